@@ -32,19 +32,42 @@ TWO_SPEEDS = Requirement(  # they distinguish a wavelength from a frequency
 
 @dataclass(frozen=True)
 class Waves:
-    """Two waves a quarter wave apart between two positions, faded over one wavelength; see ``RailCorrugation``."""
+    """Two waves a quarter wave apart between two positions, faded at both ends; see ``RailCorrugation``."""
 
     start: float
     end: float
     sine: float
     cosine: float
     wavelength: float
+    fade: float
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
-        fade = np.clip(np.minimum(x - self.start, self.end - x) / self.wavelength, 0.0, 1.0)
         phase = 2.0 * np.pi * (x - self.start) / self.wavelength
-        return fade * fade * (3.0 - 2.0 * fade) * (self.sine * np.sin(phase) + self.cosine * np.cos(phase))
+        return fade_envelope(x, self.start, self.end, self.fade) * (
+            self.sine * np.sin(phase) + self.cosine * np.cos(phase)
+        )
+
+
+def fade_envelope(x: np.ndarray, start: float, end: float, length: float) -> np.ndarray:
+    """Envelope of waves that grow and fade over a ``length`` [m] at both ends of a stretch.
+
+    Parameters
+    ----------
+    x : (n,) array of float
+        Positions. [m]
+    start, end : float
+        Of the stretch. [m]
+    length : float
+        [m]
+
+    Returns
+    -------
+    (n,) array of float
+        0 to 1.
+    """
+    share = np.clip(np.minimum(x - start, end - x) / length, 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
 
 
 @dataclass(frozen=True)
@@ -56,6 +79,7 @@ class RailCorrugation(PhysicsTerm):
     sine: float
     cosine: float = 0.0
     wavelength: float = 0.3
+    fade: float = 0.0  # m, over which its ends fade; 0: one wave
 
     name = "rail_corrugation"
     left_out = "corrugation of {wavelength:.3f} m and {amplitude:.2e} m from {start:.1f} to {end:.1f} m"
@@ -94,4 +118,4 @@ class RailCorrugation(PhysicsTerm):
         self.check()
         if self.sine == 0.0 and self.cosine == 0.0:
             return ()
-        return (Waves(self.start, self.end, self.sine, self.cosine, self.wavelength),)
+        return (Waves(self.start, self.end, self.sine, self.cosine, self.wavelength, self.fade or self.wavelength),)

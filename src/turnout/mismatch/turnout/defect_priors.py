@@ -126,6 +126,7 @@ class CorrugationPriors:
         (2e-6, 3e-4, 60), "m", "lowest, highest and number of amplitudes that are tested", SHORT_WAVES)
     response_error: float = prior(0.15, "-", "relative error of the response at one frequency", SHORT_WAVES)
     node_stride: int = prior(2, "nodes", "every second one is used", "numerical")
+    phase_step: float = prior(0.4, "rad", "between trial phases, and between trial wavelengths at the end", "numerical")
 
 
 @dataclass(frozen=True)

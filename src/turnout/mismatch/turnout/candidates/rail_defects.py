@@ -89,7 +89,9 @@ class RailScan:
         return dict(zip(self.waves.names, (self.theta + self.sd * released).tolist()))
 
 
-def scan_rail(case: TrackCase, fit: Fit, families: Collection[str] | None = None) -> tuple[Candidate, ...]:
+def scan_rail(
+    case: TrackCase, fit: Fit, families: Collection[str] | None = None, scan: RailScan | None = None
+) -> tuple[Candidate, ...]:
     """The likeliest dip and the likeliest corrugation as candidates.
 
     Parameters
@@ -100,13 +102,15 @@ def scan_rail(case: TrackCase, fit: Fit, families: Collection[str] | None = None
         A fit of the case.
     families : collection of str or None
         Effects that are searched for; None: all.
+    scan : RailScan or None
+        That of the fit; None: a new one.
 
     Returns
     -------
     tuple of Candidate
         At most one of each effect.
     """
-    scan = RailScan(case, fit)
+    scan = scan or RailScan(case, fit)
     scans = ((physics.SurfaceDip, _dip), (physics.RailCorrugation, _corrugation))
     chosen = [(effect, find) for effect, find in scans if families is None or effect.name in families]
     return tuple(candidate_of(effect, find(case, scan)) for effect, find in chosen)
@@ -177,7 +181,6 @@ def _path(term: physics.PhysicsTerm, x: np.ndarray) -> np.ndarray:
 
 # Searches in the sound level and in the waves of single wheels: (effect, case and fit -> candidates), in this order.
 SCANS = (
-    (physics.RailCorrugation, short_corrugation_candidates),
     (physics.WheelFlat, flat_candidates),
     (physics.OutOfRound, polygon_candidates),
     (physics.OutOfRound, short_polygon_candidates),
@@ -200,7 +203,10 @@ def scan_geometry(case: TrackCase, fit: Fit, families: Collection[str] | None = 
     -------
     tuple of Candidate
     """
-    candidates = list(scan_rail(case, fit, families))
+    scan = RailScan(case, fit)
+    candidates = list(scan_rail(case, fit, families, scan))
+    if families is None or physics.RailCorrugation.name in families:
+        candidates += short_corrugation_candidates(case, fit, scan)
     for effect, find in SCANS:
         if families is None or effect.name in families:
             candidates += find(case, fit)

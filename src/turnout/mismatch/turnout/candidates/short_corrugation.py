@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -21,6 +21,7 @@ from turnout.mismatch.turnout.candidates.corrugation_levels import (
     sensor_stretches,
     stretch_evidence,
 )
+from turnout.mismatch.turnout.candidates.corrugation_phase import wave_in_band
 from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.priors import PASSAGE
@@ -28,11 +29,12 @@ from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.mismatch.turnout.track_under_wheels import rail_receptances
 from turnout.mismatch.turnout.wave_response import wheel_and_contact_receptance
 from turnout.physics.hypothesis import Hypothesis
-from turnout.physics.rail_corrugation import MIN_AMPLITUDE
+from turnout.physics.rail_corrugation import MIN_AMPLITUDE, fade_envelope
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.turnout.candidates.rail_defects import RailScan
     from turnout.mismatch.turnout.case import TrackCase
     from turnout.mismatch.turnout.passage_observation import AlignedPassage
     from turnout.physics.requirement import Requirement
@@ -42,7 +44,7 @@ AMPLITUDES = np.geomspace(*CORRUGATION.amplitudes)  # m, tested
 EXPLANATIONS = {"train": "waves of the wheels of this train", "speed": "a vibration of this frequency"}
 
 
-def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
+def short_corrugation_candidates(case: TrackCase, fit: Fit, scan: RailScan | None = None) -> tuple[Candidate, ...]:
     """The likeliest short corrugation as a candidate, () where intact rail is likelier or the data cannot tell.
 
     Parameters
@@ -51,6 +53,8 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
         The case.
     fit : Fit
         A fit of the case.
+    scan : RailScan or None
+        Scores of shapes of the running surface, which give the phase; None: any phase.
 
     Returns
     -------
@@ -63,7 +67,7 @@ def short_corrugation_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, 
     if line is None:
         return ()
     wavelengths, length, k, nats, band_powers, _ = line
-    return (_candidate(case, fit, wavelengths, length, k, nats, band_powers),)
+    return (_candidate(case, fit, scan, wavelengths, length, k, nats, band_powers),)
 
 
 # Wavelengths of the bins [m], that of the line [m], its bin, evidence [nats], the passages, and the stretch [m].
@@ -177,6 +181,7 @@ def line_wavelength(
 def _candidate(
     case: TrackCase,
     fit: Fit,
+    scan: RailScan | None,
     wavelengths: np.ndarray,
     length: float,
     k: int,
@@ -190,7 +195,7 @@ def _candidate(
     where = {"wavelength": round(length, 3), "place": round(float(middle), 2)}
     hypothesis = Hypothesis(
         starts=((amplitude, length),),
-        fixed={"start": a, "end": b},
+        fixed={"start": a, "end": b, "fade": reach},
         where=where,
         n_scanned=n_widths(wavelengths[wavelengths < PASSAGE.shortest_wave]),
         parameters=parameters,
@@ -198,7 +203,25 @@ def _candidate(
         promise=nats - float(np.log(n_widths(wavelengths))),
         external_evidence=nats,
     )
+    if scan is not None:
+        hypothesis = _in_phase(hypothesis, scan, (a, b), priors)
     return candidate_of(physics.RailCorrugation, hypothesis)
+
+
+def _in_phase(
+    hypothesis: Hypothesis, scan: RailScan, stretch: tuple[float, float], priors: Mapping[str, tuple[float, float]]
+) -> Hypothesis:
+    """The hypothesis with the phase that the free waves show; the search for it has its price."""
+    wave = wave_in_band(scan, stretch, priors["wavelength"], priors["sine"])
+    assert hypothesis.promise is not None
+    return replace(
+        hypothesis,
+        starts=((wave.amplitude, wave.wavelength),),
+        fixed={**hypothesis.fixed, "start": wave.start},
+        n_scanned=hypothesis.n_scanned * float(np.exp(wave.price)),
+        promise=hypothesis.promise + wave.gain,
+        start_nuisances=wave.nuisances,
+    )
 
 
 def _line_bins(k: int) -> slice:
@@ -243,9 +266,9 @@ def _unit_energy(
               F = 1 / (A_{wheel} + A_{contact} + A_{rail})
     """
     node, gain = response_energy(case, fit, aligned, length)
-    inside = np.array([np.abs(node - m) <= r for m, r in shapes])
+    share = np.array([fade_envelope(node, m - r, m + r, r) ** 2 for m, r in shapes])
     energy = (
-        0.5 * len(aligned.passage.vehicle.wheels) / aligned.speed * np.trapezoid(inside[:, None] * gain, node, axis=2)
+        0.5 * len(aligned.passage.vehicle.wheels) / aligned.speed * np.trapezoid(share[:, None] * gain, node, axis=2)
     )
     return (
         energy * aligned.passage.recording.rate**2 / (2.0 * CORRUGATION.bin_width * aligned.speed / length)
