@@ -109,7 +109,8 @@ def _drawing_name(path: Path, taken: Collection[Path]) -> Path:
 def _files(names: list[str]) -> Iterator[tuple[Path, bool]]:
     """(file, whether it was found in a folder), those of a folder in the order of their names.
 
-    Links that lead to nothing and folders that cannot be listed are among them: reading them gives the reason.
+    Links that lead to nothing and folders that cannot be listed are among them: reading them gives the reason. Hidden
+    files and folders are left out.
     """
     import os
     from pathlib import Path
@@ -122,8 +123,11 @@ def _files(names: list[str]) -> Iterator[tuple[Path, bool]]:
             yield path, False
             continue
         closed: list[OSError] = []
-        walk = os.walk(path, onerror=closed.append)
-        inside = sorted(Path(folder, file) for folder, _, files in walk for file in files if not file.startswith("."))
+        inside = []
+        for folder, folders, files in os.walk(path, onerror=closed.append):
+            folders[:] = [name for name in folders if not name.startswith(".")]
+            inside += [Path(folder, file) for file in files if not file.startswith(".")]
+        inside.sort()
         if not inside and not closed:
             raise ReadError(path, "the path", "the folder holds no file", "Name another one", "empty")
         yield from ((file, True) for file in inside)

@@ -153,7 +153,10 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
         parser.exit(NOT_FOLLOWED, f"turnout: no command {first!r}.{close} 'turnout --help' lists the commands.\n")
     args, unknown = parser.parse_known_args(words)
     if unknown:
-        args.parser.error(f"unknown: {' '.join(unknown)}. '{args.parser.prog} --help' lists the options")
+        known = [option for action in args.parser._actions for option in action.option_strings]
+        close = get_close_matches(unknown[0].partition("=")[0], known, n=1) if unknown[0].startswith("--") else []
+        hint = f" Did you mean {close[0]}?" if close else ""
+        args.parser.error(f"unknown: {' '.join(unknown)}.{hint} '{args.parser.prog} --help' lists the options")
     return args
 
 

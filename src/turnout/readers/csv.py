@@ -174,8 +174,14 @@ def _records(
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
     for k, (a, b) in enumerate(pairwise(edges)):
         if promised is not None and b - a != promised:
-            problem = f"has {b - a} of the {promised} samples that its head promises"
-            yield source.error(f"record {k + 1} of {n}", problem, COPY_AGAIN, reason="truncated")
+            is_cut_off = b - a < promised
+            problem = f"has {b - a} of the {promised} samples that its header states"
+            if not is_cut_off:
+                problem = f"has {b - a} samples, and its header states {promised}"
+            remedy = COPY_AGAIN if is_cut_off else "Write the right number into the header, without marks for thousands"
+            yield source.error(
+                f"record {k + 1} of {n}", problem, remedy, reason="truncated" if is_cut_off else "wrong_length"
+            )
             continue
         date, start = (
             facts.record_value(START_DATE_NAMES, k, n),

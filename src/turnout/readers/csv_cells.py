@@ -30,6 +30,9 @@ OTHER_WIDTH = re.compile(r"CSV parse error: (?:Row #(\d+): )?Expected (\d+) colu
 NO_ROW_REMEDY = (
     f"{COPY_AGAIN}; if the logger's own file has it too, delete the lines that are no samples or leave that record out"
 )
+DECIMAL_COMMA_REMEDY = (
+    f"{NO_ROW_REMEDY}; where the decimal mark is a comma, export with semicolons or tabs between columns"
+)
 
 PLAIN_NUMBER_REMEDY = "Export numbers as '-12.5' or '-1.25e1', without other signs and without units"
 
@@ -194,7 +197,9 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
             where = f"line {line + int(match[1])}" if match[1] else f"the numbers after line {line}"
             count = "1 cell" if match[3] == "1" else f"{match[3]} cells"
             problem = f"a row has {count} instead of {match[2]}: {match[4].strip()[:60]!r}"
-            raise source.error(where, problem, NO_ROW_REMEDY) from error
+            has_one_comma_mark = "," in match[4] and not re.search(r"[;\t|]", match[4])
+            remedy = DECIMAL_COMMA_REMEDY if has_one_comma_mark else NO_ROW_REMEDY
+            raise source.error(where, problem, remedy) from error
         if not (match := INVALID_VALUE.search(str(error))):
             raise
         column, row, cell = int(match[1]), match[2], match[3]

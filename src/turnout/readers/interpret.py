@@ -179,13 +179,13 @@ def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> 
     n_present = len(raw.records)
     layout_remedy = _copy_or_correct("records", description.n_records)
     promises = (("the layout", description.n_records, layout_remedy), ("its own header", raw.expected, COPY_AGAIN))
-    for promiser, promised, remedy in promises:
+    for stated_by, promised, remedy in promises:
         if promised is not None and n_present < promised:
-            problem = f"it holds {n_present} of the {promised} records that {promiser} promises"
+            problem = f"it holds {n_present} of the {promised} records that {stated_by} states"
             yield source.error(f"record {n_present + 1} of {promised}", problem, remedy, reason="truncated")
             return
     if description.n_records is not None and n_present > description.n_records:
-        problem = f"it holds {n_present} records, {n_present - description.n_records} more than the layout promises"
+        problem = f"it holds {n_present} records, {n_present - description.n_records} more than the layout states"
         remedy = "Correct records in the layout, or find out whether two tests share one file"
         yield source.error(f"record {description.n_records + 1}", problem, remedy, reason="wrong_length")
 
@@ -275,7 +275,7 @@ def _sample_count(record: RawRecord, where: str, promised: int | None, source: S
         problem = f"channel {short!r} ends after {shortest} samples, others after {longest}"
         raise source.error(where, problem, COPY_AGAIN, reason="truncated")
     if promised is not None and shortest < promised:
-        problem = f"ends after {shortest} of the {promised} samples that the layout promises"
+        problem = f"ends after {shortest} of the {promised} samples that the layout states"
         raise source.error(where, problem, _copy_or_correct("samples", promised), reason="truncated")
     if promised is not None and shortest > promised:
         problem = f"it has {shortest} samples instead of {promised}"

@@ -211,7 +211,7 @@ def _writes(source: Source, segment: _Segment, n_row: int, x: np.ndarray | None)
 def _check_lengths(
     source: Source, segment: _Segment, samples: Sequence[int], columns: Sequence[np.ndarray], n_write: int
 ) -> None:
-    """An error if a channel has not the samples that its header promises."""
+    """An error if a channel has not the samples that its header states."""
     for name, promised, column in zip(segment.names, samples, columns):
         if len(column) != promised * n_write:
             place = f"{segment.where}, channel {name!r}"

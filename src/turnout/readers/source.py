@@ -294,9 +294,7 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
         with resolved.open("rb") as file:
             head, size = file.read(HEAD_SIZE), os.fstat(file.fileno()).st_size
     except (FileNotFoundError, NotADirectoryError) as error:
-        vanished_remedy = (
-            "Correct the path; if it was there before, start again when it is back, or plan again without it"
-        )
+        vanished_remedy = "Correct the path, or wait until the disk that holds the file is mounted again"
         raise ReadError(name, "the path", "there is no such file", vanished_remedy, reason="vanished") from error
     except OSError as error:
         if is_infrastructure(error) and not isinstance(error, PermissionError):

@@ -148,7 +148,7 @@ def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> Fil
     numbered = [(k, record) for k, record in enumerate(raw_records) if isinstance(record, RawRecord)]
     records = tuple(record for _, record in numbered)
     if expected is not None and len(raw_records) < expected:
-        problems.append(f"it holds {len(raw_records)} of the {expected} records that its own header promises")
+        problems.append(f"it holds {len(raw_records)} of the {expected} records that its own header states")
     base = FileContents(
         str(path), format_name, FORMATS[format_name].meaning, source.size, len(raw_records),
         records=records, problems=tuple(problems),

@@ -97,6 +97,7 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
     [
         ("", "usage: turnout"),
         ("hamer", "no command 'hamer'. Did you mean 'hammer'?"),
+        ("worklist --as-of 2026-05-14", "unknown: --as-of 2026-05-14. Did you mean --asof? 'turnout worklist --help'"),
         ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
         (
             "simulate passage --speed -3",

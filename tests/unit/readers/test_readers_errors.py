@@ -69,10 +69,7 @@ def test_a_link_in_a_circle_is_refused(tmp_path, in_si):
 def test_a_vanished_file(tmp_path, in_si):
     error = refusal("A7_1.uff", tmp_path, in_si)
     assert error.reason == "vanished"
-    found = (
-        "there is no such file. Correct the path; if it was there before, start again when it is back, or plan again "
-        "without it."
-    )
+    found = "there is no such file. Correct the path, or wait until the disk that holds the file is mounted again."
     assert str(error) == f"A7_1.uff, the path: {found}"
 
 
@@ -236,7 +233,7 @@ def test_fewer_records_than_promised(tmp_path, in_si, hammer_test):
     error = only_error(path.name, tmp_path, replace(in_si, n_records=10), 3)
     assert error.reason == "truncated"
     remedy = f"{COPY[:-1]}; if it is whole, correct 'records: 10' in the layout (null: any number)"
-    assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout promises. {remedy}."
+    assert str(error) == f"a.npz, record 4 of 10: it holds 3 of the 10 records that the layout states. {remedy}."
 
 
 def test_fewer_records_than_the_file_itself_promises_are_the_loggers(tmp_path, in_si, hammer_test):
@@ -244,14 +241,14 @@ def test_fewer_records_than_the_file_itself_promises_are_the_loggers(tmp_path, i
     path.write_text("# n_records: 5\n" + "\n".join(x for x in path.read_text().split("\n") if "n_records" not in x))
     error = only_error(path.name, tmp_path, in_si, 3)
     assert error.reason == "truncated"
-    assert str(error) == f"a.csv, record 4 of 5: it holds 3 of the 5 records that its own header promises. {COPY}"
+    assert str(error) == f"a.csv, record 4 of 5: it holds 3 of the 5 records that its own header states. {COPY}"
 
 
 def test_more_records_than_promised(tmp_path, in_si, hammer_test):
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_records=3), 4)
     assert error.reason == "wrong_length"
-    assert "a.npz, record 4: it holds 4 records, 1 more than the layout promises. Correct records in" in str(error)
+    assert "a.npz, record 4: it holds 4 records, 1 more than the layout states. Correct records in" in str(error)
 
 
 def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_test):
@@ -259,7 +256,7 @@ def test_fewer_samples_than_promised_cost_that_record(tmp_path, in_si, hammer_te
     path = write(hammer_test, tmp_path / "a.npz", "npz")
     error = only_error(path.name, tmp_path, replace(in_si, n_samples=301), 3)
     assert error.reason == "truncated"
-    found = "ends after 200 of the 301 samples that the layout promises"
+    found = "ends after 200 of the 301 samples that the layout states"
     remedy = f"{COPY[:-1]}; if it is whole, correct 'samples: 301' in the layout (null: any number)"
     assert str(error) == f"a.npz, record 2 of 4: {found}. {remedy}."
     kept = read(path.name, tmp_path, replace(in_si, n_samples=301)).recordings

@@ -132,7 +132,21 @@ def test_a_table_shorter_than_its_head_promises_is_cut(word, tmp_path):
         (tmp_path / "a.csv").write_text(text.format(promised))
         (error,) = read("a.csv", tmp_path, NAMED).errors
         assert error.reason == "truncated"
-        assert error.problem == f"has 50 of the {number} samples that its head promises"
+        assert error.problem == f"has 50 of the {number} samples that its header states"
+
+
+def test_a_record_longer_than_its_header_states_is_no_copy_that_was_cut_off(tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nn_samples: 4\nforce;acc\n{ROWS}")
+    (error,) = read("a.csv", tmp_path, NAMED).errors
+    assert error.reason == "wrong_length" and error.problem == "has 50 samples, and its header states 4"
+
+
+def test_decimal_commas_between_commas_are_explained(tmp_path):
+    rows = "".join(f"{a:.4f},{b:.4f}\n" for a, b in X)
+    (tmp_path / "a.csv").write_text("rate: 20000\nforce,acc\n1,1\n" + rows.replace(".", ","))
+    with pytest.raises(ReadError, match="4 cells instead of 2") as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert "where the decimal mark is a comma, export with semicolons or tabs between columns" in str(caught.value)
 
 
 def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):

@@ -78,7 +78,7 @@ def test_a_unit_that_is_not_ascii_and_a_short_last_line(vendors):
 
 
 def test_an_excerpt_is_called_cut_off(vendors):
-    """The file holds 42 of the 2 508 876 samples its header promises; pyuff gives the 42 without a word."""
+    """The file holds 42 of the 2 508 876 samples its header states; pyuff gives the 42 without a word."""
     description = RawDescription((RawChannel("p", 0, "pressure"),))
     (error,) = read("dataset_milestone_in_header.uff", vendors, description).errors
     assert error.reason == "truncated"

@@ -104,6 +104,12 @@ def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():
     assert re.findall(r"turnouts/(\w)\.html", second["svg"]) == ["a", "b", "c"]
 
 
+def test_of_two_turnouts_too_close_for_both_names_the_urgent_one_is_named():
+    fleet = [turnout("calm", 12.4) | {"worst": "cannot tell"}, turnout("urgent", 12.5) | {"worst": "inspect this week"}]
+    (drawing,) = line_diagrams([*fleet, turnout("far", 50.0) | {"worst": "ok"}])
+    assert re.findall(r'class="place"[^>]*>(\w+)<', drawing["svg"]) == ["urgent", "far"]
+
+
 def test_turnouts_of_one_station_do_not_lie_on_each_other():
     fleet = [turnout(f"t{k}", 5.0 + 0.01 * k) | {"worst": "ok"} for k in range(9)]
     (drawing,) = line_diagrams([*fleet, turnout("far", 99.0) | {"worst": "ok"}])

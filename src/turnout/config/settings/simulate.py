@@ -14,7 +14,7 @@ class SimulateSettings:
         why="L-stable, 1.6 % error to 1 kHz at 1e-4 s where the midpoint rule (Newmark) has 15 %",
         choices=("radau", "gauss", "midpoint"),
     )
-    rate: float = setting(20000.0, "Hz", "rate of the paper; used where the layout promises none", 1000.0, 200000.0)
+    rate: float = setting(20000.0, "Hz", "rate of the paper; used where the layout states none", 1000.0, 200000.0)
     substeps: int = setting(1, "", "time steps per sample; 2 halves the step, as numerical_error does", 1, 64)
     entry: float = setting(
         6.0, "m", "length over which wheels roll from their stand-in on to the modelled track: error 1e-4", 1.0, 50.0

@@ -27,7 +27,7 @@ from receptances t anti join superseded s on t.model_id = s.old_id;
 -- decay_rate_hz | double | Hz | sampling rate of decay and decay_model
 -- decay_ms2 | float[] | m/s² | free decay of one accepted impact
 -- decay_model_ms2 | float[] | m/s² | the model's free decay fitted to it
--- stabilisation_json | varchar | | poles over model order for the stabilisation diagram, JSON
+-- stabilisation_json | varchar | | poles over model order for the stabilization diagram, JSON
 -- run_id | varchar | | content id of the batch
 -- response_density_m2_s3 | float[] | (m/s²)²/Hz | power spectral density of the response, averaged over the impacts, at frequency_hz
 -- density_low_factor | double | | response_density_m2_s3 times it is the lower 95 % limit (chi-squared with two degrees of freedom per impact)

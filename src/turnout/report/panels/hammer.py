@@ -1,4 +1,4 @@
-"""Draw the panels of a hammer test: receptance, coherence, free decay, stabilisation diagram and impacts."""
+"""Draw the panels of a hammer test: receptance, coherence, free decay, stabilization diagram and impacts."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def _is_number(value: float | None) -> bool:
 
 
 def stabilisation_panel(test: HammerTest) -> str:
-    """Stabilisation diagram: poles over model order.
+    """Stabilization diagram: poles over model order.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def stabilisation_panel(test: HammerTest) -> str:
     chart = Chart(
         Axis(30.0, 1600.0, "frequency [Hz]", "log"),
         Axis(min(orders) - 1, max(orders) + 3, "model order"),  # room for words
-        "Stabilisation: poles over model order",
+        "Stabilization: poles over model order",
     )
     for mode in test.modes:
         chart.vertical(mode["frequency_hz"], "mode", mode["band"])

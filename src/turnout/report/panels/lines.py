@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -85,14 +84,14 @@ def _kilometres(low: float, high: float, px: Callable[[float], float], rail: flo
 
 
 def _names(turnouts: Sequence[Mapping[str, Any]], px: Callable[[float], float]) -> Iterator[str]:
-    """Ids above the line, those left out that would lie on the one before."""
-    last_end = -math.inf
-    for turnout in turnouts:
+    """Ids above the line, those left out that would lie on the id of another turnout, the most urgent first."""
+    occupied: list[tuple[float, float]] = []
+    for turnout in sorted(turnouts, key=lambda t: URGENT.index(t["worst"]) if t["worst"] in URGENT else len(URGENT)):
         half = 0.5 * LETTER * len(turnout["turnout_id"])
         x = min(max(px(turnout["km"]), half), WIDTH - half)
-        if x - half > last_end:
+        if all(abs(x - centre) > half + width + 4.0 for centre, width in occupied):
             yield f'<text class="place" x="{x:.1f}" y="11" text-anchor="middle">{escape(turnout["turnout_id"])}</text>'
-            last_end = x + half + 4.0
+            occupied.append((x, half))
 
 
 def _circle(turnout: Mapping[str, Any], x: float, y: float) -> str:
