@@ -154,8 +154,8 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
     args, unknown = parser.parse_known_args(words)
     if unknown:
         known = [option for action in args.parser._actions for option in action.option_strings]
-        close = get_close_matches(unknown[0].partition("=")[0], known, n=1) if unknown[0].startswith("--") else []
-        hint = f" Did you mean {close[0]}?" if close else ""
+        similar = get_close_matches(unknown[0].partition("=")[0], known, n=1) if unknown[0].startswith("--") else []
+        hint = f" Did you mean {similar[0]}?" if similar else ""
         args.parser.error(f"unknown: {' '.join(unknown)}.{hint} '{args.parser.prog} --help' lists the options")
     return args
 
