@@ -1,8 +1,9 @@
--- Words on the stiffness behind a change of a resonance: which component, by how much with its 95 % interval.
+-- Words on the stiffness behind a change of a resonance: which component, by how much with its 95 % interval. It is that
+-- of all supports around the section taken alike; a diagnosis gives that of single sleepers, which change more.
 -- Without a component (one resonance, or a list of an earlier day) the stiffness is about twice the change of frequency.
 create or replace macro one_stiffness_words(component, pct, low_pct, high_pct) as (
     component || case when pct < 0 then ' lost ' else ' gained ' end
-        || printf('%.0f %% of stiffness (%.0f to %.0f)', abs(pct),
+        || printf('%.0f %% of stiffness around the section (%.0f to %.0f)', abs(pct),
             case when pct < 0 then -high_pct else low_pct end, case when pct < 0 then -low_pct else high_pct end)
 );
 
