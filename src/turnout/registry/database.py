@@ -6,6 +6,7 @@ generation.
 
 from __future__ import annotations
 
+import tempfile
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -89,12 +90,30 @@ def _open_generation(folder: Path, as_of: int | str | datetime) -> duckdb.DuckDB
     generation, time = find_generation(folder, as_of)
     connection = duckdb.connect(":memory:", config=OFFLINE_CONFIG)
     connection.execute("set enable_progress_bar = false")
+    published = time or datetime.now(UTC)
     try:
-        create_catalogue(connection, folder.resolve(), generation, time or datetime.now(UTC))
+        if _has_copied_template(connection):
+            use_generation(connection, folder.resolve(), generation, published)
+        else:
+            create_catalogue(connection, folder.resolve(), generation, published)
     except duckdb.Error as error:
         connection.close()
         raise RegistryError(f"{folder}, generation {generation.number}: {str(error).splitlines()[0]}") from error
     return connection
+
+
+def _has_copied_template(connection: duckdb.DuckDBPyConnection) -> bool:
+    """Copy the template into the database of the connection; False where no temporary file can be written."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="turnout-catalogue-") as name:
+            file = Path(name) / DATABASE
+            file.write_bytes(catalogue_template())
+            connection.execute(f"attach {literal(str(file))} as template (read_only)")
+            connection.execute("copy from database template to memory (schema)")
+            connection.execute("detach template")
+    except OSError:
+        return False
+    return True
 
 
 def build_database(registry_dir: Path, generation: Generation) -> None:

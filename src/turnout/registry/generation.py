@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -75,7 +75,7 @@ class Generation:
 
     def to_json(self) -> str:
         """Text of the generation file; equal generations give equal bytes."""
-        content = {"format": FORMAT_VERSION} | asdict(self)
+        content = {"format": FORMAT_VERSION} | vars(self) | {"files": [vars(file) for file in self.files]}
         if not self.incomplete:  # an earlier version of the program does not know it
             del content["incomplete"]
         return json.dumps(content, indent=1, sort_keys=True) + "\n"

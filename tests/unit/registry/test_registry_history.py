@@ -113,6 +113,31 @@ def test_an_earlier_generation_answers_by_number_and_by_time(merged):
             open_registry(merged.registry, as_of=as_of)
 
 
+def catalogue_of(connection):
+    """Views with their comments and macros of a connection."""
+    views = "select view_name, comment from duckdb_views() where not internal order by all"
+    macros = "select distinct function_name from duckdb_functions() where not internal order by all"
+    return connection.execute(views).fetchall(), connection.execute(macros).fetchall()
+
+
+def test_an_earlier_generation_has_all_views_and_comments_of_the_present_one(made):
+    with open_registry(made.registry) as now, open_registry(made.registry, as_of=2) as then:
+        assert catalogue_of(then) == catalogue_of(now)
+        for view, _ in catalogue_of(then)[0]:
+            then.execute(f'from "{view}"')
+        assert then.execute("select database_name from duckdb_databases() where not internal").fetchall() == [
+            ("memory",)
+        ]
+
+
+def test_an_earlier_generation_is_opened_though_no_temporary_file_can_be_written(merged, monkeypatch):
+    def full(prefix):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("turnout.registry.database.tempfile.TemporaryDirectory", full)
+    assert count_as_of(merged.registry, 2) == 2
+
+
 def test_the_command_asks_an_earlier_generation_and_reads_nothing_else(merged, capsys, tmp_path):
     assert main(["query", COUNT, "--registry", str(merged.registry), "--as-of", "2"]) == 0
     assert re.search(r"^\s*2$", capsys.readouterr().out, re.M)
