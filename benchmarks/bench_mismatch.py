@@ -22,7 +22,7 @@ from turnout.mismatch.engine.fit_quality import fit_percent
 from turnout.mismatch.engine.reserved_data import predict_reserved
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import PlannedCase, measured_campaign, small_plan, turnout_plan
-from turnout.stages.mismatch_groups import reserved_names, select_passages
+from turnout.stages.recording_choice import reserved_names, select_passages
 
 EFFECTS = {
     "hanging_sleeper": (physics.HangingSleeper(39, 5e-4), {"place": 23.4}),

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.published.models import PublishedModel, published_model
-from turnout.modal.frf import haversine_pulse, pulse_response
 from turnout.modal.poles import continuous_pole
+from turnout.modal.pulse_response import haversine_pulse, pulse_response
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from turnout.stages.hammer_adhoc import RequestedUnit
+    from turnout.stages.requested_units import RequestedUnit
 
 GROUP = "Look at recordings"
 HELP = "analyse one hammer test, without storing results"
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
     from turnout.report.hammer_text import hammer_words, is_usable
-    from turnout.stages.hammer_adhoc import requested_units
+    from turnout.stages.requested_units import requested_units
 
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(

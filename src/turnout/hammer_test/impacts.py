@@ -11,8 +11,9 @@ from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test.agreement import judge_agreement
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.contact import band_edges, measure_contact
+from turnout.hammer_test.force_tops import judge_tops
 from turnout.hammer_test.free_decay import judge_decay, judge_second_contact
-from turnout.hammer_test.impact_quality import is_repeated, judge_against_median, judge_repeats, judge_tops, overload
+from turnout.hammer_test.impact_quality import is_repeated, judge_against_median, judge_repeats, overload
 from turnout.hammer_test.impact_window import NO_CONTACT
 from turnout.hammer_test.segmentation import cut_impacts
 from turnout.records import Impact, Recording, Rejection

@@ -12,10 +12,10 @@ import scipy
 
 from turnout.modal.bands import accepted_modes, fit_receptance, passed_share
 from turnout.modal.era import era
-from turnout.modal.frf import pulse_response
 from turnout.modal.joint import common_length, fit_diagnostics, stabilisation_rows
 from turnout.modal.least_squares import drift_columns, linearise
 from turnout.modal.poles import continuous_pole
+from turnout.modal.pulse_response import pulse_response
 from turnout.modal.selection import select_modes
 from turnout.modal.state_space import assemble, no_decays, no_model
 from turnout.modal.summary import ImpactEstimates

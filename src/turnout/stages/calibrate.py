@@ -22,8 +22,8 @@ from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibr
 from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
-from turnout.stages.hammer_adhoc import section_of
 from turnout.stages.raw_files import require_file
+from turnout.stages.requested_files import section_of
 from turnout.stages.track_files import track_file
 
 LOG = logging.getLogger("turnout.simulate")

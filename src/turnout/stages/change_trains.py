@@ -21,14 +21,9 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters
 from turnout.stages.finding_row import finding_row
-from turnout.stages.mismatch_groups import (
-    Group,
-    groups,
-    select_passages,
-    split_by_length,
-    visits,
-)
+from turnout.stages.mismatch_groups import Group, groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
+from turnout.stages.recording_choice import select_passages, split_by_length
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:

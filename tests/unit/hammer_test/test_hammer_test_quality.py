@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from turnout.hammer_test.agreement import pairwise_coherence, response_gain
-from turnout.hammer_test.impact_quality import rail_code, top_share
+from turnout.hammer_test.force_tops import top_share
+from turnout.hammer_test.impact_quality import rail_code
 from turnout.signal.filters import FAMILIES, force_pulse
 
 RATE = 20_000.0

@@ -14,7 +14,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import CampaignInput, TrackCase
 from turnout.mismatch.turnout.campaign import PassageInput
-from turnout.mismatch.turnout.candidates.out_of_roundness import short_polygon_candidates, wheel_excess
+from turnout.mismatch.turnout.candidates.short_polygons import short_polygon_candidates, wheel_excess
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.physics import Parameter

@@ -8,10 +8,7 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.candidates.out_of_roundness import (
-    polygon_evidence,
-    short_polygon_candidates,
-)
+from turnout.mismatch.turnout.candidates.short_polygons import polygon_evidence, short_polygon_candidates
 from turnout.mismatch.turnout.defect_priors import SHORT_POLYGONS
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 

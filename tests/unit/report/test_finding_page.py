@@ -13,7 +13,8 @@ from jinja2 import Environment, PackageLoader
 from turnout.errors import SimulationError
 from turnout.report.finding_text import ANSWERS, accepted_parameters, answer, check, facts, parameters
 from turnout.report.pages.finding import finding_page
-from turnout.report.panels.finding import TurnoutDrawing, marked_position, residual_panel
+from turnout.report.panels.finding import residual_panel
+from turnout.report.panels.position import TurnoutDrawing, marked_position
 from turnout.stages.accept_finding import _check_acceptable
 from turnout.stages.mismatch_text import headline
 

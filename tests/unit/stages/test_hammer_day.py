@@ -5,7 +5,7 @@ import pytest
 
 from turnout.errors import ConfigError
 from turnout.records import RawChannel, RawDescription
-from turnout.stages.hammer_adhoc import _noted_day
+from turnout.stages.requested_files import _noted_day
 
 CHANNELS = (RawChannel("force", "force", "force", "N"),)
 

@@ -32,10 +32,11 @@ from turnout.stages import mismatch, mismatch_groups, mismatch_inputs
 from turnout.stages.accept_finding import with_entry
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrate import calibrate_to_files
-from turnout.stages.mismatch_groups import groups, neighbours_of, select_passages, unit_of
+from turnout.stages.mismatch_groups import groups, neighbours_of, unit_of
 from turnout.stages.mismatch_inputs import MAX_SIMILAR_PASSAGES, Note, VisitInputs, _thin_out, gather_inputs
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.mismatch_trains import train_of
+from turnout.stages.recording_choice import select_passages
 from turnout.stages.recording_notes import noted_number, rail_temperature
 from turnout.stages.track_files import digest_of_model, track_of
 from turnout.workflow.scan import scan, unit_id

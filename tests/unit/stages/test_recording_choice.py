@@ -6,9 +6,9 @@ import pytest
 
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.simulate import load_vehicle
-from turnout.stages.mismatch_groups import reserved_names, select_passages, split_by_length
 from turnout.stages.mismatch_inputs import _is_unusable
 from turnout.stages.mismatch_trains import train_of
+from turnout.stages.recording_choice import reserved_names, select_passages, split_by_length
 
 
 def train(name, kind, axles, speed):

@@ -16,14 +16,8 @@ from turnout.report.finding_text import (
     unmet_requirements,
 )
 from turnout.report.formatting import day
-from turnout.report.panels.finding import (
-    STYLES,
-    curve_panel,
-    fit_panel,
-    history_of_parameter,
-    position_panel,
-    residual_panel,
-)
+from turnout.report.panels.finding import curve_panel, fit_panel, history_of_parameter, residual_panel
+from turnout.report.panels.position import STYLES, position_panel
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

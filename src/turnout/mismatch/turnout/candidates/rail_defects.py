@@ -21,8 +21,9 @@ import numpy as np
 from turnout import physics
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, parameters_with
-from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates, short_polygon_candidates
+from turnout.mismatch.turnout.candidates.out_of_roundness import polygon_candidates
 from turnout.mismatch.turnout.candidates.short_corrugation import short_corrugation_candidates
+from turnout.mismatch.turnout.candidates.short_polygons import short_polygon_candidates
 from turnout.mismatch.turnout.candidates.wheel_flats import flat_candidates
 from turnout.mismatch.turnout.defect_priors import GEOMETRY
 from turnout.mismatch.turnout.surface_priors import ROUGHNESS
