@@ -41,7 +41,7 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, S
 from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.texts import wide_encoding
+from turnout.readers.texts import decode_text, wide_encoding
 
 
 def read_raw(source: Source) -> RawFile:
@@ -113,6 +113,8 @@ def _without_cut_row(data: bytes | mmap, source: Source) -> tuple[bytes | mmap, 
     last = data[start:]
     if len(rows) == N_COMPARED_ROWS and all(_shape(row) == _shape(last) for row in rows) and _shape(last)[1]:
         return data, ()
+    if not decode_text(data[:]).strip():
+        raise source.error("line 1", "there is no text", COPY_AGAIN, reason="empty")
     line = data[:].count(b"\n") + 1
     problem = "the last line has no line break: its last number may be cut"
     remedy = f"{COPY_AGAIN}, or add the line break if it is whole"

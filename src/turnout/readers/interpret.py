@@ -22,6 +22,7 @@ from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
+from turnout.readers.stated_counts import missing_samples
 from turnout.readers.stated_scales import remedy as scale_remedy
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unexplained_entries import EntryCheck
@@ -93,6 +94,8 @@ def convert_records(
     order_errors = check_order(starts, source)
     start_of = dict(starts)
     assignments, entry_check = Assignments(description.channels, source), EntryCheck(description, source)
+    n_total = sum(len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples))
+    is_whole = all(isinstance(r, RawRecord) for r in raw.records)
     limit = max_duration if source.lazy and description.kind == "passage" else None
     conversion = _Conversion(len(raw.records), assignments, entry_check, description, source, limit)
     for k, record in enumerate(raw.records):
@@ -102,6 +105,8 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             record = entry_check.without_checked(record)
+            if is_whole and (problem := missing_samples(record, n_total)):
+                raise source.error(f"record {k + 1} of {len(raw.records)}", problem, COPY_AGAIN, reason="truncated")
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
             recording, channel_errors = conversion.recording(record, k, started_at)

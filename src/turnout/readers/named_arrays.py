@@ -185,7 +185,12 @@ def channel_names(facts: Metadata) -> list[str]:
     value = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
     is_number = isinstance(value, (int, float, np.number))
     is_count = is_number or (isinstance(value, str) and value.strip().isdecimal() and int(value) > 1)
-    return [] if is_count else list_of_texts(value)
+    return [] if is_count else _split_texts(list_of_texts(value))
+
+
+def _split_texts(texts: list[str]) -> list[str]:
+    """The texts of a list that a program wrote as one text, as in "force, rail"."""
+    return [text.strip() for text in re.split(r"[,;|\t]", texts[0])] if len(texts) == 1 else texts
 
 
 def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None) -> RawFile:
@@ -359,7 +364,7 @@ def _units_of(channels: Mapping[str, Array], facts: Metadata, ordered: bool, whe
 def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Source) -> RawRecord:
     """The record of a matrix (channel, sample) or (sample, channel)."""
     block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
-    names, units = channel_names(facts), list_of_texts(facts.get(UNIT_NAMES))
+    names, units = channel_names(facts), _split_texts(list_of_texts(facts.get(UNIT_NAMES)))
     if block.ndim != 2 or block.dtype.kind not in "fiu":
         raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")
     rows = len(names) or min(block.shape)

@@ -17,6 +17,16 @@ from turnout.readers.rate_units import PER, SAMPLES, SECONDS, TIME_UNITS, RateUn
 SAMPLING = re.compile(
     r"samp|smpl?|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acq|adqui|erfass|prove"
 )
+# The same in other languages. There a word of rate or step counts only beside one of sampling, because no list of other
+# frequencies is known. Characters are as ``words_of`` returns them, without marks.
+OTHER_SAMPLING = re.compile(
+    "probkow|vzork|amostr|mintav|nayttee?n|orneklem|uzork|esantion|provtag|дискретиз|выборк|опроса"
+    "|采样|采樣|取样|取樣|採樣|標本化|サンフリンク|δειγματοληψ"
+)
+OTHER_RATE = re.compile(
+    "czestotliw|taajuu|frekans|taxa|nopeus|szybkosc|частот|скорост|频率|頻率|周波数|レート|率$|συχνοτ"
+)
+OTHER_STEP = re.compile("okres|odstep|jakso|krok|aralıg|интервал|период|шаг|间隔|間隔|周期")
 WEAK_SAMPLING = re.compile(
     r"mess|mesur|medi[dc]|misur|male|maling|meas|meting|meet|record|aufzeich|enregistr|registr|logg|data|daq|adc|digit|conver|output"
 )
@@ -82,6 +92,8 @@ NOT_COUNTED = re.compile(
 POSSIBLE = POSSIBLE_RATES | {
     "sampling", "abtastung", "echantillonnage", "muestreo", "campionamento", "bemonstering", "vzorkovani", "timebase",
     "zeitbasis", "samplingtime", "abtastzeitraum",
+    "probkowanie", "amostragem", "mintavetelezes", "naytteenotto", "ornekleme", "provtagning", "дискретизация", "采样",
+    "サンフリンク",
 }  # fmt: skip
 # Names of other frequencies, of settings, counts and times of day.
 OTHER = re.compile(
@@ -225,6 +237,9 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
     is_counted = "per" in words[1:-1] and NOT_COUNTED.search(words[-3]) is not None  # "bytes per sample"
     is_step |= "per" in words and len(words) > 2 and words[-1] in PER_SAMPLE and not is_rate and not is_counted
     is_sampling = bool(SAMPLING.search(spaced)) or any(SAMPLES.fullmatch(w) and len(w) > 2 for w in words)
+    if OTHER_SAMPLING.search(spaced):
+        is_sampling, is_rate = True, is_rate or bool(OTHER_RATE.search(spaced))
+        is_step |= bool(OTHER_STEP.search(spaced))
     is_timed = any(TIME.match(word) for word in words)
     is_measuring = bool(WEAK_SAMPLING.search(spaced)) and not re.search(r"data|daten", spaced)
     is_certain = (is_step and (is_sampling or is_timed)) or (is_rate and (is_sampling or is_measuring))

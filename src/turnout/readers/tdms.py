@@ -4,6 +4,7 @@ npTDMS reads a truncated file without an error. Therefore the file size is compa
 and the length of each channel with ``wf_samples``.
 """
 
+import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -192,8 +193,7 @@ def _complete_record(
             place = f"{where}, channel {channel.name!r}"
             raise source.error(place, problem, COPY_AGAIN, reason="truncated")
     _check_steps(channels, where, source)
-    with source.parsed_by("npTDMS", where):
-        samples = [_numbers(c, source) for c in channels]
+    samples = [_scaled_numbers(c, where, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
     undecided = {
         i: text
@@ -250,6 +250,22 @@ def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Sou
     stamps = start_offsets([parse_time(f.record_value(("wf_start_time",), 0, 1)) for f in facts])
     starts = [stamp + (f.number(("wf_start_offset",)) or 0.0) for stamp, f in zip(stamps, facts)]
     check_simultaneous([c.name for c in channels], steps, starts, where, source)
+
+
+def _scaled_numbers(channel: nptdms.TdmsChannel, where: str, source: Source) -> Column:
+    """As ``_numbers``; ReadError if a property of a scale that it needs is missing or is no number."""
+    try:
+        with source.parsed_by("npTDMS", where):
+            return _numbers(channel, source)
+    except ReadError as error:
+        if not any(name.startswith("NI_Scale[") for name in channel.properties):
+            raise
+        kinds = {str(v) for n, v in channel.properties.items() if re.fullmatch(r"NI_Scale\[\d+\]_Scale_Type", n)}
+        listed = ", ".join(map(repr, sorted(kinds))) or "without a type"
+        place = f"{where}, channel {channel.name!r}"
+        problem = f"its scale {listed} cannot be applied, npTDMS says {error.problem.partition('(')[2].rstrip(')')}"
+        remedy = "Export the channel scaled, or with all properties of its scale"
+        raise source.error(place, problem, remedy, reason="scale_unknown") from error
 
 
 def _numbers(channel: nptdms.TdmsChannel, source: Source) -> Column:

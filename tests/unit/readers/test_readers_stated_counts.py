@@ -1,0 +1,139 @@
+"""A number of samples in the metadata of any format, names of a sampling rate in further languages, broken scales."""
+
+import json
+
+import h5py
+import nptdms
+import numpy as np
+import pytest
+import scipy.io
+import soundfile
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.readers.rate_words import CERTAIN, name_meaning
+from turnout.readers.statements import statements_of_value
+from turnout.records import RawChannel, RawDescription
+
+RATE = 20000.0
+CHANNELS = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
+SAMPLES = np.random.default_rng(1).normal(size=(400, 2)).round(6)
+
+
+def as_npz(path, **entries):
+    np.savez(path, force=SAMPLES[:, 0], rail=SAMPLES[:, 1], **entries)
+
+
+def as_mat(path, **entries):
+    scipy.io.savemat(path, {"force": SAMPLES[:, 0], "rail": SAMPLES[:, 1], **entries})
+
+
+def as_hdf5(path, **entries):
+    with h5py.File(path, "w") as file:
+        file["force"], file["rail"] = SAMPLES.T
+        file.attrs.update(entries)
+
+
+def as_tdms(path, **entries):
+    with nptdms.TdmsWriter(str(path)) as writer:
+        properties = {"wf_increment": 1 / RATE}
+        channels = [nptdms.ChannelObject("hit", n, x, properties) for n, x in zip(("force", "rail"), SAMPLES.T)]
+        writer.write_segment([nptdms.RootObject(entries), *channels])
+
+
+def as_wav(path, **entries):
+    with soundfile.SoundFile(str(path), "w", int(RATE), 2, "DOUBLE") as file:
+        file.comment = json.dumps({"channels": ["force", "rail"], **entries})
+        file.write(SAMPLES)
+
+
+FORMATS = {"npz": as_npz, "mat": as_mat, "h5": as_hdf5, "tdms": as_tdms, "wav": as_wav}
+
+
+def result_of(tmp_path, name):
+    return read(name, tmp_path, RawDescription(CHANNELS, rate=RATE))
+
+
+@pytest.mark.parametrize("name", ["n_samples", "Number of samples", "Samples", "Anzahl Messwerte"])
+@pytest.mark.parametrize("extension", FORMATS)
+def test_a_file_with_fewer_samples_than_it_states_was_cut_off(extension, name, tmp_path):
+    entry = name.replace(" ", "_") if extension in ("npz", "mat") else name
+    FORMATS[extension](tmp_path / f"a.{extension}", **{entry: 500})
+    (error,) = result_of(tmp_path, f"a.{extension}").errors
+    assert error.reason == "truncated" and "the file ends after 400 of the 500 samples that" in str(error)
+
+
+@pytest.mark.parametrize("count", [400, 399, 0])
+@pytest.mark.parametrize("extension", FORMATS)
+def test_a_file_with_as_many_samples_as_it_states_is_read(extension, count, tmp_path):
+    FORMATS[extension](tmp_path / f"a.{extension}", n_samples=count)
+    assert len(result_of(tmp_path, f"a.{extension}").recordings) == 1
+
+
+@pytest.mark.parametrize("promised, n_recording", [(1200, 3), (400, 3), (1201, 0)])
+def test_the_number_may_count_the_samples_of_all_records(promised, n_recording, tmp_path):
+    records = {f"record_{k:03d}": SAMPLES.T + k for k in range(3)}
+    np.savez(tmp_path / "a.npz", **records, channels=np.array(["force", "rail"]), number_of_samples=promised)
+    assert len(result_of(tmp_path, "a.npz").recordings) == n_recording
+
+
+@pytest.mark.parametrize("text", ["force, rail", "force;rail", "force\trail", "force|rail"])
+def test_names_in_one_text_are_those_of_the_columns(text, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["data"] = SAMPLES
+        file["data"].attrs.update(channel_names=text, units="N, m/s²", sample_rate=RATE)
+    np.testing.assert_allclose(result_of(tmp_path, "a.h5").recordings[0].signal("rail"), SAMPLES[:, 1])
+
+
+@pytest.mark.parametrize(
+    "name, is_step",
+    [
+        ("Częstotliwość próbkowania", False), ("Okres próbkowania", True), ("Näytteenottotaajuus", False),
+        ("Provtagningsfrekvens", False), ("Taxa de amostragem", False), ("Período de amostragem", True),
+        ("Mintavételi frekvencia", False), ("Vzorkovací frekvence", False), ("Örnekleme frekansı", False),
+        ("Örnekleme aralığı", True), ("Частота дискретизации", False), ("Период дискретизации", True),
+        ("Frecvență de eșantionare", False), ("采样频率", False), ("采样间隔", True), ("サンプリング周波数", False),
+        ("サンプリング間隔", True), ("Συχνότητα δειγματοληψίας", False), ("Frekvencija uzorkovanja", False),
+    ],
+)  # fmt: skip
+def test_a_rate_or_a_step_is_known_in_further_languages(name, is_step):
+    assert (meaning := name_meaning(name)).certainty == CERTAIN and meaning.is_step == is_step
+    (statement,) = statements_of_value(name, 1 / 25600 if is_step else 25600.0, "float")
+    assert statement.usual.rate == pytest.approx(25600.0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Počet vzorků", "Liczba próbek", "Taajuus", "Częstotliwość graniczna", "Частота среза", "截止频率", "Okres"],
+)
+def test_another_frequency_period_or_count_is_no_rate(name):
+    assert name_meaning(name).certainty != CERTAIN
+
+
+@pytest.mark.parametrize(
+    "properties, words",
+    [
+        ({"NI_Scale[0]_Scale_Type": "RTD"}, "its scale 'RTD' cannot be applied, npTDMS says 'NI_Scale[0]_RTD_"),
+        ({"NI_Scale[0]_Scale_Type": "Linear", "NI_Scale[0]_Linear_Slope": 2.0}, "its scale 'Linear' cannot be applied"),
+        ({"NI_Scale[0]_Linear_Slope": 2.0}, "its scale without a type cannot be applied"),
+    ],
+)
+def test_a_scale_without_its_properties_is_named(properties, words, tmp_path):
+    scale = {"NI_Number_Of_Scales": 1, "NI_Scaling_Status": "unscaled", **properties}
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        codes = (SAMPLES * 1000).astype("int16").T
+        channels = [
+            nptdms.ChannelObject("hit", n, x, {"wf_increment": 1 / RATE, **scale})
+            for n, x in zip(("force", "rail"), codes)
+        ]
+        writer.write_segment(channels)
+    (error,) = result_of(tmp_path, "a.tdms").errors
+    assert error.reason == "scale_unknown" and words in str(error) and "channel 'force'" in str(error)
+
+
+@pytest.mark.parametrize("content", [b"\xef\xbb\xbf", b"\xef\xbb\xbf  ", b" \t "])
+def test_a_text_without_any_character_is_empty(content, tmp_path):
+    (tmp_path / "a.csv").write_bytes(content)
+    with pytest.raises(ReadError, match="there is no text") as raised:
+        result_of(tmp_path, "a.csv")
+    assert raised.value.reason == "empty"
