@@ -14,9 +14,11 @@ from __future__ import annotations
 import argparse
 import csv
 import os
+import re
 import sys
 from contextlib import contextmanager
 from decimal import Decimal
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
 
     import duckdb
 
+NAMES_SQL = """
+    select turnout_id from turnouts union select section_id from sections union select distinct band from charts
+    union select distinct kind from events"""
 GROUP = "Results"
 HELP = "query the registry in SQL"
 
@@ -86,10 +91,35 @@ def run(args: argparse.Namespace) -> int:
             elif args.csv:
                 _write_csv(result, args.csv)
             else:
-                print(format_table(result, args.rows))
+                table = format_table(result, args.rows)
+                print(table)
+                if not args.quiet and table.endswith("(0 rows)"):
+                    for remark in misspelt_names(connection, sql):
+                        print(remark, file=sys.stderr)
         except duckdb.Error as error:
             raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
     return 0
+
+
+def misspelt_names(connection: duckdb.DuckDBPyConnection, sql: str) -> list[str]:
+    """A remark on each text of a query that resembles a name of the registry and is none, for a result without rows.
+
+    Parameters
+    ----------
+    connection : DuckDB connection
+        An open registry.
+    sql : str
+        The query.
+
+    Returns
+    -------
+    list of str
+        Sentences.
+    """
+    names = {str(name) for (name,) in connection.execute(NAMES_SQL).fetchall()}
+    unknown = [text for text in re.findall(r"'([^']+)'", sql) if text not in names]
+    similar = {text: get_close_matches(text, names, n=1) for text in unknown}
+    return [f"The registry has no {text!r}. Did you mean {found[0]!r}?" for text, found in similar.items() if found]
 
 
 def _text_of_query(word: str) -> str:

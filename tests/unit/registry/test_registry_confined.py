@@ -82,3 +82,13 @@ def test_a_csv_has_no_formula(registry, tmp_path):
     stream = io.StringIO()
     _write(stream, ["name"], [("+x",), (-2.0,)])
     assert stream.getvalue() == "name\n'+x\n-2.0\n"
+
+
+def test_a_misspelt_name_is_told_where_a_query_gives_no_row(registry, capsys):
+    assert query(registry, "from turnouts where turnout_id = 't11'") == 0
+    assert capsys.readouterr().err == "The registry has no 't11'. Did you mean 't1'?\n"
+    for sql in ("from turnouts where turnout_id = 't1' and name = ''", "select 'T1'"):
+        assert query(registry, sql) == 0
+        assert capsys.readouterr().err == "", sql
+    assert query(registry, "from turnouts where turnout_id = 't11'", "--quiet") == 0
+    assert capsys.readouterr().err == ""
