@@ -7,8 +7,9 @@ from datetime import datetime
 from pathlib import Path
 
 from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
-from turnout.config.document import Frozen, Place
+from turnout.config.document import Place
 from turnout.config.events import parse_utc, time_problem
+from turnout.config.frozen_mapping import Frozen
 from turnout.config.turnout import Campaign
 from turnout.errors import ReadError
 

@@ -1,12 +1,12 @@
 """YAML files as trees in which every value knows its line and column, so that an error can name them.
 
 ``load`` reads a file of the configuration; ``turnout.config.parameters`` builds on the same tree. Files that cannot be
-read as text or YAML raise ``ConfigError``. ``Frozen`` is a read-only mapping that can be pickled.
+read as text or YAML raise ``ConfigError``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -379,38 +379,3 @@ def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:
     except (MarkedYAMLError, ValueError):
         problem = f"{node.value!r} with the tag {node.tag!r}, which is none of a configuration"
         raise place.error(problem, "Write a plain value without a tag") from None
-
-
-class Frozen(Mapping):
-    """Read-only view of a dictionary; unlike MappingProxyType it can be pickled.
-
-    Parameters
-    ----------
-    values : mapping or iterable of tuple of (any, any)
-        Content; it is copied.
-
-    Examples
-    --------
-    >>> Frozen({"a": 1})["a"]
-    1
-    """
-
-    __slots__ = ("_values",)
-
-    def __init__(self, values: Mapping | Iterable[tuple[Any, Any]] = ()) -> None:
-        self._values = dict(values)
-
-    def __getitem__(self, name: Any) -> Any:
-        return self._values[name]
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self._values!r})"
-
-    def __reduce__(self) -> tuple[type, tuple[dict]]:
-        return type(self), (self._values,)

@@ -10,9 +10,10 @@ from turnout.config import merge
 from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import Campaigns, read_campaigns, read_trains
 from turnout.config.consistency import ToSi, check_consistency
-from turnout.config.document import Branch, Frozen, Place, leaves, load, merge_branches, plain_values
+from turnout.config.document import Branch, Place, leaves, load, merge_branches, plain_values
 from turnout.config.events import Event, read_events
 from turnout.config.file_names import file_key
+from turnout.config.frozen_mapping import Frozen
 from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
 from turnout.config.schema import NO_TURNOUT, check, suggestion

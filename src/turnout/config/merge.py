@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
-from turnout.config.document import Branch, Frozen, Leaf, Place, merge_branches, plain_values
+from turnout.config.document import Branch, Leaf, Place, merge_branches, plain_values
+from turnout.config.frozen_mapping import Frozen
 from turnout.config.settings import parts
 from turnout.config.settings_schema import fill_settings
 from turnout.config.turnout import HammerConfig, PassageConfig, Section

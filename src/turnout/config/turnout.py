@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from turnout.config.document import Frozen
+from turnout.config.frozen_mapping import Frozen
 from turnout.errors import ConfigError
 from turnout.records import RawDescription
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
+from turnout.readers.array_names import natural_sort_key
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES
-from turnout.readers.named_arrays import natural_sort_key
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings

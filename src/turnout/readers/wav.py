@@ -18,10 +18,10 @@ import numpy as np
 import soundfile
 
 from turnout.readers.array_metadata import Metadata, list_of_texts
+from turnout.readers.array_names import channel_names
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.metadata_names import START_NAMES, UNIT_NAMES
-from turnout.readers.named_arrays import channel_names
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements
