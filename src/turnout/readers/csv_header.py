@@ -32,7 +32,8 @@ from turnout.readers.stated_units import is_unit_name
 HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TEMPERATURES = {"rail_temperature", "air_temperature"}
-HEAD_NAMES = {*START_NAMES, *START_DATE_NAMES, *RECORD_COUNT_NAMES, "n_samples"}
+TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
+HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}
 NUMERIC_HEAD_NAMES = TEMPERATURES | {
     *SAMPLE_COUNT_NAMES
 }  # a head line only if a number follows, else the name of a column
@@ -150,6 +151,8 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
         return None
     if _states_scale(name_with_unit, value):
         return name_with_unit, value
+    if plain_name in TIMES_OF_START and len(re.findall(r"\d+", value)) > 1 and not is_number(value):
+        return plain_name, value  # "13 May 2026 10:00" is no number with a unit
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 

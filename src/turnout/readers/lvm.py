@@ -258,11 +258,12 @@ def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list
 def _entries(fields: Mapping[str, list[str]]) -> Iterator[Entry]:
     """Entries of a segment's header, one per channel where the channels differ."""
     for name, values in fields.items():
-        for i, value in enumerate(dict.fromkeys(value for value in values if value)):
-            if name != "Delta_X":
-                yield Entry(f"header of the segment: {name}", name, value)
-            elif i == 0:
-                yield step_entry("header of the segment: Delta_X", value)
+        if name == "Delta_X":
+            step = next((value for value in values if value and value.casefold() != "nan"), "0")
+            yield step_entry("header of the segment: Delta_X", step)
+            continue
+        for value in dict.fromkeys(value for value in values if value):
+            yield Entry(f"header of the segment: {name}", name, value)
 
 
 def _date_and_time(date: str, clock: str) -> str:

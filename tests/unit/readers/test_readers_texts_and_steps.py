@@ -101,7 +101,7 @@ def test_a_step_of_a_universal_file_that_is_none_is_an_error(step, tmp_path):
     assert error.reason == "wrong_rate" and "in abscissa spacing (record 7) states no rate" in str(error)
 
 
-@pytest.mark.parametrize("step", ["0.0", "-5.0E-5"])
+@pytest.mark.parametrize("step", ["0.0", "-5.0E-5", "NaN", ""])
 def test_a_step_of_an_lvm_file_that_is_none_is_an_error_without_a_time_column(step, tmp_path):
     lvm(tmp_path / "a.lvm", step=step)
     error = outcome(tmp_path, "a.lvm")
@@ -125,3 +125,23 @@ def test_the_layout_can_declare_a_step_checked_that_is_none(tmp_path):
     tdms(tmp_path / "a.tdms", 0.0)
     description = RawDescription(CHANNELS, rate=RATE, checked_entries=("wf_increment",))
     assert len(read("a.tdms", tmp_path, description).recordings) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "13 mai 2026 10:00:00",
+        "13. Mai 2026 10:00",
+        "13 May 2026 10:00:00",
+        "13. maj 2026 kl. 10:00",
+        "13 de mayo de 2026 10:00",
+    ],
+)
+@pytest.mark.parametrize("name", ["Start time", "Startzeit", "Messbeginn"])
+def test_a_start_that_begins_with_the_day_is_no_number(name, text, tmp_path):
+    rows = "".join(f"{f:.6f};{a:.6f}\n" for f, a in SAMPLES)
+    (tmp_path / "a.csv").write_text(
+        f"{name};{text}\nSample rate;20000\nforce [N];rail [m/s²]\n{rows}", encoding="utf-8"
+    )
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=RATE))
+    assert not result.errors and f"{result.recordings[0].started_at:%Y-%m-%d %H:%M}" == "2026-05-13 10:00"
