@@ -83,6 +83,12 @@ def test_a_first_campaign_is_progress_and_no_failure():
     assert "Nothing to do" not in text and "10 charts without a recent campaign" in text
 
 
+def test_charts_that_are_all_without_recent_measurements_are_no_all_clear():
+    text = page([turnout("a")], [state("a", "not measured", 12)])
+    assert "No answer: no chart has recent measurements by which it can be judged." in text
+    assert "Nothing to do" not in text and "12 charts without a recent campaign" in text
+
+
 def test_weekly_campaigns_of_half_a_year_are_more_than_a_baseline_needs_but_not_long_enough():
     learning = {"n": 2, "n_campaigns": 20, "n_days": 133, "n_again": 3}
     text = page([turnout("a")], [state("a", "learning", 5)], learning=learning)
@@ -90,7 +96,7 @@ def test_weekly_campaigns_of_half_a_year_are_more_than_a_baseline_needs_but_not_
     assert "has 20 campaigns in 133 days; with " + needs in text and "20 of 12" not in text
     assert "3 charts learn the level after recorded work." in text
     after_work = page([turnout("a")], [state("a", "learning", 3)], learning={"n_again": 3})
-    assert "Your measurements are in" not in after_work and "No chart is outside" not in after_work
+    assert "Your measurements are in" not in after_work and "No answer" not in after_work
 
 
 def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():

@@ -81,10 +81,11 @@ def coherence_panel(test: HammerTest) -> str:
     """
     row = test.receptance
     frequency = np.asarray(row["frequency_hz"], dtype=float)
+    tested = "its lower limit" if row["gate"] == "limit" else "the estimate"
     chart = Chart(
         Axis(*FREQUENCY_RANGE, "frequency [Hz]", "log"),
         Axis(0.0, 1.02, "coherence"),
-        f"Coherence, 95 % limits, n = {row['n_impacts']}; gate: {row['gate']}",
+        f"Coherence, n = {row['n_impacts']}; the gate tests {tested}",
         height=190,
     )
     _grey_out(chart, frequency, np.asarray(row["passed"], dtype=bool), row)
@@ -141,7 +142,7 @@ def decay_panel(test: HammerTest) -> str:
     largest = 1.1 * float(np.max(np.abs(measured[:n])))
     fit, null = model["hammer_fit_pct"], model["hammer_fit_null_pct"]
     score = (
-        f"predicts {fit:.0f} % of held-out impacts (a random model {null:.0f} %)"
+        f"fit of held-out impacts {fit:.0f} % (a random model: {null:.0f} %)"
         if _is_number(fit) and _is_number(null)
         else ""
     )
