@@ -257,7 +257,7 @@ REASONS = {
     "no_train": "no axle found",
     "train_cut_off": "the train is cut off at an end of the recording",
     "two_trains": "two trains at the same time",
-    "axles_uncertain": "the number of axles of an unknown train is not certain",
+    "axles_uncertain": "the number of axles is not certain",
     "clipped": "a channel is clipped in the passage",
     "channels_swapped": "channels arrive in the wrong order",
     "clock_drift": "the loggers' clocks drift apart",

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 MAX_SHORT_SPAN, SHORT_SPAN_ERROR = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
 MIN_DURATION = 0.1  # s, least duration of a recording: two blocks of the quiet level
 MIN_CONTRAST = 1.5  # least ratio of accepted to rejected peaks of an unknown train
+MIN_NAMED_CONTRAST = 1.0  # the same of a train with a template: no peak that it leaves is higher than its weakest axle
 
 
 def analyse(
@@ -138,8 +139,7 @@ def _analyse_train(
     motion, axles, train_type = count
     passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
-    if train_type.type == UNKNOWN:
-        findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
+    findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
     return replace(passage, status="partly" if findings else "accepted", findings=tuple(findings))
 
@@ -163,7 +163,8 @@ def _count_by_several_sensors(
     is_simultaneous = (
         bool(inconsistencies) and simultaneity(envelopes, motion) > -MIN_MOTION_GAIN
     )  # impacts at one moment look like wrong clocks
-    if count is None or count[2].type == UNKNOWN or is_simultaneous:
+    is_uncertain = count is None or count[2].type == UNKNOWN or count[1].contrast < MIN_NAMED_CONTRAST
+    if is_uncertain or is_simultaneous:
         at_nose = detect_at_nose(envelopes, patterns, settings)
         if at_nose is not None:
             return envelopes, sensors, "facing" if at_nose[0].direction > 0 else "trailing", at_nose
@@ -172,13 +173,14 @@ def _count_by_several_sensors(
 
 
 def _axle_count_doubts(passage: Passage, envelopes: SensorEnvelopes, is_multi_sensor: bool) -> list[Rejection]:
-    """Reasons to doubt the number of axles of a train without template."""
+    """Reasons to doubt the number of axles."""
     doubts: list[Rejection] = []
-    min_contrast = MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST
+    is_named = passage.type is not None and passage.type.type != UNKNOWN
+    min_contrast = MIN_NAMED_CONTRAST if is_named else MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST
     if passage.contrast < min_contrast:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
-    if is_multi_sensor and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
+    if is_multi_sensor and not is_named and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
         text = (
             f"{passage.n_axle} axles, but sensors record impacts at one moment, as of a crossing's nose or a deep dip"
         )

@@ -50,9 +50,9 @@ class TrainUnknownError(Exception):
 def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     """Train of a passage, from the recording and the notes in its file.
 
-    The recording takes precedence over the notes. A train noted with its speed is accepted even if its axles do
-    not match, with a doubt: flats, dips and polygonal wheels look like axles, and the simulation shows whether
-    it is that train.
+    The recording takes precedence over the notes, unless the passage stage doubts the axles that it counted. A train
+    noted with its speed is accepted even if its axles do not match, with a doubt: flats, dips and polygonal wheels look
+    like axles, and the simulation shows whether it is that train.
 
     Parameters
     ----------
@@ -68,6 +68,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     IdentifiedTrain
     """
     noted_speed = KMH * (noted_number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
+    min_axle_share = MIN_AXLE_SHARE
+    if _is_uncertain(row) and noted_speed and _type_names({**row, "train_type": None}, notes):
+        row, min_axle_share = {**row, "train_type": None, "speed_kmh": None, "axle_times_s": None}, 0.0
     speed = row.get("speed_kmh") or noted_speed
     type_names = _type_names(row, notes)
     type_name = _with_a_file(type_names, folder)
@@ -78,7 +81,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         )
     trusted_speed = noted_speed if type_name in _type_names({**row, "train_type": None}, notes) else None
     vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(
-        type_name, row.get("n_axles") or None, row, notes, folder, bool(trusted_speed)
+        type_name, row.get("n_axles") or None, row, notes, folder, min_axle_share if trusted_speed else np.inf
     )
     if trusted_speed and (type_name != type_names[0] or axle_doubts):
         speed = trusted_speed  # the measured one is from axle distances of another train, or from impacts between axles
@@ -94,7 +97,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         speed, further_doubts = float(trusted_speed) / KMH, (f"{error}; taken as noted",)
         if len(axles := vehicle.wheels) == row.get("n_axles"):
             n = _axles_by_length(type_name, row, speed, folder)
-            vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(type_name, n, row, notes, folder, True)
+            vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(type_name, n, row, notes, folder, MIN_AXLE_SHARE)
             further_doubts += (f"{len(axles)} axles recorded over the length of {n}",) if n < len(axles) else ()
     direction, direction_doubts = _heading(("facing", "trailing"), "direction", row, notes)
     route, route_doubts = _heading(("main", "diverging"), "track", row, notes)
@@ -108,6 +111,11 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         load_sd,
         route_doubts,
     )
+
+
+def _is_uncertain(row: Mapping[str, Any]) -> bool:
+    """Whether the passage stage doubts the axles of this train."""
+    return "axles_uncertain" in (row.get("reason_codes") or ())
 
 
 def _heading(
@@ -140,9 +148,12 @@ def _loaded_vehicle(
     row: Mapping[str, Any],
     notes: Mapping[str, Any],
     folder: Path,
-    is_trusted: bool,
+    min_axle_share: float,
 ) -> tuple[Vehicle, float, tuple[str, ...], tuple[str, ...]]:
-    """(vehicle, ``load_sd``, doubts on its load, doubts on its axles)."""
+    """(vehicle, ``load_sd``, doubts on its load, doubts on its axles).
+
+    TrainUnknownError if the axles are no multiple of the vehicle's, and fewer than ``min_axle_share`` of them.
+    """
     try:
         single_unit = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
@@ -154,7 +165,7 @@ def _loaded_vehicle(
         axle_doubts = (
             f"{n_axles_heard} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
         )
-        if not is_trusted or n_axles_heard < MIN_AXLE_SHARE * n * units:
+        if n_axles_heard < min_axle_share * n * units:
             raise TrainUnknownError(*axle_doubts)
     elif n_axles_heard:
         units = n_axles_heard // n

@@ -6,6 +6,7 @@ from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, recordi
 
 from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
+from turnout.passage.axle_patterns import Group, Pattern, Vehicle
 from turnout.passage.train_type import UNKNOWN
 
 PLACES, NOSE = (0.0, 2.3, 4.1, 7.4), 3.2  # m
@@ -42,6 +43,16 @@ def test_a_train_without_template_that_bangs_is_counted_with_a_doubt():
     recording, _ = banging(np.random.default_rng(3), STRANGER, 33.0, 1)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert passage.type.type == UNKNOWN
+    assert "axles_uncertain" in {f.reason for f in passage.findings}
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_known_train_that_leaves_a_higher_peak_than_its_weakest_axle_is_doubted(seed):
+    """Four axles carry little information: impacts at the nose look like a locomotive at 58 m/s instead of 44."""
+    locomotive = Pattern("locomotive", (Group((Vehicle("unit", 18.0, (2.7, 5.7, 12.3, 15.3)),), 1, 1),))
+    recording, _ = banging(np.random.default_rng(seed), np.array([0.0, 3.0, 9.6, 12.6]), 44.0, 1)
+    passage = analyse(recording, sensors_for(recording), [*PATTERNS, locomotive], PassageSettings())
+    assert passage.type.type == "locomotive" and passage.speed.speed > 55.0  # wrong, and therefore doubted
     assert "axles_uncertain" in {f.reason for f in passage.findings}
 
 

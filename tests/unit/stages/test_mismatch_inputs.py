@@ -84,6 +84,19 @@ def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
         assert train(row, said, repository).speed == pytest.approx(speed)
 
 
+@pytest.mark.parametrize(("codes", "name", "speed"), [((), "locomotive", 40.0), (("axles_uncertain",), "ic3", 25.0)])
+def test_train_data_precede_a_train_whose_axles_are_uncertain(repository, codes, name, speed):
+    row = {"train_type": "locomotive", "n_axles": 4, "speed_kmh": 144.0, "speed_listed_kmh": 90.0}
+    row |= {"train_type_listed": "ic3", "reason_codes": list(codes)}
+    found = train(row, {}, repository)
+    assert found.name == name and found.speed == pytest.approx(speed)
+
+
+def test_an_uncertain_train_without_train_data_is_taken_as_recorded(repository):
+    row = {"train_type": "locomotive", "speed_kmh": 144.0, "reason_codes": ["axles_uncertain"]}
+    assert train(row, {}, repository).speed == pytest.approx(40.0)
+
+
 def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository):
     """A deep dip is crossed with a bang behind every axle: sixteen, over the length of one unit. Sixteen over that of
     two are two units, also where they do not stand as the file has them. The notes' speed is believed, not 81 km/h."""
