@@ -155,7 +155,7 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
         noted_turnout, note_errors = read_notes(turnout, raw)
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
         if not note_errors:
-            remarks += _without_temperature(noted_turnout, scanned.units)
+            remarks += _without_temperature(noted_turnout, raw, scanned.units)
     problem_count = count_of(len(problems), "problem") if problems else "no problem"
     print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:
@@ -167,13 +167,15 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
     return len(problems)
 
 
-def _without_temperature(turnout: TurnoutConfig, units: Iterable[Unit]) -> Iterator[str]:
+def _without_temperature(turnout: TurnoutConfig, raw: Path, units: Iterable[Unit]) -> Iterator[str]:
     """A remark on a turnout of whose campaigns none has a noted rail temperature: no file, no column or empty cells."""
     days = {unit.campaign for unit in units if unit.kind == "hammer" and unit.campaign}
     if days and all(turnout.campaigns[day].rail_temperature is None for day in days):
+        path = raw / turnout.raw / "campaigns.csv"
+        lack = "no column rail_temperature_c with values" if path.is_file() else "there is no such file"
         yield (
-            f"{turnout.raw}/campaigns.csv notes no rail temperature of any campaign with files, and a campaign without "
-            "one is not judged. Write it into the column rail_temperature_c, unless the recordings state it."
+            f"{path}: {lack}. Charts do not judge a campaign without a rail temperature. "
+            "Note it there, unless the recordings state it"
         )
 
 
