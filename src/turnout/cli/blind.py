@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import above_zero, at_least_one
+from turnout.cli.options import above_zero, add_use, at_least_one
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -132,6 +132,7 @@ def _diagnose(args: argparse.Namespace) -> None:
         again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in record["cases"].values())
+    add_use(args, len(record["cases"]) - failed, failed)
     print(f"{len(record['cases'])} cases diagnosed, {failed} without an answer; truth hidden by {record['isolation']}")
 
 

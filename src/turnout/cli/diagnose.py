@@ -25,6 +25,7 @@ from turnout.cli.options import (
     add_result,
     add_track,
     add_turnout,
+    add_use,
     add_work,
     zero_or_more,
 )
@@ -113,6 +114,7 @@ def _save_and_print(args: argparse.Namespace, results: Results, rows: dict[str, 
     results.save(rows)
     page = write_diagnosis_page(rows, args.configuration, args.turnout, args.pages)
     add_result(args, rows["mismatch_findings"])
+    add_use(args, len(rows["mismatch_findings"]), len(rows["quarantine"]))
     print(_findings_text(rows))
     print(f"page: {page}")
 

@@ -34,12 +34,12 @@ DONE, PROBLEM_FOUND, NOT_FOLLOWED, PROGRAM_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
 EXIT_CODES = """\
 exit codes:
   0    done, nothing wrong
-  1    done, and a problem was found
+  1    done, and a problem was found, or none of the inputs could be used
   2    not done: the command line, an input or a file is wrong; the message says what to do
   3    not done: a fault of the program
   124  nightly: ended at the limit of time
   130  interrupted"""
-COMMON_DEFAULTS = {"json": False, "quiet": False, "verbose": False, "result": None}
+COMMON_DEFAULTS = {"json": False, "quiet": False, "verbose": False, "result": None, "nothing_used": False}
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -165,7 +165,7 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
     interrupts: list[int] = []
     try:
         with _noted_interrupts(interrupts):
-            code = args.run(args) or DONE
+            code = args.run(args) or (PROBLEM_FOUND if args.nothing_used else DONE)
             _flush_output()
         return code, ""
     except BrokenPipeError:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import above_zero, add_result
+from turnout.cli.options import above_zero, add_result, add_use
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     add_result(args, asdict(night))
+    add_use(args, n_used=0 if night.nothing_usable else 1, n_left_out=len(night.unused))
     print(night)
     return night.code or (_alert(args.options) if night.published else 0)
 

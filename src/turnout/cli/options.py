@@ -347,6 +347,31 @@ def leaf_parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentP
         yield parser
 
 
+def add_use(args: argparse.Namespace, n_used: int, n_left_out: int) -> None:
+    """State how many of the inputs were used and left out. The exit code is 1 if there are only inputs left out.
+
+    Every command that goes on without an unusable input (file, test, visit, section, turnout, case) calls it once, and
+    prints itself what it left out and why.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+    n_used : int
+        Number of inputs that gave a result.
+    n_left_out : int
+        Number of inputs without one.
+
+    Examples
+    --------
+    >>> args = argparse.Namespace(nothing_used=False)
+    >>> add_use(args, n_used=0, n_left_out=3)
+    >>> args.nothing_used
+    True
+    """
+    args.nothing_used = n_left_out > 0 and n_used == 0
+
+
 def add_result(args: argparse.Namespace, result: object) -> None:
     """Hand on what ``--json`` prints as ``result``.
 

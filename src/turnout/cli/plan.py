@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_work, at_least_one
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_use, add_work, at_least_one
 from turnout.counts import count_of
 
 if TYPE_CHECKING:
@@ -78,9 +78,11 @@ def run(args: argparse.Namespace) -> int:
         )
     counts = dict.fromkeys(("all", "new", "changed"), 0)
     earlier = _EarlierResults(Path(args.work), shards)
+    n_left_out = 0
     for turnout in map(configuration.turnout, args.turnout or configuration.ids):
-        _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
+        n_left_out += _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
     add_result(args, counts)
+    add_use(args, counts["all"], n_left_out)
     print(f"{count_of(counts['all'], 'unit')}, {counts['new']} never computed, {counts['changed']} changed since.")
     _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
     return 0
@@ -101,8 +103,8 @@ def _print_gone(
         print(f"{gone}, first {gone.files[0]}: what they gave stays in the registry.")
 
 
-def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, counts: dict[str, int]) -> None:
-    """Print and count the new and changed units of one turnout, and print the files left out."""
+def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, counts: dict[str, int]) -> int:
+    """Print and count the new and changed units of one turnout; print the files left out and return their number."""
     from turnout.config.load import read_notes
     from turnout.workflow.notes import notes_of
     from turnout.workflow.plan import PlannedUnit
@@ -118,6 +120,7 @@ def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, 
             print(f"{change:<8} {unit_id(unit)}: {count_of(len(unit.files), 'file')}")
     for problem in (*scanned.problems, *note_errors):
         print(f"left out {problem}")
+    return len(scanned.problems)
 
 
 class _EarlierResults:

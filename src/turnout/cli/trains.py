@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_registry
+from turnout.cli.options import add_configuration, add_raw, add_registry, add_use
 from turnout.constants import KMH
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
     configuration = load_configuration(args.configuration)
     names = args.turnout or list(configuration.rows)
     settings = configuration.settings["passage"]
+    has_result = []  # of each turnout, then of the clusters
     for name in names:
         turnout = with_raw(configuration.turnout(name), args.raw)
         if turnout.passages is None:
@@ -73,10 +74,14 @@ def run(args: argparse.Namespace) -> int:
         settings = turnout.settings["passage"]
         patterns = known_patterns(settings.axle_patterns)
         trains = weighed_trains(turnout, args.raw, patterns, settings)
-        print("\n".join(_load_lines(name, trains, learn_loads(turnout, trains, settings), settings)))
+        calibrations = learn_loads(turnout, trains, settings)
+        has_result.append(bool(calibrations))
+        print("\n".join(_load_lines(name, trains, calibrations, settings)))
     with open_registry(args.registry) as connection:
         clusters = learn_clusters(connection, settings)
+    has_result.append(bool(clusters.clusters))
     print("\n".join(_cluster_lines(clusters)))
+    add_use(args, sum(has_result), has_result.count(False))
     return 0
 
 
