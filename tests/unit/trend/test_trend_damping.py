@@ -55,6 +55,25 @@ def test_the_nightly_update_charts_the_damping_and_lists_its_alarm(tmp_path, set
     assert (settled["state"] == "alarm_down").any()
 
 
+@pytest.mark.parametrize(
+    ("damping", "step_down", "first"), [(-45.0, -6.0, "railpad"), (-70.0, -3.0, "railpad_damping")]
+)
+def test_alarms_are_sorted_by_change_over_target_whatever_the_quantity(tmp_path, settings, damping, step_down, first):
+    rows = damped(percent=damping)
+    is_late = rows["measured_at_utc"] > rows["measured_at_utc"].min() + timedelta(weeks=80)
+    fallen = (rows["section_id"] == "T00000/S2") & is_late
+    rows.loc[fallen, "frequency_hz"] *= 1.0 + step_down / 100.0
+    small_registry(tmp_path, rows)
+    update(tmp_path, settings)
+    with open_registry(tmp_path) as con:
+        listed = con.execute(
+            "select band, least(abs(w.change_low_pct), abs(w.change_high_pct)) as certain, target_pct from worklist w "
+            "join chart_status using (section_id, band, source) where w.state = 'inspect this week' order by rank"
+        ).df()
+    assert set(listed["band"]) == {"railpad", "railpad_damping"} and listed["band"][0] == first
+    assert (listed["certain"] / listed["target_pct"]).is_monotonic_decreasing
+
+
 def frames_of(rows, settings):
     """Charts of the damping ratios alone, as the nightly update makes them."""
     damping = rows.assign(

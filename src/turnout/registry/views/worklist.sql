@@ -1,5 +1,5 @@
--- One row per thing to do: every campaign that must be confirmed now, every open alarm, the largest change first (by the
--- end of its interval nearer to none), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
+-- One row per thing to do: every campaign that must be confirmed now, every open alarm, the largest change first (the
+-- end of its interval nearer to zero, in multiples of the target of its chart), and what else there is up to `trend.worklist_rows` rows in all, or `most`; n_in_all counts what there would be without an end.
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
 -- An alarm that follows from the other resonance of a section refers to its row, if that one is listed.
@@ -129,8 +129,9 @@ everything as (
     union all by name select * from confirming
 ),
 not_silenced as (
-    select e.*
+    select e.*, s.target_pct
     from everything e
+    left join chart_status s using (turnout_id, section_id, band, source)
     where in_service(e.turnout_id) and not has_left(e.section_id) and not exists (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
@@ -169,7 +170,8 @@ listed as (
                 '; likewise ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ')
             end) as why,
         max_by(direction, abs(change_pct)) as direction, max_by(change_pct, abs(change_pct)) as change_pct,
-        max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct
+        max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct,
+        max(target_pct) as target_pct
     from rows_to_list
     where why is not null
     group by turnout_id, band, source, state, case band when 'all' then why end
@@ -253,7 +255,7 @@ select
                 (case h.changed_component when 'pad' then 'railpads' else 'ballast' end)
                 || ', whose own row says what to do' else '' end)
             || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
-            || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', s.target_pct)
+            || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', h.target_pct)
                 else '' end)
             || coalesce('; acknowledged by ' || h.acknowledged, '')
     end as sentence,
@@ -392,7 +394,9 @@ window importance as (
             when 'confirm now' then 0 when 'inspect this week' then 1 when 'plan' then 2 when 'cannot tell' then 3 else 4
         end,
         h.band = 'all' desc,
-        case when h.low_pct * h.high_pct < 0 then 0 else least(abs(h.low_pct), abs(h.high_pct)) end desc nulls last,
+        -- a percentage of frequency, of damping and of acceleration are not alike, multiples of their targets are
+        case when h.low_pct * h.high_pct < 0 then 0 else least(abs(h.low_pct), abs(h.high_pct)) / h.target_pct end
+            desc nulls last,
         h.ratio desc nulls last, h.turnout_id, h.sections, h.band, h.source
 )
 qualify rank <= coalesce(most, (select max(worklist_rows) from chart_status), 20) or h.state in ('confirm now', 'inspect this week')
