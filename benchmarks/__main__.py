@@ -7,6 +7,8 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+from benchmarks.bar import heading
+
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
@@ -35,8 +37,9 @@ def main() -> int:
     print(f"Python {platform.python_version()}, {os.cpu_count()} cores, one BLAS thread. CPU s = user + system.")
     missed = 0
     for name in names:
-        print(f"\n{name}\n{'-' * len(name)}", flush=True)
-        for bar in import_module(f"benchmarks.bench_{name}").bars():
+        module = import_module(f"benchmarks.bench_{name}")
+        print(f"\n{name}\n{'-' * len(name)}\n{module.__doc__.strip()}\n\n{heading()}", flush=True)
+        for bar in module.bars():
             print(bar, flush=True)
             missed += bar.is_met is False
     print(f"\n{missed} bar(s) missed." if missed else "\nNo bar missed.")

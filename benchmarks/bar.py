@@ -22,12 +22,21 @@ class Bar:
     def is_met(self) -> bool | None:
         if self.limit is None or not self.sense:
             return None
-        return self.figure <= self.limit if self.sense == "<=" else self.figure >= self.limit
+        return bool(self.figure <= self.limit if self.sense == "<=" else self.figure >= self.limit)
 
     def __str__(self) -> str:
         verdict = {True: "met", False: "MISSED", None: ""}[self.is_met]
         bar = "" if self.limit is None else f"{self.sense} {self.limit:g}"
-        return f"{self.name:<64} {self.figure:>11.4g} {bar:>12} {self.unit:<10} {verdict:<7}{self.n} {self.note}"
+        return _line(self.name, f"{self.figure:.4g}", bar, self.unit, verdict, f"{self.n} {self.note}")
+
+
+def _line(name: str, figure: str, bar: str, unit: str, verdict: str, remarks: str) -> str:
+    return f"{name:<64} {figure:>11} {bar:>12} {unit:<10} {verdict:<7}{remarks}".rstrip()
+
+
+def heading() -> str:
+    """The names of the columns in which a ``Bar`` is printed."""
+    return _line("figure", "measured", "bar", "unit", "bar is", "number of cases, remarks")
 
 
 class Stopwatch:

@@ -1,4 +1,8 @@
-"""Accuracy against the Cramér-Rao bound, unmodelled modes, coverage, speed, power: bars B1 to B5 and B10."""
+"""Accuracy against the Cramér-Rao bound, unmodelled modes, coverage of intervals, speed, power to find a shift.
+
+CRB: Cramér-Rao bound, the smallest standard deviation possible. dB: resonance over noise. SP to CP A9: places of the
+paper.
+"""
 
 import os
 import time
@@ -97,7 +101,7 @@ def largest_by_chance(n_test, n_value, probability=0.95):
 
 
 def accuracy():
-    """B1: rms over bound at every location and mode."""
+    """Rms over bound at every location and mode."""
     for snr, limit in ((40.0, 1.15), (20.0, 1.15)):
         trials = {name: trial(name, N_ACCURACY, SEED_ACCURACY, with_bound=True, snr_db=snr) for name in LOCATIONS}
         ratio = {name: t.rms() / t.rms_bound() for name, t in trials.items()}
@@ -108,16 +112,16 @@ def accuracy():
             f"worst at {worst}; median {np.median(values):.2f}; largest of {len(values)} by chance up to {chance:.2f}"
         )
         n = f"n={N_ACCURACY} x 8"
-        yield Bar(f"B1 rms / CRB, {snr:.0f} dB", ratio[worst].max(), limit, n=n, note=note)
+        yield Bar(f"two modes: rms / CRB, {snr:.0f} dB", ratio[worst].max(), limit, n=n, note=note)
         biased = max(trials, key=lambda name: trials[name].bias().max())
         bias = trials[biased].bias().max()
-        yield Bar(f"B1 |bias| / rms, {snr:.0f} dB", bias, 0.3, n=n, note=f"worst at {biased}")
+        yield Bar(f"two modes: |bias| / rms, {snr:.0f} dB", bias, 0.3, n=n, note=f"worst at {biased}")
         detected = min(float(np.mean(t.detected, axis=0).min()) for t in trials.values())
-        yield Bar(f"B1 found, {snr:.0f} dB", detected, 1.0, sense=">=", n=n)
+        yield Bar(f"two modes: found, {snr:.0f} dB", detected, 1.0, sense=">=", n=n)
 
 
 def unmodelled_modes():
-    """B2: two unmodelled modes and drift, without prior frequencies."""
+    """Two unmodelled modes and drift, without prior frequencies."""
     for snr, limits in ((40.0, (0.5, 2.5)), (26.0, (1.2, 7.0))):
         conditions = {"snr_db": snr, "nuisance": UNMODELLED, "drift": 0.05}
         trials = [trial(name, 100, 2, with_bound=True, **conditions) for name in LOCATIONS]
@@ -127,42 +131,61 @@ def unmodelled_modes():
             worst = int(np.argmax(rms[:, i]))
             note = f"worst {LOCATIONS[worst]} {rms[worst, i]:.2f} % where the CRB is {bound[worst, i]:.2f} %"
             figure = np.sqrt(np.mean(rms[:, i] ** 2))
-            yield Bar(f"B2 ballast {quantity} rms, {snr:.0f} dB", figure, limits[i], "%", n="n=100 x 8", note=note)
-        yield Bar(f"B2 rms / CRB with all modes unknown, largest, {snr:.0f} dB", (rms / bound).max(), 1.3)
+            yield Bar(
+                f"two more modes and drift: ballast {quantity} rms, {snr:.0f} dB",
+                figure,
+                limits[i],
+                "%",
+                n="n=100 x 8",
+                note=note,
+            )
+        yield Bar(
+            f"two more modes and drift: rms / CRB with all modes unknown, largest, {snr:.0f} dB",
+            (rms / bound).max(),
+            1.3,
+        )
         detected = min(float(np.mean(t.detected, axis=0).min()) for t in trials)
-        yield Bar(f"B2 found, worst location and mode, {snr:.0f} dB", detected, 0.95, sense=">=", n="n=100 x 8")
+        yield Bar(
+            f"two more modes and drift: found, worst location and mode, {snr:.0f} dB",
+            detected,
+            0.95,
+            sense=">=",
+            n="n=100 x 8",
+        )
         false = max(float(np.mean(t.false_modes)) for t in trials)
-        yield Bar(f"B2 false modes per test in 20-800 Hz, {snr:.0f} dB", false, 0.3, n="n=100 x 8")
+        yield Bar(
+            f"two more modes and drift: false modes per test in 20-800 Hz, {snr:.0f} dB", false, 0.3, n="n=100 x 8"
+        )
 
 
 def coverage():
-    """B3: nominal 95 % intervals."""
+    """Nominal 95 % intervals."""
     for spread in (0.0, 0.01, 0.03):
         for snr in (40.0, 26.0, 20.0):
             yield from _coverage_bars("CP A7", trial("CP A7", 400, 3, snr_db=snr, spread=spread), spread, snr)
     shares = [np.mean(trial(name, 400, 4, snr_db=26.0, spread=0.01).covered, axis=0) for name in LOCATIONS]
     low, high = min(s.min() for s in shares), max(s.max() for s in shares)
-    yield Bar("B3 coverage of 95 %, all locations, 26 dB, 1 %, lowest", low, 0.92, sense=">=", n="n=400 x 8")
-    yield Bar("B3 the same, highest", high, 0.98, n="n=400 x 8")
+    yield Bar("coverage of 95 %, all locations, 26 dB, 1 %, lowest", low, 0.92, sense=">=", n="n=400 x 8")
+    yield Bar("coverage of 95 %, all locations, 26 dB, 1 %, highest", high, 0.98, n="n=400 x 8")
 
 
 def _coverage_bars(name, result, spread, snr):
     share = np.mean(result.covered, axis=0)
     words = "f1 z1 f2 z2: " + " ".join(f"{s:.3f}" for s in share)
-    title = f"B3 coverage of 95 %, {name}, {snr:.0f} dB, {100 * spread:.0f} %"
+    title = f"coverage of 95 %, {name}, {snr:.0f} dB, {100 * spread:.0f} %"
     yield Bar(f"{title}, lowest", share.min(), 0.92, sense=">=", n=f"n={len(result.covered)}", note=words)
     yield Bar(f"{title}, highest", share.max(), 0.98, n=f"n={len(result.covered)}")
 
 
 def paper():
-    """B4: consistency of the paper's tables, and the bias of its method."""
+    """Consistency of the paper's tables, and the bias of its method."""
     pairs = {pair.key: pair for pair in TABLE_1 + TABLE_2}
     error = []
     for row in TABLE_3:
         z = np.linalg.eigvals(state_matrix(pairs[row.key]))
         frequency, _ = modal_parameters(z[np.argmax(z.imag)], 20e3)
         error.append(100.0 * abs(frequency / row.frequency - 1.0))
-    yield Bar("B4 Table 3 frequencies from Tables 1 and 2, largest error", max(error), 0.15, "%", n=f"n={len(error)}")
+    yield Bar("Table 3 frequencies from Tables 1 and 2, largest error", max(error), 0.15, "%", n=f"n={len(error)}")
     remaining_bias, n_without = [], 0
     for name in LOCATIONS:
         test = hammer_test(name, 10, 5)
@@ -174,9 +197,9 @@ def paper():
             f = true.frequency[true.bands.index(mode.band)]
             bias = model.diagnostics["simulated_bias"][mode.band]["frequency_percent"]
             remaining_bias.append(abs(100.0 * (mode.frequency / f - 1.0) - bias))
-    yield Bar("B4 results of method paper without their bias", n_without, 0, n="n=8")
+    yield Bar("results of method paper without their bias", n_without, 0, n="n=8")
     yield Bar(
-        "B4 true bias less printed bias, largest, f", max(remaining_bias), None, "%", "", n=f"n={len(remaining_bias)}"
+        "true bias less printed bias, largest, f", max(remaining_bias), None, "%", "", n=f"n={len(remaining_bias)}"
     )
 
 
@@ -192,29 +215,29 @@ def _fastest(action, repeats=15):
 
 
 def speed():
-    """B5: CPU time and memory of ERA and of the identification."""
+    """CPU time and memory of ERA and of the identification."""
     record = hammer_test("CP A7", 1, 6, duration=0.5).decays(8000)[0]
-    yield Bar("B5 ERA n = 4000, order 4", _fastest(lambda: era(record, 4, 4000, 20e3)), 10.0, "ms CPU")
+    yield Bar("ERA n = 4000, order 4", _fastest(lambda: era(record, 4, 4000, 20e3)), 10.0, "ms CPU")
     peaks = {}
     for n in (2000, 4000):
         tracemalloc.start()
         era(record[: 2 * n], 4, n, 20e3)
         peaks[n] = tracemalloc.get_traced_memory()[1] / 2**20
         tracemalloc.stop()
-    yield Bar("B5 ERA n = 4000, peak memory", peaks[4000], 10.0, "MiB")
-    yield Bar("B5 memory at n = 4000 over n = 2000 (4 is quadratic)", peaks[4000] / peaks[2000], 2.5)
+    yield Bar("ERA n = 4000, peak memory", peaks[4000], 10.0, "MiB")
+    yield Bar("memory at n = 4000 over n = 2000 (4 is quadratic)", peaks[4000] / peaks[2000], 2.5)
     for n in (10, 30):
         test = hammer_test("CP A7", n, 7)
         decays = test.decays()
         cost = _fastest(lambda d=decays: identify(d, 20e3, IdentifySettings())) / n
-        yield Bar(f"B5 identify with error bars, {n} impacts, per impact", cost, 3.0, "ms CPU")
+        yield Bar(f"identify with error bars, {n} impacts, per impact", cost, 3.0, "ms CPU")
     tests = [hammer_test(name, 30, 8).decays() for name in LOCATIONS]
     cost = _fastest(lambda: [identify(d, 20e3, IdentifySettings()) for d in tests], 3) / 1e3
-    yield Bar("B5 identify 8 x 30 impacts, without reading and FRF", cost, 2.0, "s CPU")
+    yield Bar("identify 8 x 30 impacts, without reading and FRF", cost, 2.0, "s CPU")
 
 
 def whole_turnout():
-    """B5: one turnout of 8 x 30 impacts, from samples to modes: impacts and their quality, FRF, limits, gate, modes."""
+    """One turnout of 8 x 30 impacts, from samples to modes: impacts and their quality, FRF, limits, gate, modes."""
     channels = (Channel("hammer", "force"), Channel("rail", "acceleration"))
     recordings_by_location = []
     for name in LOCATIONS:
@@ -222,7 +245,7 @@ def whole_turnout():
         pairs = enumerate(zip(test.force, test.acceleration, strict=True))
         recordings_by_location.append([Recording(np.array(pair), test.rate, channels, record=i) for i, pair in pairs])
     cost = _seconds_of(recordings_by_location, "hammer")
-    yield Bar("B5 8 x 30 impacts with quality, FRF, limits, gate and modes", cost, 2.0, "s CPU")
+    yield Bar("8 x 30 impacts with quality, FRF, limits, gate and modes", cost, 2.0, "s CPU")
     day = date(2024, 5, 13)
     simulated = []
     for section in SECTIONS:
@@ -230,7 +253,7 @@ def whole_turnout():
         tests = [demonstration_test(response, None, day, test, rng)[0] for test in (1, 2, 3)]
         simulated.append([recording for test in tests for recording in test])
     cost = _seconds_of(simulated, "force")
-    yield Bar("B5 the same on simulated track, many modes", cost, 2.0, "s CPU")
+    yield Bar("the same on simulated track, many modes", cost, 2.0, "s CPU")
 
 
 def _seconds_of(recordings_by_location, force):
@@ -247,7 +270,7 @@ def _seconds_of(recordings_by_location, force):
 
 
 def power():
-    """B10: shifts between two tests of ten impacts, p < 0.01."""
+    """Shifts between two tests of ten impacts, p < 0.01."""
     cases = (("ballast", (0.95, 1.0), 0.029, 0.8), ("railpad", (1.0, 0.99), 0.005, 0.9))
     for band, shift, spread, limit in cases:
         detected, false_alarms, fits = [], [], []
@@ -260,7 +283,7 @@ def power():
             false_alarms.append(compare_tests(first, repeated, band).detected)
             fits.append(first.fit - shifted.fit)
         change = 100.0 * (1.0 - min(shift))
-        name = f"B10 {change:.0f} % {band} shift found, spread {100 * spread:.1f} %"
+        name = f"{change:.0f} % {band} shift found, spread {100 * spread:.1f} %"
         yield Bar(
             name,
             float(np.mean(detected)),
@@ -270,7 +293,7 @@ def power():
             note=f"false alarms {np.mean(false_alarms):.3f}",
         )
         words = f"mean change of fit {np.mean(fits):+.2f} points: a fit does not tell"
-        yield Bar("B10 spread of the change of fit", float(np.std(fits)), None, "points", "", note=words)
+        yield Bar("spread of the change of fit", float(np.std(fits)), None, "points", "", note=words)
 
 
 def no_vibration():

@@ -53,7 +53,7 @@ def shipped_patterns():
 
 
 def scores_and_times() -> Iterator[Bar]:
-    """B8: true model, 40 dB, from detected axles; impact times at 40 and 26 dB."""
+    """True model, 40 dB, from detected axles; impact times at 40 and 26 dB."""
     rng = np.random.default_rng(1)
     fits = {}
     for location in LOCATIONS:
@@ -65,11 +65,11 @@ def scores_and_times() -> Iterator[Bar]:
     median = {k: np.median(v, axis=0) for k, v in fits.items()}
     for k, name in enumerate(("in-sample fit", "forecast")):
         worst = min(median, key=lambda location: median[location][k])
-        yield Bar(f"B8 {name} of the true model, 40 dB, A7", median["CP A7"][k], 95.0, "%", ">=", "n=5")
+        yield Bar(f"{name} of the true model, 40 dB, A7", median["CP A7"][k], 95.0, "%", ">=", "n=5")
         note = f"{worst}; the noise allows {median[worst][2 + k]:.1f}"
-        yield Bar(f"B8 {name}, 40 dB, worst of 8 places", median[worst][k], None, "%", "", "n=5", note)
+        yield Bar(f"{name}, 40 dB, worst of 8 places", median[worst][k], None, "%", "", "n=5", note)
         shortfall = max(m[2 + k] - m[k] for m in median.values())
-        yield Bar(f"B8 {name}, 40 dB, furthest below what the noise allows", shortfall, 2.0, "points", "<=", "8 places")
+        yield Bar(f"{name}, 40 dB, furthest below what the noise allows", shortfall, 2.0, "points", "<=", "8 places")
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
     for snr in (40.0, 26.0):
         errors, bound, n_unflagged, n_flagged = [], [], 0, 0
@@ -86,9 +86,9 @@ def scores_and_times() -> Iterator[Bar]:
                 rows = np.stack([basis.coefficients(f) @ basis.columns, g * (basis.slopes(f) @ basis.columns)])
                 bound.append(p.noise * np.sqrt(np.linalg.inv(rows @ rows.T)[1, 1]))
         ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(bound)))
-        yield Bar(f"B8 impact time rms over the Cramér-Rao bound, {snr:g} dB", ratio, 1.5, "", "<=", "n=480 wheels")
+        yield Bar(f"impact time rms over the Cramér-Rao bound, {snr:g} dB", ratio, 1.5, "", "<=", "n=480 wheels")
         yield Bar(
-            f"B8 wrong intervals without a flag, {snr:g} dB", n_unflagged, 0, "", "<=", "n=480", f"{n_flagged} flagged"
+            f"wrong intervals without a flag, {snr:g} dB", n_unflagged, 0, "", "<=", "n=480", f"{n_flagged} flagged"
         )
     p_values = []
     for _ in range(60):
@@ -112,7 +112,7 @@ def _attainable_scores(passage):
 
 
 def noise_passages() -> Iterator[Bar]:
-    """B9: 40 records of noise."""
+    """40 records of noise."""
     rng = np.random.default_rng(2)
     through = band_pass(80, 800, 4, RATE)
     basis, random = wheel_basis(paper_model("CP A7"), through, RATE), null_bases(4, through, RATE, SETTINGS)
@@ -125,11 +125,11 @@ def noise_passages() -> Iterator[Bar]:
         leave_one_out.append(result.leave_one_out)
         null_best.append(max(s.forecast for s in null))
         null_left += [s.leave_one_out for s in null]
-    yield Bar("B9 noise: median forecast with the section's model", np.median(forecasts), 0.0, "%", "<=", "n=40")
-    yield Bar("B9 noise: largest forecast with the section's model", max(forecasts), 3.0, "%", "<=", "n=40")
-    yield Bar("B9 noise: largest forecast with the best of 30 random models", max(null_best), 7.0, "%", "<=", "n=40")
+    yield Bar("noise: median forecast with the section's model", np.median(forecasts), 0.0, "%", "<=", "n=40")
+    yield Bar("noise: largest forecast with the section's model", max(forecasts), 3.0, "%", "<=", "n=40")
+    yield Bar("noise: largest forecast with the best of 30 random models", max(null_best), 7.0, "%", "<=", "n=40")
     above = float(np.mean(np.array(leave_one_out) > np.quantile(null_left, 0.95)))
-    yield Bar("B9 noise: leave-one-out above the 95 % quantile of its null", above, 0.15, "", "<=", "n=40")
+    yield Bar("noise: leave-one-out above the 95 % quantile of its null", above, 0.15, "", "<=", "n=40")
 
 
 def real_axle_times() -> Iterator[Bar]:

@@ -43,17 +43,17 @@ def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
 
 def impact_quality():
     detected, alarms, n, m = detection_rates(blows.second_impact, reason="double_hit")
-    yield Bar("B6 second hits found", detected, 0.99, sense=">=", n=f"n {n}")
-    yield Bar("B6 findings on accepted impacts of the same tests", alarms, 0.01, n=f"n {m}")
+    yield Bar("second hits found", detected, 0.99, sense=">=", n=f"n={n}")
+    yield Bar("findings on accepted impacts of the same tests", alarms, 0.01, n=f"n={m}")
     for name in ("hard_clip", "analog_clip", "soft_clip"):
         fault = getattr(blows, name)
         detected, alarms, n, m = detection_rates(fault, reason="overload")
-        yield Bar(f"B6 {name.replace('_', ' ')} found, tips 0.1-3 ms", detected, 0.95, sense=">=", n=f"n {n}")
+        yield Bar(f"{name.replace('_', ' ')} found, tips 0.1-3 ms", detected, 0.95, sense=">=", n=f"n={n}")
         short, _, n, _ = detection_rates(fault, (1e-4, 3e-4), reason="overload")
-        yield Bar("   of these tips 0.1-0.3 ms, 2 to 6 samples", short, sense="", n=f"n {n}")
-        yield Bar("   findings on accepted impacts of the same tests", alarms, 0.01, n=f"n {m}")
+        yield Bar("   of these tips 0.1-0.3 ms, 2 to 6 samples", short, sense="", n=f"n={n}")
+        yield Bar("   findings on accepted impacts of the same tests", alarms, 0.01, n=f"n={m}")
     _, alarms, _, m = detection_rates(None, noise=(0.0, 0.0))
-    yield Bar("B6 findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n {m}")
+    yield Bar("findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n={m}")
     rng, clipped = np.random.default_rng(3), []
     for _ in range(100):
         recordings = blows.test_of(rng, None, tips=(5e-4, 3e-3))
@@ -62,7 +62,7 @@ def impact_quality():
         samples[1] = np.clip(samples[1], -limit, limit)
         last = find_impacts([*recordings[:-1], Recording(samples, blows.RATE, blows.CHANNELS)], "hammer", "rail")[-1]
         clipped.append("overload" in {r.reason for r in last.rejections})
-    yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n 100")
+    yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n=100")
 
 
 def windowed_receptance(settings, noise=0.0):
@@ -98,17 +98,17 @@ def windows_and_gate():
     estimated_pole, amplitude = fit_mode(result, decay)
     s = correct_poles(estimated_pole, decay)
     zeta, truth = -s.real / abs(s), -pole.real / abs(pole)
-    yield Bar("B7 exponential window: error of damping", 100 * abs(zeta / truth - 1), 0.1, "%")
-    yield Bar("B7 exponential window: error of amplitude", 100 * abs(amplitude / residue - 1), 0.1, "%")
+    yield Bar("exponential window: error of damping", 100 * abs(zeta / truth - 1), 0.1, "%")
+    yield Bar("exponential window: error of amplitude", 100 * abs(amplitude / residue - 1), 0.1, "%")
     raw = -estimated_pole.real / abs(estimated_pole)
     yield Bar("   the same damping left uncorrected", 100 * abs(raw / truth - 1), unit="%", sense="")
-    yield Bar("B7 lowest line (0 Hz masked)", result.frequency[0], 5.0, "Hz", ">=", note="one line spacing")
+    yield Bar("lowest line (0 Hz masked)", result.frequency[0], 5.0, "Hz", ">=", note="one line spacing")
     rng = np.random.default_rng(4)
     impacts = find_impacts(blows.test_of(rng, None, tips=(1e-3, 2e-3), noise=(3e-3, 1e-2)), "hammer", "rail")
     r = receptance_of(impacts)
     h1, hv, h2 = np.abs(r.h1), np.abs(r.hv), np.abs(r.h2)
     inside = np.mean((h1 <= hv * (1 + 1e-9)) & (hv <= h2 * (1 + 1e-9)))
-    yield Bar("B7 lines with |H1| <= |Hv| <= |H2|", float(inside), 1.0, sense=">=", n=f"n_d {r.n}")
+    yield Bar("lines with |H1| <= |Hv| <= |H2|", float(inside), 1.0, sense=">=", n=f"n={r.n} impacts")
     yield from coverage()
 
 
@@ -125,10 +125,10 @@ def coverage(n=10, draws=40_000):
         lower.append(np.mean(lower_coherence_limit(z, n) >= 0.8))
         if true == 0.8:
             yield Bar(
-                "   true coherence 0.8 passes the gate on the lower limit", float(lower[-1]), 0.055, n=f"n {draws}"
+                "   true coherence 0.8 passes the gate on the lower limit", float(lower[-1]), 0.055, n=f"n={draws}"
             )
-            yield Bar("   and the paper's plain > 0.8", float(np.mean(z > 0.8)), sense="", n=f"n {draws}")
-    yield Bar("B7 coverage of the 95 % limits, worst deviation", float(max(worst)), 0.005, n=f"n {3 * draws}")
+            yield Bar("   and the paper's plain > 0.8", float(np.mean(z > 0.8)), sense="", n=f"n={draws}")
+    yield Bar("coverage of the 95 % limits, worst deviation", float(max(worst)), 0.005, n=f"n={3 * draws}")
 
 
 def best_subset():
@@ -147,7 +147,7 @@ def speed():
     sections = [blows.test_of(rng, None, n_impact=30, tips=(1e-3, 2e-3)) for _ in range(8)]
     with stopwatch() as finding:
         tests = [find_impacts(recordings, "hammer", "rail") for recordings in sections]
-    yield Bar("B5 part: 8 x 30 impacts of 4,000 samples found and judged", finding.cpu, 1.0, "CPU s")
+    yield Bar("part of the hammer test: 8 x 30 impacts of 4,000 samples found and judged", finding.cpu, 1.0, "CPU s")
     with stopwatch() as averaging:
         lines = sum(receptance_of(impacts).frequency.size for impacts in tests)
-    yield Bar("B5 part: receptance with all limits", averaging.cpu, 0.3, "CPU s", n=f"{lines} lines")
+    yield Bar("part of the hammer test: receptance with all limits", averaging.cpu, 0.3, "CPU s", n=f"{lines} lines")

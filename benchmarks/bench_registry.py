@@ -1,4 +1,4 @@
-"""R1-R8: size, registering, questions on 29 million rows, race, re-run, storage version, refusals, empty registry.
+"""Size, registering, questions on 29 million rows, race, re-run, storage version, refusals, empty registry.
 
 CPU seconds, best of three, warm. TURNOUT_BENCH_SHARE (default 1) scales the network for a quick look.
 """
@@ -52,16 +52,16 @@ def _register_in_own_process(work, registry):
 
 
 def registering(folder):
-    """R2, and the cost of a result with all its impacts and curves."""
+    """Registering, and the cost of a result with all its impacts and curves."""
     n = int(28000 * SHARE)
     hammer_batches(folder / "work", n)
     fastest = min(_register_in_own_process(folder / "work", folder / f"registry{k}") for k in range(3))
-    yield Bar(f"R2 register {n} results", fastest[0], 5, "CPU s", n=f"{fastest[2]} units, {fastest[3]} rejected")
+    yield Bar(f"register {n} results", fastest[0], 5, "CPU s", n=f"{fastest[2]} units, {fastest[3]} rejected")
     per_table = {}
     for path in (folder / "registry0").rglob("batch-*.parquet"):
         table = path.relative_to(folder / "registry0").parts[0]
         per_table[table] = per_table.get(table, 0) + 1
-    yield Bar("R2 files per table and run", max(per_table.values()), 3, "files")
+    yield Bar("files per table and run", max(per_table.values()), 3, "files")
     n = int(7000 * SHARE)
     hammer_batches(folder / "complete", n, complete=True)
     cpu, memory, units, _ = _register_in_own_process(folder / "complete", folder / "complete_registry")
@@ -72,13 +72,13 @@ def registering(folder):
 
 
 def rerun(folder):
-    """R5: a second run adds nothing, and two concurrent runs give the union."""
+    """A second run adds nothing, and two concurrent runs give the union."""
     hammer_batches(folder / "one", 800)
     hammer_batches(folder / "other", 1600)
     batches = sorted((folder / "one").glob("*.parquet"))
     first = register(batches, folder / "registry", read=read_results)
     again = register(batches, folder / "registry", read=read_results)
-    yield Bar("R5 rows added by a second run", sum(again.rows.values()), 0, "rows", n=f"{first.n_units} units")
+    yield Bar("rows added by a second run", sum(again.rows.values()), 0, "rows", n=f"{first.n_units} units")
     command = [sys.executable, "-c", REGISTER]
     processes = [
         subprocess.Popen([*command, str(folder / name), str(folder / "both")], stdout=subprocess.DEVNULL)
@@ -91,7 +91,7 @@ def rerun(folder):
     answers = [_ask(folder / name, query) for name in ("both", "calm")]
     differ = len(set(answers[0]) ^ set(answers[1]))
     yield Bar(
-        "R5 rows that two concurrent runs lack of their union", differ + sum(codes), 0, "rows", n=f"{len(answers[1])}"
+        "rows that two concurrent runs lack of their union", differ + sum(codes), 0, "rows", n=f"{len(answers[1])}"
     )
 
 
@@ -101,13 +101,13 @@ def _ask(registry, sql):
 
 
 def empty_registry(folder):
-    """R8 here; R7 by the tests of each case."""
+    """An empty registry here; refusals by the tests of each case."""
     register([], folder / "registry", read=iter)
     failed = sum(_fails(folder / "registry", call) for call in views())
-    yield Bar("R8 views and macros that fail on an empty registry", failed, 0, "", n=f"of {len(views())}")
+    yield Bar("views and macros that fail on an empty registry", failed, 0, "", n=f"of {len(views())}")
     tests = Path(__file__).resolve().parents[1] / "tests" / "unit" / "registry" / "test_registry_refusals.py"
     result = subprocess.run([sys.executable, "-m", "pytest", "-q", "-x", str(tests)], capture_output=True, text=True)
-    yield Bar("R7 refusals that fail", result.returncode, 0, "", n=result.stdout.strip().splitlines()[-1])
+    yield Bar("refusals that fail", result.returncode, 0, "", n=result.stdout.strip().splitlines()[-1])
 
 
 ARGUMENTS = {
@@ -133,7 +133,7 @@ def _fails(registry, call):
 
 
 def versions(folder):
-    """R6: a registry of this DuckDB, opened and queried by an older version in a separate environment."""
+    """A registry of this DuckDB, opened and queried by an older version in a separate environment."""
     hammer_batches(folder / "work", 80)
     register(sorted((folder / "work").glob("*.parquet")), folder / "registry", read=read_results)
     python = folder / "venv" / "bin" / "python"
@@ -142,7 +142,7 @@ def versions(folder):
         pip = [str(python), "-m", "pip", "install", "--quiet", f"duckdb=={OLDER_DUCKDB}"]
         subprocess.run(pip, check=True, capture_output=True, timeout=300)
     except (subprocess.SubprocessError, OSError):
-        yield Bar("R6 not run: no older DuckDB to be had", 0, None)
+        yield Bar("not run: no older DuckDB to be had", 0, None)
         return
     code = (
         "import duckdb, sys; off = {'autoinstall_known_extensions': False, 'autoload_known_extensions': False}\n"
@@ -158,19 +158,17 @@ def versions(folder):
     result = subprocess.run([str(python), "-c", code, str(file), *queries], capture_output=True, text=True)
     print(result.stderr, end="")
     failed, rows, version = result.stdout.split() if result.returncode == 0 else (str(len(queries)), "0", OLDER_DUCKDB)
-    yield Bar("R6 views and macros that fail in an older DuckDB", int(failed), 0, "", n=f"of {len(queries)}, {version}")
-    yield Bar("R6 modes it reads", int(rows), 160, "rows", ">=")
+    yield Bar("views and macros that fail in an older DuckDB", int(failed), 0, "", n=f"of {len(queries)}, {version}")
+    yield Bar("modes it reads", int(rows), 160, "rows", ">=")
 
 
 def racing(folder):
-    """R4: 15 s of writing and compaction. Reading by a glob must fail, reading by the published list must not."""
+    """15 s of writing and compaction. Reading by a glob must fail, reading by the published list must not."""
     listed, globbed = race(folder / "list"), race(folder / "glob", through_glob=True)
+    yield Bar("wrong counts and errors, published list", listed.wrong + listed.errors, 0, "", n=f"{listed.reads} reads")
+    yield Bar("reads", listed.reads, 300, "", ">=", n=f"{listed.commits} commits")
     yield Bar(
-        "R4 wrong counts and errors, published list", listed.wrong + listed.errors, 0, "", n=f"{listed.reads} reads"
-    )
-    yield Bar("R4 reads", listed.reads, 300, "", ">=", n=f"{listed.commits} commits")
-    yield Bar(
-        "R4 wrong counts and errors, glob (must fail)",
+        "wrong counts and errors, glob (must fail)",
         globbed.wrong + globbed.errors,
         1,
         "",
@@ -186,24 +184,24 @@ def passages(folder):
     cpu, memory, units, _ = _register_in_own_process(folder / "work", folder / "registry")
     yield Bar(f"register {units} passages x 12 sensors", cpu, None, "CPU s", n=f"{memory:.2f} GB")
     size, rows = _size(folder / "registry", "passage_fits")
-    yield Bar("R1 bytes per passage fit", size / rows, 10, "B", n=f"{rows} rows")
+    yield Bar("bytes per passage fit", size / rows, 10, "B", n=f"{rows} rows")
     with open_registry(folder / "registry") as connection:
         for name, sql in PASSAGES.items():
             yield Bar(name, _fastest(connection, sql), 1.2, "CPU s")
 
 
 def network(folder):
-    """R1 and R3 on 29 million modes: nine compacted years and 52 weekly batches."""
+    """Size and speed of questions on 29 million modes: nine compacted years and 52 weekly batches."""
     folder.mkdir(parents=True)
     started = time.perf_counter()
     make_network(folder, int(3500 * SHARE))
     size, rows = _size(folder, "modes")
     note = f"{rows} rows, made in {time.perf_counter() - started:.0f} s"
-    yield Bar("R1 bytes per mode", size / rows, 26, "B", n=note)
+    yield Bar("bytes per mode", size / rows, 26, "B", n=note)
     with open_registry(folder) as connection:
         for name, sql in NETWORK.items():
-            yield Bar(f"R3 {name}", _fastest(connection, sql), 0.15 if name in QUICK_QUESTIONS else 1.2, "CPU s")
-        yield Bar("R3 CUSUM of all charts, 4 years", _fastest(connection, CUSUM), 6, "CPU s")
+            yield Bar(f"{name}", _fastest(connection, sql), 0.15 if name in QUICK_QUESTIONS else 1.2, "CPU s")
+        yield Bar("CUSUM of all charts, 4 years", _fastest(connection, CUSUM), 6, "CPU s")
 
 
 def _size(registry, table):

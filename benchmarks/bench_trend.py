@@ -54,7 +54,7 @@ def opens_alarm(opened):
 
 
 def false_alarms(n_part=14, turnouts=500, years=3):
-    """T1: charts without change, all parameters estimated from the first year. Alarms of both directions count."""
+    """Charts without change, all parameters estimated from the first year. Alarms of both directions count."""
     for phi in (0.0, 0.2, 0.4):
         counts = dict.fromkeys(("down", "up", "whole"), 0)
         for index in range(n_part):
@@ -67,7 +67,7 @@ def false_alarms(n_part=14, turnouts=500, years=3):
         weeks = YEAR * years * n_part * turnouts * 8 / FLEET
         total = sum(counts.values()) / weeks
         words = ", ".join(f"{k} {v / weeks:.1f}" for k, v in counts.items())
-        yield Bar(f"T1 false alarms a week in {FLEET} charts, phi {phi}", total, 10.0, "", "<=",
+        yield Bar(f"false alarms a week in {FLEET} charts, phi {phi}", total, 10.0, "", "<=",
                   f"n = {n_part * turnouts * 8} charts x {years} a", words)  # fmt: skip
 
 
@@ -84,7 +84,7 @@ def curved_laws(turnouts=500, years=3):
                 if not is_judged[rows].any():
                     continue
                 alarms = (openings & is_judged)[rows].sum()
-                yield Bar(f"T1 false alarms of those promised, law curved by {curvature} %/°C², {name} of {n_section} "
+                yield Bar(f"false alarms of those promised, law curved by {curvature} %/°C², {name} of {n_section} "
                           "sections", alarms / (is_judged[rows].sum() * promised), 1.2, "", "<=",
                           f"n = {is_judged[rows].any(axis=1).sum()} charts, {alarms} alarms")  # fmt: skip
 
@@ -100,12 +100,12 @@ def rare_campaigns(turnouts=750, years=5):
             is_judged = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & charts.prepared.baseline.complete[:n, None]
             alarms = opens_alarm(charts.down_open[:n]).sum() + opens_alarm(charts.up_open[:n]).sum()
             share = alarms / (is_judged.sum() * promised)
-            yield Bar(f"T1 false alarms of those promised, one campaign in {every} weeks, phi {phi}",
+            yield Bar(f"false alarms of those promised, one campaign in {every} weeks, phi {phi}",
                       share, None, "", "<=", f"n = {n} charts, {alarms} alarms")  # fmt: skip
 
 
 def delays(turnouts=2000):
-    """T2: one section of each turnout loses 1.5 % at once, or 1.5 % a year."""
+    """One section of each turnout loses 1.5 % at once, or 1.5 % a year."""
     which = np.zeros((turnouts, 8), dtype=bool)
     which[:, 0] = True
     for campaign, phi, limits in (
@@ -126,7 +126,7 @@ def delays(turnouts=2000):
         names = ("step, median delay", "step, P(seen in 26 weeks)", "drift, median delay")
         for i, name in enumerate(names):
             limit = limits[i] if limits else None
-            yield Bar(f"T2 {name}, {about}", float(values[i]), limit, units[i], senses[i], f"n = {turnouts}")
+            yield Bar(f"{name}, {about}", float(values[i]), limit, units[i], senses[i], f"n = {turnouts}")
 
 
 PAPER = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7": (99.6, 5.2), "CP A9": (115.8, 17.6),
@@ -134,7 +134,7 @@ PAPER = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7":
 
 
 def detectable():
-    """T3: sections that report that they cannot detect 3 % of stiffness, with the paper's spreads as sigma."""
+    """Sections that report that they cannot detect 3 % of stiffness, with the paper's spreads as sigma."""
     n_blind, numbers = 0, []
     for i, (name, (frequency, spread)) in enumerate(PAPER.items()):
         fleet = Fleet(turnouts=60, sections=1, weeks=2 * YEAR, phi=0.2, campaign=0.0, sigma=100 * spread / frequency,
@@ -144,12 +144,12 @@ def detectable():
         silent_share = (status["detectable_pct"] > SETTINGS.target_percent).mean()
         n_blind += silent_share > 0.95 if name != "CP A8" else 0
         numbers.append(f"{name} {status['detectable_pct'].median():.1f} %")
-    yield Bar("T3 ballast sections of the paper but A8 that say they cannot see", n_blind, 7, "of 7", ">=",
+    yield Bar("ballast sections of the paper but A8 that say they cannot see", n_blind, 7, "of 7", ">=",
               "n = 60 each", "median change seen: " + ", ".join(numbers))  # fmt: skip
 
 
 def ranking(turnouts=1750):
-    """T4: 2 % of 14,000 charts decline for a year. Precision of the first fifty of two rankings."""
+    """2 % of 14,000 charts decline for a year. Precision of the first fifty of two rankings."""
     rng = np.random.default_rng(44)
     fleet = Fleet(turnouts=turnouts, weeks=2 * YEAR, phi=0.2)
     which = np.zeros(fleet.charts, dtype=bool)
@@ -166,13 +166,13 @@ def ranking(turnouts=1750):
     }
     about = f"n = {fleet.charts} charts, {which.sum()} decline"
     yield Bar(
-        "T4 precision of the first 50, by the sum over its limit", first["the sum over its limit"], 0.9, "", ">=", about
+        "precision of the first 50, by the sum over its limit", first["the sum over its limit"], 0.9, "", ">=", about
     )
-    yield Bar("T4 precision of the first 50, by the raw 90-day slope", first["raw 90-day slope"], 0.1, "", "<=", about)
+    yield Bar("precision of the first 50, by the raw 90-day slope", first["raw 90-day slope"], 0.1, "", "<=", about)
 
 
 def after_reset(turnouts=2000):
-    """T5: false alarms of a chart after an event, relative to the rate asked for."""
+    """False alarms of a chart after an event, relative to the rate asked for."""
     fleet = Fleet(turnouts=turnouts, weeks=YEAR * 3 + 20, phi=0.2)
     when = pd.Timestamp("2016-01-04") + pd.Timedelta(weeks=70)
     work = pd.DataFrame({"turnout_id": [f"T{i:05d}" for i in range(turnouts)], "section_id": None, "kind": "tamping",
@@ -182,12 +182,12 @@ def after_reset(turnouts=2000):
     active = np.isfinite(charts.z[:n]) & ~charts.learning[:n] & (charts.prepared.epoch[:n] == 1)
     rate = (opens_alarm(charts.down_open[:n]) & active).sum() / active.sum()
     rate *= SETTINGS.run_length_loss
-    yield Bar(f"T5 false alarms after a reset, m = {SETTINGS.learning_large}, of those asked for", rate, 1.5, "", "<=",
+    yield Bar(f"false alarms after a reset, m = {SETTINGS.learning_large}, of those asked for", rate, 1.5, "", "<=",
               f"n = {n} charts, {active.sum() // n} campaigns")  # fmt: skip
 
 
 def dates(draws=2000):
-    """T6: intervals of the time to the limit for linear trends, and dates wrongly given for a curve that settles."""
+    """Intervals of the time to the limit for linear trends, and dates wrongly given for a curve that settles."""
     rng = np.random.default_rng(61)
     for years in (1, 2, 3):
         inside, verdicts, noise = 0, [], ar_noise(rng, draws, YEAR * years, 0.2, 0.6)
@@ -199,16 +199,16 @@ def dates(draws=2000):
             verdicts.append(forecast(time, values, 0.2, SETTINGS).verdict if len(verdicts) < 300 else None)
         share = {v: verdicts[:300].count(v) / 300 for v in ("line", "line_or_settling", "no_limit", "settling")}
         words = ", ".join(f"{k} {v:.2f}" for k, v in share.items())
-        yield Bar(f"T6 80 % interval holds the date, line, {years} a, lower bar", inside / draws, 0.75, "", ">=",
+        yield Bar(f"80 % interval holds the date, line, {years} a, lower bar", inside / draws, 0.75, "", ">=",
                   f"n = {draws}", words)  # fmt: skip
-        yield Bar(f"T6 80 % interval holds the date, line, {years} a, upper bar", inside / draws, 0.85, "", "<=")
+        yield Bar(f"80 % interval holds the date, line, {years} a, upper bar", inside / draws, 0.85, "", "<=")
     for years in (2, 3):
         time = np.arange(YEAR * years) * 7.0
         noise = ar_noise(rng, 500, time.size, 0.2, 0.6)
         forecasts = [forecast(time, v, 0.2, SETTINGS) for v in noise - 3.0 * (1 - np.exp(-time / 365.25 / 0.5))]
         dated = np.mean([np.isfinite(f.not_before) for f in forecasts])
         latest = np.mean([np.isfinite(f.not_after) for f in forecasts])
-        yield Bar(f"T6 settling curve (3 %, half a year) that gets a date, {years} a", float(dated), 0.05, "", "<=",
+        yield Bar(f"settling curve (3 %, half a year) that gets a date, {years} a", float(dated), 0.05, "", "<=",
                   "n = 500", f"with a latest date {latest:.3f}")  # fmt: skip
 
 
@@ -221,7 +221,7 @@ def ar_noise(rng, n, length, phi, sigma):
 
 
 def season_only(turnouts=300):
-    """T7: share of works in October without effect that are reported as a change, with straight and curved laws."""
+    """Share of works in October without effect that are reported as a change, with straight and curved laws."""
     from tests.oracles.trend_views import connect_views
 
     from turnout.trend import baseline_rows, chart_rows
@@ -239,7 +239,7 @@ def season_only(turnouts=300):
         raw = rows[(rows["measured_at_utc"] - pd.Timestamp("2017-10-10")).abs() < pd.Timedelta("120D")]
         later = raw["measured_at_utc"] >= "2017-10-10"
         side = raw.groupby(["section_id", later], observed=True)["frequency_hz"].mean().unstack()
-        about = f"T7 work that changed nothing called a change, {'reset' if resets else 'no reset'}"
+        about = f"work that changed nothing called a change, {'reset' if resets else 'no reset'}"
         about += f", law curved by {curvature} %/°C²" if curvature else ""
         yield Bar(about, float(events["changed"].mean()), None if curvature else 0.05, "", "" if curvature else "<=",
                   f"n = {len(events)}",
@@ -248,7 +248,7 @@ def season_only(turnouts=300):
 
 
 def oracle():
-    """T8: sums by a plain loop, residuals by pandas, slopes by statsmodels, independent of the code of the charts."""
+    """Sums by a plain loop, residuals by pandas, slopes by statsmodels, independent of the code of the charts."""
     from tests.oracles.trend_views import connect_views
 
     from benchmarks.trend_oracle import cusum_by_loop, residuals_by_pandas, slopes_by_statsmodels
@@ -273,7 +273,7 @@ def oracle():
             sql_values = con.execute(f"select * from {question}").df().set_index(oracle.index.names)[column]
             joined = pd.concat([sql_values.rename("sql"), oracle.rename("oracle")], axis=1, join="inner").dropna()
             worst = float((joined["sql"] - joined["oracle"]).abs().max())
-            yield Bar(f"T8 SQL against an independent computation, {name}", worst, 1e-8, "", "<=",
+            yield Bar(f"SQL against an independent computation, {name}", worst, 1e-8, "", "<=",
                       f"n = {len(joined)} rows", f"DuckDB {version()}")  # fmt: skip
 
 

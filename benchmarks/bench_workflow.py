@@ -1,7 +1,7 @@
-"""W1-W4: cost of the workflow itself on a network, and its behaviour after damage and kills.
+"""Cost of the workflow itself on a network, and its behaviour after damage and kills.
 
 The raw files are tiny and only read, so that the orchestration is measured. TURNOUT_BENCH_SHARE (default 1) scales the
-number of turnouts of W1 and W2 for a quick look.
+number of turnouts of the cost for a quick look.
 """
 
 import os
@@ -38,46 +38,46 @@ def bars():
 
 
 def network(folder):
-    """W1 and W2 on a network of 3,500 turnouts x 8 sections, five files each."""
+    """Cost on a network of 3,500 turnouts x 8 sections, five files each."""
     make_network(folder)
     n_file = sum(len(files) for _, _, files in os.walk(folder / "raw")) - N_TURNOUT
     output, watch, _ = run_workflow(folder)
     n = f"{N_TURNOUT} turnouts, {n_file} files, {SHARDS} shards"
     processed = count(output, "processed")
-    yield Bar("W2 first run of all: units processed", processed, N_TURNOUT * N_SECTION, "units", ">=", n)
+    yield Bar("first run of all: units processed", processed, N_TURNOUT * N_SECTION, "units", ">=", n)
     note = "starts, imports, scan, hashing all files, register; the chain does nothing"
     yield Bar(
-        "W2 first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs", note
+        "first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs", note
     )
     output, watch, peak = run_workflow(folder)
     assert "Nothing to be done" in output, output
     note = f"{watch.cpu:.2f} CPU s; load of the machine {os.getloadavg()[0]:.1f}"
-    yield Bar("W1 nothing new: wall", watch.wall, 5.0, "s", "<=", n, note)
-    yield Bar("W1 nothing new: memory of the process", peak, 300.0, "MB", "<=", n)
-    yield Bar("W1 nothing new: CPU", watch.cpu, None, "CPU s", "", n)
+    yield Bar("nothing new: wall", watch.wall, 5.0, "s", "<=", n, note)
+    yield Bar("nothing new: memory of the process", peak, 300.0, "MB", "<=", n)
+    yield Bar("nothing new: CPU", watch.cpu, None, "CPU s", "", n)
 
     turnout = "T00042" if N_TURNOUT > 42 else "T00001"
     day = folder / "raw" / turnout / "hammer" / "2024-01-01"
     (day / "A3_9.npz").write_bytes(toy.raw_bytes(1, folder))
     output, watch, _ = run_workflow(folder)
-    yield Bar("W2 one new file: units processed", count(output, "processed"), 1, "units", "<=")
-    yield Bar("W2 one new file: hammer jobs", count_jobs(output), 1, "jobs", "<=")
-    yield Bar("W2 one new file: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
+    yield Bar("one new file: units processed", count(output, "processed"), 1, "units", "<=")
+    yield Bar("one new file: hammer jobs", count_jobs(output), 1, "jobs", "<=")
+    yield Bar("one new file: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
 
     toy.add_raw(folder, "T99999", N_SECTION)
     with open(folder / "config/turnouts.tsv", "a") as table:
         table.write("T99999\ttoy\tline 1\n")
     output, watch, _ = run_workflow(folder)
-    yield Bar("W2 one new turnout row: units processed", count(output, "processed"), N_SECTION, "units", "<=")
-    yield Bar("W2 one new turnout row: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
+    yield Bar("one new turnout row: units processed", count(output, "processed"), N_SECTION, "units", "<=")
+    yield Bar("one new turnout row: wall", watch.wall, 15.0, "s", "<=", "", f"{watch.cpu:.2f} CPU s")
 
     changed = [f"T{i:05d}" for i in range(0, N_TURNOUT, max(1, N_TURNOUT // 200))][:200]
     for name in changed:
         toy.add_raw(folder, name, N_SECTION, n_campaign=1, first=1)
     output, watch, _ = run_workflow(folder)
     off = abs(count(output, "processed") - N_SECTION * len(changed))
-    yield Bar(f"W2 {len(changed)} turnouts with a new campaign: units off", off, 0, "units", "<=")
-    yield Bar("W2 orchestration of these", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs")
+    yield Bar(f"{len(changed)} turnouts with a new campaign: units off", off, 0, "units", "<=")
+    yield Bar("orchestration of these", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs")
 
 
 def make_network(folder):
@@ -123,7 +123,7 @@ def count_jobs(output):
 
 
 def damage_and_kills(folder):
-    """W3: one per cent of the files damaged in ten ways, and twenty kills. The registry must be unaffected."""
+    """One per cent of the files damaged in ten ways, and twenty kills. The registry must be unaffected."""
     fleet = toy.make(folder / "fleet", n_turnout=N_DAMAGE_TURNOUT, n_section=8)
     files = sorted((fleet / "raw").glob("*/hammer/*/*.npz"))
     damage_types = toy.damages(fleet)
@@ -135,10 +135,10 @@ def damage_and_kills(folder):
     undisturbed = toy.data_files(fleet)
     in_quarantine = quarantine_rows(fleet)
     n = f"{len(files)} files, {len(broken)} damaged in {len(damage_types)} ways"
-    yield Bar("W3 damaged files without their reason in quarantine", len(expected - in_quarantine), 0, "files", "<=", n)
-    yield Bar("W3 sound files in quarantine", len(in_quarantine - expected), 0, "files", "<=", n)
+    yield Bar("damaged files without their reason in quarantine", len(expected - in_quarantine), 0, "files", "<=", n)
+    yield Bar("sound files in quarantine", len(in_quarantine - expected), 0, "files", "<=", n)
     lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not damage_types[k][2] for k in broken.values())
-    yield Bar("W3 sound recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
+    yield Bar("sound recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
 
     toy.forget(fleet)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 10}\n")
@@ -148,7 +148,7 @@ def damage_and_kills(folder):
     toy.run(fleet, "--rerun-incomplete", shards=4)
     differs = int(toy.data_files(fleet) != undisturbed)
     note = f"{n_dead} of {N_KILL} kills met a run that was not finished"
-    yield Bar("W3 registry differs after 20 kills -9 and a last run", differs, 0, "", "<=", n, note)
+    yield Bar("registry differs after 20 kills -9 and a last run", differs, 0, "", "<=", n, note)
 
 
 def quarantine_rows(folder):
@@ -180,7 +180,7 @@ def kill_run(folder, seconds):
 
 
 def same_rows(folder):
-    """W4: shards and cores change no byte of the registry's data files."""
+    """Shards and cores change no byte of the registry's data files."""
     fleet = folder / "fleet"
     (fleet / "config/config.yaml").write_text("")
     registries = {}
@@ -189,4 +189,4 @@ def same_rows(folder):
         toy.run(fleet, shards=shards, cores=cores)
         registries[shards, cores] = tuple(toy.data_files(fleet))
     n = "shards x cores " + ", ".join(f"{s}x{c}" for s, c in registries)
-    yield Bar("W4 different registries", len(set(registries.values())), 1, "", "<=", n)
+    yield Bar("different registries", len(set(registries.values())), 1, "", "<=", n)

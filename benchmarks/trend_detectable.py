@@ -40,7 +40,7 @@ def bars(turnouts=300):
             shares = [share_seen(days, campaign, phi, turnouts) for phi in (0.0, 0.2, 0.4)]
             words = ", ".join(f"phi {phi} {share:.3f}" for phi, (share, _) in zip((0.0, 0.2, 0.4), shares))
             value, n = np.mean([s for s, _ in shares]), sum(n for _, n in shares)
-            about = f"T3 detectable change seen within a year, {name}, campaign effect {campaign} %"
+            about = f"detectable change seen within a year, {name}, campaign effect {campaign} %"
             yield Bar(about, float(value), 0.88, "", ">=", f"n = {n}", words)
             yield Bar(f"{about}, not understated", float(value), 0.93, "", "<=", f"n = {n}")
         for curvature in (0.0, -0.005):  # %/°C²; sections without siblings, which fit it
@@ -49,6 +49,6 @@ def bars(turnouts=300):
                 for phi in (0.0, 0.2, 0.4)
             ]
             value, n = np.mean([s for s, _ in shares]), sum(n for _, n in shares)
-            about = f"T3 the same, turnouts of two sections, law curved by {curvature} %/°C², {name}"
+            about = f"the same, turnouts of two sections, law curved by {curvature} %/°C², {name}"
             yield Bar(about, float(value), 0.88, "", ">=", f"n = {n}")
             yield Bar(f"{about}, not understated", float(value), 0.93, "", "<=", f"n = {n}")

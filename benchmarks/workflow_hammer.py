@@ -1,4 +1,4 @@
-"""W4 with the real hammer stage: a small fleet of full recordings gives the same rows for any shards and cores."""
+"""With the real hammer stage: a small fleet of full recordings gives the same rows for any shards and cores."""
 
 import shutil
 from datetime import date
@@ -30,9 +30,9 @@ def hammer_same_rows(folder, toy):
     rows = toy.rows(folder)
     n = f"{n_file} files, {len(rows['impacts'])} impacts, {len(rows['modes'])} modes; shards x cores, CPU: "
     off = abs(len(rows["models"]) - (n_file - 1))
-    yield Bar("W4 hammer chain: models too many or too few", off, 0, "", "<=", f"{n_file} files, one of them cut off")
+    yield Bar("hammer chain: models too many or too few", off, 0, "", "<=", f"{n_file} files, one of them cut off")
     yield Bar(
-        "W4 hammer chain: different registries", len(set(registries.values())), 1, "", "<=", n + ", ".join(cpu_texts)
+        "hammer chain: different registries", len(set(registries.values())), 1, "", "<=", n + ", ".join(cpu_texts)
     )
 
 

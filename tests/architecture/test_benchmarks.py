@@ -1,0 +1,43 @@
+"""What ``python -m benchmarks`` prints is judged and understood without further documents."""
+
+import ast
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.bar import Bar, heading
+
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
+CODE = re.compile(
+    r"^\s*[A-Z]\d{1,2}\b|\b(bars?|and) [A-Z]\d{1,2}\b"
+)  # a number of a bar, as in a list that is elsewhere
+
+
+@pytest.mark.parametrize(("figure", "is_met"), [(0.9, True), (1.1, False), (float("nan"), False)])
+@pytest.mark.parametrize("type_", [float, np.float64, np.float32])
+def test_a_missed_bar_is_counted_whatever_the_type_of_its_figure(figure, is_met, type_):
+    assert Bar("figure", type_(figure), 1.0).is_met is is_met
+
+
+def test_figures_stand_below_the_names_of_their_columns():
+    line = str(Bar("figure", 0.9, 1.0, "Hz", n="n=5"))
+    for name, value in (("measured", "0.9"), ("bar", "<= 1")):
+        end = re.search(rf"(?<= ){name} ", heading()).end()
+        assert line[:end].rstrip().endswith(value)
+    assert line.index("Hz") == heading().index("unit") and line.index("met") == heading().index("bar is")
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
+def test_names_of_bars_and_docstrings_are_words(path):
+    tree = ast.parse(path.read_text())
+    calls = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "Bar" and n.args)
+    names = [ast.unparse(call.args[0]).removeprefix("f").strip("'\"") for call in calls]
+    documented = (ast.Module, ast.FunctionDef, ast.ClassDef)
+    names += [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, documented)]
+    assert [name for name in names if CODE.search(name)] == []
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("bench_*.py")), ids=lambda path: path.name)
+def test_every_benchmark_says_first_what_it_measures(path):
+    assert len(ast.get_docstring(ast.parse(path.read_text())) or "") > 40
