@@ -1,7 +1,13 @@
-"""Metadata in unknown words: what contradicts the layout and is read silently, and remarks on harmless files."""
+"""Metadata in unknown words: what contradicts the layout and is read silently, and remarks on harmless files.
+
+Set E and set F are files with words of different languages. A harmful file contradicts the layout; it is silent if it
+is read without a message. A benign file contradicts nothing; "reported": it is rejected, "remarked": it is read with a
+remark, and a person has to look.
+"""
 
 import os
 from collections import Counter
+from textwrap import shorten
 
 from benchmarks.bar import Bar
 from benchmarks.metadata_cases import benign, harmful, is_silent
@@ -19,7 +25,7 @@ def bars():
         for kind, n in Counter(case.kind for case in silent).items():
             yield Bar(f"set {which}, silent, {kind}", 100 * n / of_kind[kind], None, "%", n=f"{n} of {of_kind[kind]}")
         for case in silent:
-            note = f"{case.entries[0][0]}: {case.entries[0][1]} ({case.outcome} {case.note[:60]})"
+            note = f"{case.entries[0][0]}: {case.entries[0][1]} ({case.outcome} {_beginning(case.note, 80)})"
             yield Bar(f"set {which}, silent, {case.kind}, {case.format}, {case.place}", 1, None, note=note)
         cases = list(benign(which))
         for outcome in ("reported", "remarked"):
@@ -27,4 +33,13 @@ def bars():
             yield Bar(f"set {which}, benign files {outcome}", 100 * n / len(cases), None, "%", n=f"{n} of {len(cases)}")
         for case in cases:
             if case.outcome not in ("read", "remarked"):
-                yield Bar(f"set {which}, benign, {case.format}: {case.outcome}", 1, None, note=case.note[-160:])
+                yield Bar(
+                    f"set {which}, benign, {case.format}: {case.outcome}",
+                    1,
+                    None,
+                    note=_beginning(case.note, 240),
+                )
+
+
+def _beginning(text, width):
+    return shorten(text, width, placeholder=" ...")

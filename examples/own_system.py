@@ -182,14 +182,23 @@ def made_records(law, amount, levels, rate=200.0, seconds=10.0, force_sd=1.0, no
     return records
 
 
+def show(title, diagnosis):
+    """Print the answer, the effect with its size, and the fit on the held-out record."""
+    print(f"{title}: {diagnosis}")
+    for term in diagnosis.fit.terms:
+        print(f"   {term.sentence()}")
+    fit = diagnosis.verification
+    print(f"   fit on the held-out record: {fit.before:.1f} % without it, {fit.after:.1f} % with it")
+
+
 def main():
     """Diagnose a mount with quadratic drag and a pendulum with dry friction."""
     forced = made_records("quadratic_drag", 0.3, (0.3, 0.6, 1.0, 0.8))
     case = Mount(forced[:3], forced[3:], 200.0, (3.8, 0.5), (0.03, 0.03), (90.0, 30.0))
-    print("forced:", diagnose(case))
+    show("forced", diagnose(case))
     free = made_records("dry_friction", 0.01, (1.0, 0.5, 0.25, 0.7), force_sd=0.0)
     case = Pendulum(free[:3], free[3:], 200.0, (3.8, 0.5), (0.03, 0.03))
-    print("free decay:", diagnose(case))
+    show("free decay", diagnose(case))
 
 
 if __name__ == "__main__":

@@ -117,7 +117,8 @@ def campaign(laws, seed=1):
 
 if __name__ == "__main__":
     diagnosis = diagnose(campaign((Law("cubic", 1, 0.5),)), MismatchSettings(iterations=30, base_iterations=30))
-    print(diagnosis.verdict.answer, *diagnosis.names, diagnosis.verdict.reason)
+    print(diagnosis)
     for term in diagnosis.fit.terms:
-        print(term.sentence())
-    print(diagnosis.verification)
+        print(f"   {term.sentence()}")
+    fit = diagnosis.verification
+    print(f"   fit on the held-out recording: {fit.before:.1f} % without it, {fit.after:.1f} % with it")

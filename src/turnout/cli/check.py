@@ -81,7 +81,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {path}: no command reads a file of this name. Rename it, or move it out of the configuration")
     for event in _planned_events(configuration.events):
         print(f"  {event}")
-    for decision in _open_decisions(configuration, layouts):
+    if not configuration.ids:
+        print("  no turnout yet: `turnout add ID LAYOUT` adds one")
+    for decision in _open_decisions(configuration.folder / "layouts"):
         print(f"  {decision}")
     raw = Path(args.raw or "raw")
     if not raw.is_dir() and args.raw:
@@ -117,13 +119,12 @@ def _unread_files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.iterdir() if p.suffix in TABLE_SUFFIXES and p.name not in (*TABLES, "config.yaml"))
 
 
-def _open_decisions(configuration: Configuration, layouts: Iterable[str]) -> Iterator[str]:
-    """Each line of a used layout that a person has yet to decide, as `turnout layout new` marks it."""
+def _open_decisions(folder: Path) -> Iterator[str]:
+    """Each line of a layout, used or not, that a person has yet to decide, as `turnout layout new` marks it."""
     from turnout.stages.layout_draft import decisions
 
-    for name in sorted(layouts):
-        path = configuration.folder / "layouts" / f"{name}.yaml"
-        for decision in decisions(path.read_text(encoding="utf-8")):
+    for path in sorted(path for path in folder.glob("*.yaml") if path.is_file()):
+        for decision in decisions(path.read_text(encoding="utf-8", errors="replace")):
             yield f"{path}, {decision}: still marked with DECIDE. Write the value, and remove the mark"
 
 

@@ -199,7 +199,8 @@ def _impact_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Rec
     impacts = rows["impacts"]
     used = sum(impact["status"] == "accepted" for impact in impacts)
     lines = [_line("impacts", f"{used} of {len(impacts)} accepted, {settings.minimum_impacts} are needed")]
-    width = max(map(len, names.values()))
+    width = max(map(len, (*names.values(), "file")))
+    lines.append(_line("", f"{'file':<{width}} no.  {'peak':>9}  {'contact':>8}  verdict"))
     for impact in impacts:
         force, contact = (_number(impact[c], d) for c, d in (("peak_n", 1e3), ("contact_ms", 1.0)))
         name = f"{names[impact['recording_id']]:<{width}} {impact['record'] + 1:>3}"
@@ -281,11 +282,17 @@ def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mappin
 
 def _reason_lines(model: Mapping[str, Any]) -> list[str]:
     """Why the model was rejected or has one resonance only, or else its detail; a line for each statement."""
-    statements = (model["detail"] or "").split("; ")
+    statements = sorted((model["detail"] or "").split("; "), key=_frequency)
     if model["reason"]:
         return [_line("why", REASONS[model["reason"]]), *(_line("", statement) for statement in statements)]
     lines = [_line("" if k else "detail", statement) for k, statement in enumerate(statements)]
     return lines if model["detail"] else []
+
+
+def _frequency(statement: str) -> float:
+    """Frequency with which a statement begins; 0 without one, so that sorting leaves the order of such statements."""
+    number, _, rest = statement.partition(" ")
+    return float(number) if rest.startswith("Hz ") and number.isdecimal() else 0.0
 
 
 def _temperature(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:

@@ -200,6 +200,7 @@ def _snakemake(options: Sequence[str], limit: float | None, quiet: bool = False)
         [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options],
         start_new_session=True,
         env=snakemake_environment(),
+        stdout=subprocess.DEVNULL if quiet else None,  # what the jobs print is progress, too
         stderr=subprocess.DEVNULL if quiet else None,
     )
     try:

@@ -195,12 +195,21 @@ def test_counts_of_one_have_no_plural(project, capsys):
     assert "config: 1 turnout with 1 layout, 0 events, 0 acknowledgements, no fault." in capsys.readouterr().out
 
 
-def test_a_draft_that_is_not_finished_is_listed(project, capsys):
-    layout = project / "config/layouts/tommerup.yaml"
-    layout.write_text(layout.read_text().replace("position: 24.6}  ", "position: 24.6}  # DECIDE: position [m]"))
+@pytest.mark.parametrize("name", ["tommerup", "unused"])
+def test_a_draft_that_is_not_finished_is_listed(project, capsys, name):
+    """Before a turnout uses it, too."""
+    layout = project / f"config/layouts/{name}.yaml"
+    text = (project / "config/layouts/tommerup.yaml").read_text()
+    layout.write_text(text.replace("position: 24.6}  ", "position: 24.6}  # DECIDE: position [m]"))
     assert main(["check"]) in (0, 1)
     line = 1 + layout.read_text().splitlines().index(next(x for x in layout.read_text().splitlines() if "DECIDE" in x))
-    assert f"config/layouts/tommerup.yaml, line {line}: position [m]" in capsys.readouterr().out
+    assert f"config/layouts/{name}.yaml, line {line}: position [m]" in capsys.readouterr().out
+
+
+def test_a_project_without_a_turnout_says_how_to_add_one(tmp_path, monkeypatch, capsys):
+    create_project(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert main(["check"]) == 0 and "no turnout yet: `turnout add ID LAYOUT` adds one" in capsys.readouterr().out
 
 
 def test_the_first_command_of_a_project_can_be_pasted_into_a_shell(tmp_path, capsys):

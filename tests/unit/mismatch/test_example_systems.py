@@ -1,5 +1,9 @@
 """The example systems of other fields: a mount under a known force, and a pendulum that is left to decay."""
 
+import re
+import runpy
+from importlib import import_module
+
 import numpy as np
 import pytest
 from examples.own_system import LAWS, Mount, Pendulum, made_records, simulate
@@ -51,3 +55,16 @@ def test_a_free_decay_is_that_of_the_closed_form():
     exact = 0.7 * np.exp(-decay * t) * (np.cos(damped * t) + decay / damped * np.sin(damped * t))
     assert np.max(np.abs(y - exact)) < 2e-4
     assert set(LAWS) >= {"quadratic_drag", "dry_friction"}
+
+
+def test_both_programs_print_what_their_page_shows(repository, capsys):
+    """docs/own_simulator.md"""
+    page = (repository / "docs" / "own_simulator.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```console\n\$ python (\S+(?: \S+)?)\n(.*?)^```", page, re.M | re.S)
+    assert [command for command, _ in blocks] == ["-m examples.own_system", "docs/examples/bring_your_own.py"]
+    for command, shown in blocks:
+        if command.startswith("-m "):
+            import_module(command.removeprefix("-m ")).main()
+        else:
+            runpy.run_path(str(repository / command), run_name="__main__")
+        assert capsys.readouterr().out == shown

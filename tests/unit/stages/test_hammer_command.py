@@ -15,6 +15,7 @@ from turnout.demo import scenario
 from turnout.demo.hammer import RATE, hammer_test
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
+from turnout.report.hammer_text import _reason_lines
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.scan import scan
 
@@ -353,3 +354,10 @@ def test_files_that_are_called_alike_are_told_apart(tmp_path, capsys):
     code, text, _ = say(capsys, tmp_path, *files)
     assert code == 0 and "20 of 20 accepted" in text
     assert all(len(re.findall(rf"{stick}/2024-05-13/A7_1\.h5 +\d+ ", text)) == 10 for stick in ("left", "right"))
+
+
+def test_modes_that_are_not_used_are_listed_by_frequency_and_other_statements_first():
+    detail = "579 Hz not used: weak; 1061 Hz not used: weak; the fit drifts; 82 Hz not used: weak"
+    lines = _reason_lines({"reason": None, "detail": detail})
+    starts = [line.removeprefix("  detail").split()[0] for line in lines]
+    assert starts == ["the", "82", "579", "1061"]

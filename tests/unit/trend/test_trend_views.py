@@ -492,4 +492,6 @@ def test_a_baseline_counts_campaigns_with_a_rail_temperature_and_says_so(frames,
     status = frames["chart_status"].assign(state="learning", reason="baseline", n_baseline=n)
     with connect_views(frames | {"chart_status": status}, frames["modes"]["measured_at_utc"].max()) as con:
         (why, *_) = con.execute("select distinct why from cannot_see()").fetchall()
-    assert why[0].startswith(words) and why[0].endswith("so far; a baseline needs a whole year and at least twelve")
+    assert why[0].startswith(words) and why[0].endswith(
+        "so far; a baseline needs a whole year and at least twelve campaigns"
+    )

@@ -89,6 +89,16 @@ def test_a_fleet_of_which_nothing_could_be_used_is_not_called_sound(folder):
     assert "nothing could be used yet of t1, t2, t3 and 2 more" in said
 
 
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_quiet_night_shows_only_its_last_line(folder, quiet, capfd):
+    """Neither messages of Snakemake nor what its jobs print."""
+    more = "import sys; print('trend: 12 rows'); print('rule trend', file=sys.stderr)"
+    (folder / "snakemake.py").write_text(STATE.format(known={}, plan=plan("t1/hammer/A/2026-01-05"), more=more))
+    nightly([], "profiles/default", quiet=quiet)
+    out, error = capfd.readouterr()
+    assert ("trend: 12 rows" not in out and "rule trend" not in error) == quiet
+
+
 ERROR = """Error in rule {rule}:
     message: None
     jobid: {job}

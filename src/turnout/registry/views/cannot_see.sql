@@ -22,7 +22,7 @@ select
         when reason = 'too_few_sections' then
             'too few sections are measured, or are without an alarm, in the same campaigns for their median'
         when reason = 'baseline' then n_baseline || case when n_baseline = 1 then ' campaign' else ' campaigns' end
-            || ' with a rail temperature so far; a baseline needs a whole year and at least twelve'
+            || ' with a rail temperature so far; a baseline needs a whole year and at least twelve campaigns'
         when reason = 'after_event' then n_learned || ' of ' || n_needed || ' campaigns since the event'
         when band = 'amplitude' and coalesce(detectable_pct < 50, false) then
             printf('a change below %.1f %% of acceleration may go unseen for a year; target: %.1f %%',
