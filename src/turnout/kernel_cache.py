@@ -75,7 +75,7 @@ def inner_kernel(function: Function) -> Function:
     Function
         A numba dispatcher, inlined into compiled callers.
     """
-    return _compile(function, forceinline=True, _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _compile(function, forceinline=True, _nrt=False, no_cpython_wrapper=True)
 
 
 def borrowing_kernel(function: Function) -> Function:
@@ -98,14 +98,15 @@ def borrowing_kernel(function: Function) -> Function:
 
 
 def _compile(function: Function, **options: Any) -> Function:
+    options |= {"fastmath": FASTMATH_FLAGS, "no_cfunc_wrapper": True}  # no kernel is called by code in C
     folder = cache_folder()
     if folder is not None:
         try:
             with _numba_cache(folder):
-                return _without_write_faults(njit(cache=True, fastmath=FASTMATH_FLAGS, **options)(function))
+                return _without_write_faults(njit(cache=True, **options)(function))
         except RuntimeError:  # "no locator available": the folder was removed after it was tested
             pass
-    return njit(fastmath=FASTMATH_FLAGS, **options)(function)
+    return njit(**options)(function)
 
 
 def _without_write_faults(dispatcher: Any) -> Any:

@@ -24,20 +24,25 @@ TIME_STEP = 1.0 / 60000.0
 Function = TypeVar("Function", bound=Callable)
 
 
-def compile_function(fastmath: bool = False) -> Callable[[Function], Function]:
-    """Decorator: compile a function with numba, and store its machine code beside the source.
+def compile_part(fastmath: bool = False, for_python: bool = False) -> Callable[[Function], Function]:
+    """Decorator: compile a part of ``march`` with numba, and store its machine code beside the source.
+
+    It counts no references to its arrays, all of which ``march`` holds: each would cost two atomic operations.
 
     Parameters
     ----------
     fastmath : bool
         Whether sums may be reordered.
+    for_python : bool
+        Whether Python calls it, too. The entry takes longer to compile than the function.
 
     Returns
     -------
     callable
         The decorator.
     """
-    return cast("Callable[[Function], Function]", numba.njit(cache=True, fastmath=fastmath))
+    options: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": not for_python, "no_cfunc_wrapper": True}
+    return cast("Callable[[Function], Function]", numba.njit(cache=True, fastmath=fastmath, **options))
 
 
 def _value_at(value: Any, i: int) -> Any:
@@ -57,7 +62,7 @@ def _compile_value_at(value: Any, i: int) -> Callable:
     return at_node if isinstance(value, numba.types.Array) else at_every_node
 
 
-@compile_function(fastmath=True)
+@compile_part(fastmath=True)
 def _rail_step(
     beam: Beam,
     dt: float,
@@ -85,18 +90,18 @@ def _rail_step(
         w[i] += dt * v[i]
 
 
-@compile_function()
+@compile_part()
 def _interpolate(x: np.ndarray, first: int, weights: np.ndarray) -> float:
     return x[first] * weights[0] + x[first + 1] * weights[1] + x[first + 2] * weights[2] + x[first + 3] * weights[3]
 
 
-@compile_function()
+@compile_part()
 def _add_force(f: np.ndarray, first: int, weights: np.ndarray, force: float) -> None:
     for k in range(4):
         f[first + k] += weights[k] * force
 
 
-@compile_function()
+@compile_part(for_python=True)
 def _ballast_force(s: Supports, j: int, y: float, rate: float, t: float) -> float:
     k = s.ballast[j] * (1.0 + s.drift[j] * t)
     if s.gap[j] < 0.0:
@@ -111,7 +116,7 @@ def _ballast_force(s: Supports, j: int, y: float, rate: float, t: float) -> floa
     )
 
 
-@compile_function()
+@compile_part()
 def _support_step(
     s: Supports,
     dt: float,
@@ -148,7 +153,7 @@ def _support_step(
         y[j] += dt * rate[j]
 
 
-@compile_function()
+@compile_part()
 def _attached_mass_step(
     r: AttachedMasses, dt: float, w: np.ndarray, v: np.ndarray, f: np.ndarray, y: np.ndarray, rate: np.ndarray
 ) -> None:
@@ -164,7 +169,7 @@ def _attached_mass_step(
         y[j] += dt * rate[j]
 
 
-@compile_function()
+@compile_part()
 def _path_height(wheels: Wheels, path: np.ndarray, i: int, x: float) -> float:
     coordinate = (x - wheels.path_start) / wheels.path_step
     k = int(np.floor(coordinate))
@@ -175,7 +180,7 @@ def _path_height(wheels: Wheels, path: np.ndarray, i: int, x: float) -> float:
     return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)))
 
 
-@compile_function()
+@compile_part(for_python=True)
 def hertz_force(stiffness: float, local: float, approach: float, guess: float) -> float:
     """Contact force F = k max(0, approach - local F)^1.5 by Newton's method.
 
@@ -211,7 +216,7 @@ def hertz_force(stiffness: float, local: float, approach: float, guess: float) -
     return force
 
 
-@compile_function()
+@compile_part()
 def _contact_share(motion: WheelMotion, x: float) -> float:
     if x <= motion.engage_start or x >= motion.release_end:
         return 0.0
@@ -223,7 +228,7 @@ def _contact_share(motion: WheelMotion, x: float) -> float:
     return s * s * (3.0 - 2.0 * s)
 
 
-@compile_function()
+@compile_part()
 def _wheel_forces(
     wheels: Wheels,
     motion: WheelMotion,
@@ -256,7 +261,7 @@ def _wheel_forces(
         _add_force(f, k - 1, stencil, share * contact[i])
 
 
-@compile_function(fastmath=True)
+@compile_part(fastmath=True)
 def _blade_step(
     blade: Blade,
     h: float,
@@ -287,7 +292,7 @@ def _blade_step(
         w[i] += dt * v[i]
 
 
-@compile_function()
+@compile_part()
 def _chair_forces(
     blade: Blade,
     s: Supports,
@@ -311,7 +316,7 @@ def _chair_forces(
         rate[j] += dt * force / s.mass[j]
 
 
-@compile_function()
+@compile_part()
 def _wheel_forces_of_two_rails(
     wheels: Wheels,
     motion: WheelMotion,
@@ -363,7 +368,7 @@ def _wheel_forces_of_two_rails(
             _add_force(f if line == 0 else f2, node, stencil, share * force)
 
 
-@compile_function()
+@compile_part()
 def _car_step(
     cars: Cars,
     wheels: Wheels,
@@ -404,7 +409,7 @@ def _car_step(
         b[i] += dt * bv[i]
 
 
-@compile_function()
+@numba.njit(cache=True)
 def march(
     n_step: int,
     dt: float,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.kernel_cache import borrowing_kernel, inner_kernel, kernel
+from turnout.kernel_cache import borrowing_kernel, inner_kernel
 from turnout.simulate.band_matrix import momentum_minus_force, multiply
 from turnout.simulate.band_solution import solve, solve6_from_both_ends, solve_from_both_ends
 from turnout.simulate.port_system import evaluate, flexibility, locate_ports, newton_update
@@ -334,7 +334,7 @@ def _march_steps(
     out_force: np.ndarray,
     work: Workspace,
 ) -> tuple[int, int, int, float, int]:
-    """``march`` in a given workspace."""
+    """``march`` in a given workspace. Were ``march`` compiled, too, all of this would be compiled once more in it."""
     stages, n_port = scheme.node.size, ports.body.size
     n = n_port * stages
     d, e, e_stand_in, x, order = work.d, work.e, work.e_stand_in, work.x, work.order
@@ -394,7 +394,6 @@ def _march_steps(
     return CONVERGED, n_step, -1, 0.0, iterations
 
 
-@kernel
 def march(
     track: TrackArrays,
     scheme: SchemeArrays,

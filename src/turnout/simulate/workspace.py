@@ -1,10 +1,8 @@
-"""Arrays that the time march overwrites in each step, created once for a march; compiled."""
+"""Arrays that the time march overwrites in each step, created once for a march."""
 
 from typing import NamedTuple
 
 import numpy as np
-
-from turnout.kernel_cache import kernel
 
 
 class Workspace(NamedTuple):
@@ -44,7 +42,6 @@ class Workspace(NamedTuple):
     right: np.ndarray
 
 
-@kernel
 def new_workspace(n_padded: int, n: int, n_body_row: int, n_wheel: int, n_port: int, tau: np.ndarray) -> Workspace:
     """Workspace of zeros, the ports in their own order.
 
