@@ -2,7 +2,7 @@
 
 The file has 10 records, 2 channels, 1 s at 51,200 Hz in double precision: 16.4 MB of samples. Text formats get a
 tenth of it. ``read`` also hashes the file, converts units, and checks every sample and every count.
-Small records are 30 of 4,096 samples; their bars are the ratios from before statements of rates and scales were checked.
+Small records are 30 of 4,096 samples; their bars are the ratios before statements of rates and scales were checked.
 """
 
 import tempfile
