@@ -96,7 +96,7 @@ def scores_and_times() -> Iterator[Bar]:
         p_values += list(direction_test(p.samples, p.times, basis, p.noise).p_value)
     share = float(np.mean(np.array(p_values) < 0.01))
     limit = float(stats.binom.ppf(0.999, 480, 0.01) / 480)
-    yield Bar("chi-squared test along b rejects sound wheels at level 0.01", share, limit, "", "<=", "n=480")
+    yield Bar("chi-squared test along b rejects intact wheels at level 0.01", share, limit, "", "<=", "n=480")
 
 
 def _attainable_scores(passage):

@@ -19,6 +19,7 @@ import sys
 from contextlib import contextmanager
 from decimal import Decimal
 from difflib import get_close_matches
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
@@ -91,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
             elif args.csv:
                 _write_csv(result, args.csv)
             else:
-                table = format_table(result, args.rows)
+                table = format_table(result, args.rows, get_terminal_size().columns if sys.stdout.isatty() else None)
                 print(table)
                 if not args.quiet and table.endswith("(0 rows)"):
                     for remark in misspelt_names(connection, sql):
@@ -174,8 +175,10 @@ def open_output(path: str) -> Iterator[TextIO]:
         ) from None
 
 
-def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60) -> str:
+def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60, width: int | None = None) -> str:
     """Text table of a result: numbers right aligned, NULL empty, and the number of rows.
+
+    A terminal would break the lines of a wider table: then each row is a block with a line for each value.
 
     Parameters
     ----------
@@ -183,6 +186,8 @@ def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60) -> str:
         Rows of a query.
     limit : int
         Most rows that are shown.
+    width : int, optional
+        Characters in a line of the terminal; None: any number.
 
     Returns
     -------
@@ -202,7 +207,14 @@ def format_table(result: duckdb.DuckDBPyRelation, limit: int = 60) -> str:
 
     total = result.count("*").fetchall()[0][0] if is_longer else len(rows)
     count = f"({len(rows)} of {total} rows)" if is_longer else f"({total} row{'s' if total != 1 else ''})"
-    return "\n".join([line(result.columns), line(["-" * w for w in widths]), *map(line, text), count])
+    head = [line(result.columns), line(["-" * w for w in widths])]
+    if rows and width is not None and len(head[1]) > width:
+        longest = max(map(len, result.columns))
+        blocks = [
+            "\n".join(f"{name:<{longest}}  {cell}" for name, cell in zip(result.columns, row) if cell) for row in text
+        ]
+        return "\n\n".join([*blocks, count])
+    return "\n".join([*head, *map(line, text), count])
 
 
 def _cell(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import re
 
+import duckdb
 import pytest
 
 from turnout.cli.query import format_table
@@ -21,3 +22,11 @@ def test_an_example_prints_what_the_page_says(fleet, repository, number):
 def test_all_examples_are_checked(repository):
     page = (repository / "docs" / "registry.md").read_text(encoding="utf-8")
     assert len(EXAMPLE.findall(page)) == page.count("```sql") == 8
+
+
+@pytest.mark.parametrize(("width", "is_table"), [(None, True), (13, True), (12, False)])
+def test_a_row_that_is_wider_than_the_terminal_has_a_line_for_each_value(width, is_table):
+    result = duckdb.sql("select * from (values (1, 'ballast', null), (2, 'railpad', 'x')) t(n, band, c) order by n")
+    table = "n  band     c\n-  -------  -\n1  ballast\n2  railpad  x\n(2 rows)"
+    blocks = "n     1\nband  ballast\n\nn     2\nband  railpad\nc     x\n\n(2 rows)"
+    assert format_table(result, width=width) == (table if is_table else blocks)
