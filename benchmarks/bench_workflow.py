@@ -136,9 +136,9 @@ def damage_and_kills(folder):
     in_quarantine = quarantine_rows(fleet)
     n = f"{len(files)} files, {len(broken)} damaged in {len(damage_types)} ways"
     yield Bar("damaged files without their reason in quarantine", len(expected - in_quarantine), 0, "files", "<=", n)
-    yield Bar("sound files in quarantine", len(in_quarantine - expected), 0, "files", "<=", n)
+    yield Bar("undamaged files in quarantine", len(in_quarantine - expected), 0, "files", "<=", n)
     lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not damage_types[k][2] for k in broken.values())
-    yield Bar("sound recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
+    yield Bar("undamaged recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
 
     toy.forget(fleet)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 10}\n")

@@ -217,6 +217,9 @@ def _event_lines(contents: FileContents) -> list[str]:
 
 
 def _event_times(contents: FileContents, unit: str) -> str:
+    moments = {f"{e.time:.4g} {unit}" for e in contents.events}
+    if len(moments) == 1 and len({e.record for e in contents.events}) == len(contents.events) > 1:
+        return f"one in each of {len(contents.events)} records, at {moments.pop()}"
     times = [f"record {e.record} at {e.time:.4g} {unit}" for e in contents.events[:MAX_EVENTS]]
     return ", ".join(times) + (" ..." if len(contents.events) > MAX_EVENTS else "")
 

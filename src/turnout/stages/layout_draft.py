@@ -15,7 +15,7 @@ from turnout.units import SI, conversion
 
 DECIDE = "# DECIDE:"  # marks what the files do not state
 TEST_NAME = re.compile(rf"({LABEL})_([A-Za-z0-9]+)")
-PANELS = ("OT", "SP", "CLP", "CP", "AS")
+PANELS = {"OT": "open track", "SP": "switch", "CLP": "closure", "CP": "crossing", "AS": "after the crossing"}
 QUANTITY_OF_ROLE = {"force": "force", "response": "acceleration"}
 MOUNTING = {"hammer": ("hammer", "rail head at sleeper"), "passages": ("rail web", "rail web")}
 
@@ -97,10 +97,11 @@ def _labels(hammer: Sequence[FileContents]) -> list[str]:
 
 
 def _section_lines(labels: Sequence[str]) -> Iterator[str]:
+    panels = ", ".join(f"{name} {meaning}" for name, meaning in PANELS.items())
     for k, label in enumerate(labels):
         panel = next((p for p in PANELS if label.startswith(p)), "CP" if re.match(r"A\d", label) else "OT")
         yield (
-            f"  {label}: {{panel: {panel}, track: main, position: {float(k)}}}  {DECIDE} panel ({', '.join(PANELS)}), "
+            f"  {label}: {{panel: {panel}, track: main, position: {float(k)}}}  {DECIDE} panel ({panels}), "
             "track, position [m] from the switch toe"
         )
 

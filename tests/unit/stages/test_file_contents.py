@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from turnout.cli.main import main
 from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
+from turnout.report.contents_text import _event_times
 from turnout.stages.file_contents import file_contents
 
 RATE = 10_000.0
@@ -173,3 +175,17 @@ def test_what_reading_with_a_layout_rejects_or_remarks_is_a_problem(head, end, w
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     problems = file_contents(tmp_path / "a.csv").problems
     assert any(words in problem for problem in problems) if words else problems == ()
+
+
+@pytest.mark.parametrize(
+    ("events", "words"),
+    [
+        ([(1, 0.005), (2, 0.005)], "one in each of 2 records, at 0.005 s"),
+        ([(1, 0.005), (2, 0.006)], "record 1 at 0.005 s, record 2 at 0.006 s"),
+        ([(1, 0.005), (1, 0.005)], "record 1 at 0.005 s, record 1 at 0.005 s"),
+        ([(1, 0.005)], "record 1 at 0.005 s"),
+    ],
+)
+def test_impacts_at_the_same_time_of_each_record_are_stated_once(events, words):
+    contents = SimpleNamespace(events=[SimpleNamespace(record=record, time=time) for record, time in events])
+    assert _event_times(contents, "s") == words
