@@ -122,3 +122,12 @@ def test_turnouts_of_one_station_do_not_lie_on_each_other():
     dots = [(float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawing["svg"])]
     assert len(dots) == 10
     assert min(math.dist(a, b) for k, a in enumerate(dots) for b in dots[:k]) >= 14.0  # two radii
+
+
+def test_a_fleet_of_which_everything_was_used_says_so_in_place_of_an_empty_table():
+    said = "Nothing: no impact was rejected, and nothing is in quarantine."
+    source = Source([turnout("a")])
+    assert said in page([turnout("a")])
+    source.rows["reasons"] = [{"reason": "overload", "impacts": 2, "rows": 0}]
+    text = fleet_page(source, page_environment().get_template("fleet.html"), shared_by_pages(1))
+    assert said not in text and "<td>overload</td>" in text
