@@ -1,6 +1,7 @@
 """Run the benchmarks named on the command line, or all of them, and print figure beside bar."""
 
 import argparse
+import ast
 import os
 import platform
 import sys
@@ -15,9 +16,22 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 def main() -> int:
     """Each module ``bench_<part>`` has ``bars()``, a generator of ``Bar``."""
-    available = sorted(p.stem.removeprefix("bench_") for p in Path(__file__).parent.glob("bench_*.py"))
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("part", nargs="*", metavar="part", help="any of: " + ", ".join(available))
+    texts = {
+        path.stem.removeprefix("bench_"): (
+            ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        ).replace("``", "")
+        for path in sorted(Path(__file__).parent.glob("bench_*.py"))
+    }
+    available = list(texts)
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description=__doc__,
+        epilog="parts:\n"
+        + "\n".join(f"  {name:<15} {text.splitlines()[0]}" for name, text in texts.items())
+        + "\n\nEach part prints first what it measures, and the variables that make it shorter. All parts take hours.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("part", nargs="*", metavar="part", help="parts to run (all of them)")
     parser.add_argument("--strict", action="store_true", help="exit code 1 where a bar is missed; 0 without it")
     parser.add_argument("--seeds", metavar="N", help="faults: number of seeds (20)")
     parser.add_argument("--first", metavar="SEED", help="faults and mutations: first seed (0)")
@@ -38,7 +52,7 @@ def main() -> int:
     missed = 0
     for name in names:
         module = import_module(f"benchmarks.bench_{name}")
-        print(f"\n{name}\n{'-' * len(name)}\n{module.__doc__.strip()}\n\n{heading()}", flush=True)
+        print(f"\n{name}\n{'-' * len(name)}\n{texts[name]}\n\n{heading()}", flush=True)
         for bar in module.bars():
             print(bar, flush=True)
             missed += bar.is_met is False
