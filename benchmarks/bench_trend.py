@@ -345,7 +345,7 @@ def demonstration():
 
     registry = Path("results/registry")
     if not (registry / "registry.duckdb").exists():
-        yield Bar("demonstration", float("nan"), 0.0, "", "<=", "", "not measured: run 'turnout demo' first")
+        yield Bar("demonstration", float("nan"), None, note="not measured: run 'turnout demo' first")
         return
     changes = [(s.turnout, c) for s in scenarios for c in s.changes]
     drifts = {(t, f"{t}/{c.section}", c.component): c.since for t, c in changes if c.per_year and not c.event}
@@ -360,7 +360,7 @@ def demonstration():
             rank = worklist_rows[0][0] if worklist_rows else 999
             above = sum(r[0] < rank and r[1:4] not in drifts for r in rows)
             yield Bar(
-                f"demonstration: sound charts above the drift of {section} {band}", above, 0, "", "<=", f"rank {rank}"
+                f"demonstration: intact charts above the drift of {section} {band}", above, 0, "", "<=", f"rank {rank}"
             )
             alarm = con.execute(
                 "select count(distinct c.measured_at_utc), min(a.raised_at_utc) from alarms a join charts c using "

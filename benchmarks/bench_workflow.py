@@ -45,7 +45,7 @@ def network(folder):
     n = f"{N_TURNOUT} turnouts, {n_file} files, {SHARDS} shards"
     processed = count(output, "processed")
     yield Bar("first run of all: units processed", processed, N_TURNOUT * N_SECTION, "units", ">=", n)
-    note = "starts, imports, scan, hashing all files, register; the chain does nothing"
+    note = "starts, imports, scan, hashing all files, register; the stage itself only reads"
     yield Bar(
         "first run of all: orchestration", watch.cpu, 420.0, "CPU s", "<=", f"{count_jobs(output)} hammer jobs", note
     )

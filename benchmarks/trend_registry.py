@@ -44,7 +44,9 @@ def registry_of_modes(root, turnouts, weeks, holdback=1):
             )
             con.unregister("came")
     last = con.execute("select max(measured_at_utc) from mm").fetchall()[0][0] - pd.Timedelta(weeks=holdback)
-    select = f"select md5(section_id || band || measured_at_utc::varchar) as model_id, *, {EXTRA} from mm where "
+    rows = f"select md5(section_id || band || measured_at_utc::varchar) as model_id, *, {EXTRA} from mm"
+    given = [name for name, *_ in con.execute(f"describe {rows}").fetchall()]
+    select = f"select *, {_absent_columns(given)} from ({rows}) where "
     years = con.execute("select distinct year(measured_at_utc) from mm order by 1").fetchall()
     _publish(
         con,
@@ -66,8 +68,7 @@ def small_registry(root, rows, number=1):
     rows = rows if "damping_ratio" in rows else rows.assign(damping_ratio=0.05)
     with duckdb.connect() as con:
         con.register("came", rows.astype({"turnout_id": str, "section_id": str, "band": str, "source": str}))
-        empty = [f"null::{c.type} as {c.name}" for c in tables()["modes"] if c.name not in rows.columns]
-        con.execute(f"create view all_rows as select {', '.join(['*', *empty])} from came")
+        con.execute(f"create view all_rows as select *, {_absent_columns(rows.columns)} from came")
         years = sorted(rows["measured_at_utc"].dt.year.unique())
         select = "select * from all_rows where year(measured_at_utc) = {}"
         files = [write_sorted(con, root, "modes", int(y), select.format(y), f"batch-{number}") for y in years]
@@ -75,6 +76,11 @@ def small_registry(root, rows, number=1):
     generation = Generation(number=number, files=sorted([*other_files, *files], key=lambda f: f.path))
     commit(root, generation)
     build_database(root, generation)
+
+
+def _absent_columns(given):
+    """Columns of the table ``modes`` that the rows lack, as NULL."""
+    return ", ".join(f"null::{c.type} as {c.name}" for c in tables()["modes"] if c.name not in given)
 
 
 def _publish(con, root, selects, prefix):

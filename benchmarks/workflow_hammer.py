@@ -30,9 +30,9 @@ def hammer_same_rows(folder, toy):
     rows = toy.rows(folder)
     n = f"{n_file} files, {len(rows['impacts'])} impacts, {len(rows['modes'])} modes; shards x cores, CPU: "
     off = abs(len(rows["models"]) - (n_file - 1))
-    yield Bar("hammer chain: models too many or too few", off, 0, "", "<=", f"{n_file} files, one of them cut off")
+    yield Bar("hammer stage: models too many or too few", off, 0, "", "<=", f"{n_file} files, one of them cut off")
     yield Bar(
-        "hammer chain: different registries", len(set(registries.values())), 1, "", "<=", n + ", ".join(cpu_texts)
+        "hammer stage: different registries", len(set(registries.values())), 1, "", "<=", n + ", ".join(cpu_texts)
     )
 
 
