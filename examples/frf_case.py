@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from turnout.mismatch import Candidate, Case, Nuisance, Observation
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.physics import Parameter
 
 SOURCE = "Ewins 2000, Modal Testing, chapters 2 and 4"
@@ -235,6 +236,53 @@ class FrfCase(Case):
 
     def predict(self, values, terms, observations):
         """Accelerance of each impact, real parts followed by imaginary parts."""
+        frequencies, damping, shapes, loss = self._modes(values, terms)
+        predictions = []
+        for o in observations:
+            place, stretch, gain = self._impact(values, terms, o)
+            lines = self._resonance_lines(frequencies * stretch, damping, loss)
+            rows = (shapes[:, : self.n_sensor] * shapes[:, place, None]).T @ lines
+            predictions.append(split_complex(gain * self._through_sensors(rows, terms)))
+        return predictions
+
+    def nuisance_jacobian(self, values, terms, observations, base):
+        """The difference quotients of ``Case``, but only what depends on a nuisance is computed for it."""
+        frequencies, damping, shapes, loss = self._modes(values, terms)
+        heard, numbers = shapes[:, : self.n_sensor], {n.name: k for k, n in enumerate(self.nuisances)}
+        steps = {n.name: THRESHOLDS.nuisance_step * n.sd for n in self.nuisances}
+        modes = [(r, str(r)) for r in range(self.n_mode)]
+        modes += [(self.n_mode + r, f"rigid{r}") for r in range(self.rigid)]
+        jacobians = []
+        for o in observations:
+            place, stretch, gain = self._impact(values, terms, o)
+            all_lines = self._lines(frequencies * stretch, damping, loss)
+            through = gain * self._through_sensors(np.ones((self.n_sensor, self.frequency.size), complex), terms)
+            jacobian = np.zeros((o.data.size, len(self.nuisances)), order="F")
+
+            def put(name, rows, jacobian=jacobian, through=through):
+                jacobian[:, numbers[name]] += split_complex(through * rows) / steps[name]
+
+            for k, label in modes:
+                f, zeta, lines, both = frequencies[k], damping[k], all_lines[k], heard[k, :, None] * shapes[k, place]
+                name = "log_frequency_0" if self.beam and k < self.n_mode else f"log_frequency_{label}"
+                put(name, both * (self._lines(f * stretch * np.exp(steps[name]), zeta, loss) - lines))
+                if k < self.n_mode:  # that of the rigid body is given
+                    name = f"log_damping_{label}"
+                    put(name, both * (self._lines(f * stretch, zeta * np.exp(steps[name]), loss) - lines))
+                for s in range(self.n_place):
+                    moved = shapes[k].copy()
+                    moved[s] += steps[f"shape_{label}_{s}"]
+                    change = moved[: self.n_sensor] * moved[place] - heard[k] * shapes[k, place]
+                    put(f"shape_{label}_{s}", change[:, None] * lines)
+            product = (heard * shapes[:, place, None]).T
+            put(f"hammer@{o.name}", product @ all_lines * (steps[f"hammer@{o.name}"] / gain))
+            stretched = self._lines(frequencies * (stretch + steps[f"stretch@{o.name}"]), damping, loss)
+            put(f"stretch@{o.name}", product @ (stretched - all_lines))
+            jacobians.append(jacobian)
+        return jacobians
+
+    def _modes(self, values, terms):
+        """(frequencies [Hz], damping ratios, (n_mode, n_place) shapes, share of structural damping) of all modes."""
         modes = [
             (f, np.exp(values[f"log_damping_{r}"]), [values[f"shape_{r}_{s}"] for s in range(self.n_place)])
             for r, f in enumerate(self.frequencies(values, terms))
@@ -248,16 +296,14 @@ class FrfCase(Case):
                 modes.append((np.exp(v["log_frequency"]), np.exp(v["log_damping"]), shape))
         loss = sum(t.values["share"] for t in terms if t.effect_type == "structural_damping")
         frequencies, damping = (np.array([mode[i] for mode in modes])[:, None] for i in (0, 1))
-        shapes = np.array([shape for _, _, shape in modes])
-        predictions = []
-        for o in observations:
-            place, stretch = self.impact_places[int(o.name.split()[1]) - 1], 1.0 + values[f"stretch@{o.name}"]
-            lines = self._resonance_lines(frequencies * stretch, damping, loss)
-            rows = (shapes[:, : self.n_sensor] * shapes[:, place, None]).T @ lines
-            gain = 1.0 + values[f"hammer@{o.name}"]
-            gain += sum(t.values["gain"] for t in terms if t.effect_type == "impact_gain" and t.where == o.name)
-            predictions.append(split_complex(gain * self._through_sensors(rows, terms)))
-        return predictions
+        return frequencies, damping, np.array([shape for _, _, shape in modes]), loss
+
+    def _impact(self, values, terms, observation):
+        """(place, factor on all frequencies, gain) of an impact."""
+        name = observation.name
+        gain = 1.0 + values[f"hammer@{name}"]
+        gain += sum(t.values["gain"] for t in terms if t.effect_type == "impact_gain" and t.where == name)
+        return self.impact_places[int(name.split()[1]) - 1], 1.0 + values[f"stretch@{name}"], gain
 
     def _resonance_lines(self, frequencies, damping, loss):
         """(n_mode, n_line) accelerance of each mode with unit shape; ``loss`` is the share of structural damping."""
@@ -265,10 +311,13 @@ class FrfCase(Case):
         if key not in self._stored_lines:
             if len(self._stored_lines) >= N_STORED:
                 self._stored_lines.clear()
-            x = self.frequency / frequencies
-            square = x**2
-            self._stored_lines[key] = square / (square - 1.0 - 2j * damping * (1.0 - loss) * x - 2j * damping * loss)
+            self._stored_lines[key] = self._lines(frequencies, damping, loss)
         return self._stored_lines[key]
+
+    def _lines(self, frequencies, damping, loss):
+        x = self.frequency / frequencies
+        square = x**2
+        return square / (square - 1.0 - 2j * damping * (1.0 - loss) * x - 2j * damping * loss)
 
     def _through_sensors(self, rows, terms):
         rows, f = rows.copy(), self.frequency

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from examples import real_frfs
-from examples.frf_case import LAMBDA, FrfCase, free_shape
+from examples.frf_case import LAMBDA, Effect, FrfCase, free_shape
+
+from turnout.mismatch import Case
 
 
 def test_shapes_of_a_free_beam():
@@ -26,6 +28,34 @@ def test_a_resonance_is_read_off_a_made_response():
     predicted = case.predict(values, (), case.observations)
     for o, p in zip(case.observations, predicted):
         assert np.linalg.norm(p - o.data) < 0.05 * np.linalg.norm(o.data)
+
+
+MODE = {"log_frequency": np.log(150.0), "log_damping": np.log(0.02)} | {f"shape_{s}": 0.2 - 0.1 * s for s in range(3)}
+
+
+@pytest.mark.parametrize("beam", [False, True])
+@pytest.mark.parametrize(
+    "terms",
+    [
+        (),
+        (Effect("mode", "", MODE), Effect("structural_damping", "", {"share": 0.4})),
+        (Effect("impact_gain", "impact 2", {"gain": 0.3}), Effect("sensor_delay", "A1", {"delay": 1e-4})),
+    ],
+)
+def test_derivatives_are_those_of_any_case(beam, terms):
+    """Two sensors, three impacts, one of them away from the sensors, two modes and a rigid body."""
+    rng, f = np.random.default_rng(4), np.arange(50.0, 400.0, 0.5)
+    shapes, h = rng.normal(size=(2, 3)), 0.0
+    for shape, resonance in zip(shapes, (100.0, 270.0)):
+        x = f / resonance
+        h = h + np.outer(shape, shape[:2])[:, :, None] * (-(x**2) / (1.0 - x**2 + 2j * 0.03 * x))
+    case = FrfCase(f, h, (60.0, 390.0), (100.0, 270.0), rigid=1, beam=beam)
+    values = {n.name: n.mean + 0.3 * n.sd for n in case.nuisances}
+    base = case.predict(values, terms, case.observations)
+    found = case.nuisance_jacobian(values, terms, case.observations, base)
+    expected = Case.nuisance_jacobian(case, values, terms, case.observations, base)
+    for one, other in zip(found, expected):
+        assert np.all(np.abs(one - other) <= 1e-9 * np.abs(other).max(axis=0)) and np.any(other, axis=0).sum() > 10
 
 
 @pytest.mark.slow

@@ -184,10 +184,15 @@ def _iterate(
 def _updated_jacobian(
     joint: JointProblem, jacobian: list[np.ndarray], before: FitPoint, after: FitPoint
 ) -> list[np.ndarray]:
-    """The Jacobian after a step, updated; new for the cheap observations."""
-    step = after.theta - before.theta
-    jacobian = broyden_update(jacobian, step / joint.sd**2, step, before.residuals, after.residuals)
-    return joint.with_new_cheap_columns(after.theta, after.predictions, jacobian)
+    """The Jacobian after a step: updated for the expensive observations, new for the cheap ones."""
+    step, updated = after.theta - before.theta, list(jacobian)
+    chosen = [i for i, o in enumerate(joint.observations) if not joint.case.is_cheap(o)]
+    old, residuals_before, residuals_after = (
+        [values[i] for i in chosen] for values in (jacobian, before.residuals, after.residuals)
+    )
+    for i, new in zip(chosen, broyden_update(old, step / joint.sd**2, step, residuals_before, residuals_after)):
+        updated[i] = new
+    return joint.with_new_cheap_columns(after.theta, after.predictions, updated)
 
 
 def _refreshed_jacobian(joint: JointProblem, point: FitPoint, updated: list[np.ndarray]) -> list[np.ndarray]:
