@@ -49,14 +49,15 @@ def main() -> int:
     if unknown := set(names) - set(available):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(available)}")
     print(f"Python {platform.python_version()}, {os.cpu_count()} cores, one BLAS thread. CPU s = user + system.")
-    missed = 0
+    missed = unmeasured = 0
     for name in names:
         module = import_module(f"benchmarks.bench_{name}")
         print(f"\n{name}\n{'-' * len(name)}\n{texts[name]}\n\n{heading()}", flush=True)
         for bar in module.bars():
             print(bar, flush=True)
             missed += bar.is_met is False
-    print(f"\n{missed} bar(s) missed." if missed else "\nNo bar missed.")
+            unmeasured += bar.is_unmeasured
+    print(f"\n{missed or 'No'} bar{'s' * (missed > 1)} missed{f', {unmeasured} not measured' if unmeasured else ''}.")
     return 1 if args.strict and missed else 0
 
 

@@ -1,5 +1,6 @@
 """A measured figure with its bar, and a stopwatch."""
 
+import math
 import resource
 import time
 from contextlib import contextmanager
@@ -19,13 +20,19 @@ class Bar:
     note: str = ""
 
     @property
+    def is_unmeasured(self) -> bool:
+        """Whether there is a bar and no figure, which is NaN where nothing was measured."""
+        return self.limit is not None and bool(self.sense) and math.isnan(self.figure)
+
+    @property
     def is_met(self) -> bool | None:
-        if self.limit is None or not self.sense:
+        """Whether the bar is met; None without a bar or a figure."""
+        if self.limit is None or not self.sense or self.is_unmeasured:
             return None
         return bool(self.figure <= self.limit if self.sense == "<=" else self.figure >= self.limit)
 
     def __str__(self) -> str:
-        verdict = {True: "met", False: "MISSED", None: ""}[self.is_met]
+        verdict = {True: "met", False: "MISSED", None: "open" if self.is_unmeasured else ""}[self.is_met]
         bar = "" if self.limit is None else f"{self.sense} {self.limit:g}"
         return _line(self.name, f"{self.figure:.4g}", bar, self.unit, verdict, f"{self.n} {self.note}")
 

@@ -14,10 +14,12 @@ CODE = re.compile(
 )  # a number of a bar, as in a list that is elsewhere
 
 
-@pytest.mark.parametrize(("figure", "is_met"), [(0.9, True), (1.1, False), (float("nan"), False)])
+@pytest.mark.parametrize(("figure", "is_met"), [(0.9, True), (1.1, False), (float("nan"), None)])
 @pytest.mark.parametrize("type_", [float, np.float64, np.float32])
-def test_a_missed_bar_is_counted_whatever_the_type_of_its_figure(figure, is_met, type_):
-    assert Bar("figure", type_(figure), 1.0).is_met is is_met
+def test_a_bar_is_missed_or_open_whatever_the_type_of_its_figure(figure, is_met, type_):
+    bar = Bar("figure", type_(figure), 1.0)
+    assert bar.is_met is is_met and bar.is_unmeasured is (is_met is None)
+    assert {True: " met", False: " MISSED", None: " open"}[is_met] in str(bar)
 
 
 def test_figures_stand_below_the_names_of_their_columns():
