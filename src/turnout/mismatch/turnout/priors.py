@@ -244,6 +244,8 @@ class SimulationPriors:
     averaging_length: float = prior(
         2.4, "m", "of the rail about a wheel; 0.6 and 1.2 err near the wheel resonance, the whole rail above it",
         LOCAL_RAIL)
+    ringing_length: float = prior(
+        3.0, "m", "in which a wheel on the rail rings down to a tenth at its resonance", "numerical")
 
 
 @dataclass(frozen=True)

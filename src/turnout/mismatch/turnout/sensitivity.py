@@ -188,6 +188,8 @@ def _difference(
     paths = tuple(t.name for t in terms if t.effect_type == "path")
     key = (aligned.name, name, paths if in_switch else _kinds_of(terms))
     values_now = _in_units_of_reach(values, predictor.site.common_sds)
+    if name in _of_vehicle(aligned):  # the response to waves of the rail depends on it
+        values_now |= _in_units_of_reach(values, dict(zip(predictor.waves.names, predictor.waves.sd)))
     if not in_switch:
         values_now |= _own_values(values, terms, aligned)
     values_then, column = predictor.differences.get(key, ({}, predicted))
@@ -196,6 +198,10 @@ def _difference(
         predictor.differences[key] = values_now, column
         drop_oldest(predictor.differences, SIMULATION.difference_cache_size)
     return column
+
+
+def _of_vehicle(aligned: AlignedPassage) -> tuple[str, str]:
+    return f"wheels_{aligned.train}", f"load@{aligned.name}"
 
 
 def _kinds_of(terms: Terms) -> tuple:

@@ -107,8 +107,8 @@ class TrackUnderWheels:
         -------
         to_sensors : (m, n_sensor, n_node) array of complex
             Acceleration of the sensors. [m/s²/N]
-        about : (m, n_node) array of complex
-            Receptance of the rail about each node. [m/N]
+        under_wheel : (m, n_node) array of complex
+            Receptance of the rail at each node. [m/N]
         pair : (m, n_sensor, n_pair) array of complex or None
             Acceleration of the sensors by opposite forces on blade and stock rail at ``pair_nodes``. [m/s²/N]
         node : (n_node,) array of float
@@ -126,15 +126,15 @@ class TrackUnderWheels:
         square = -((2.0 * np.pi * frequency) ** 2)[:, None, None]
         if self.load_transfer is None:
             near = near[:: SIMULATION.node_stride]
-            h, mean_receptance = rail_receptances(matrices, frequency, near, self.positions)
-            return square * h, mean_receptance, None, matrices.node[near]
+            h, under_wheel = rail_receptances(matrices, frequency, near, self.positions)
+            return square * h, under_wheel, None, matrices.node[near]
         near = near[near[0] % SIMULATION.node_stride :]  # the node at the toe is not in line with the others
         near = near[:: SIMULATION.node_stride]
-        h, mean_receptance = self._receptances_under_wheels(frequency, near)
+        h, under_wheel = self._receptances_under_wheels(frequency, near)
         nodes = self.pair_nodes
         rows = np.concatenate([blade_rows(matrices)[nodes], matrices.node_index[nodes]])
         on_blade, on_stock = np.split(responses(matrices, frequency, self.positions, rows), 2, axis=2)
-        return square * h, mean_receptance, square * (on_blade - on_stock), matrices.node[near]
+        return square * h, under_wheel, square * (on_blade - on_stock), matrices.node[near]
 
     def _receptances_under_wheels(self, frequency: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As ``rail_receptances``, of the rail that wheels press: the stock rail, both or the blade."""
@@ -152,7 +152,7 @@ class TrackUnderWheels:
             + weight**2 * between[:, on_blade, on_blade]
         )
         under_wheels = (1.0 - weight) * to_sensors[:, :, on_stock] + weight * to_sensors[:, :, on_blade]
-        return under_wheels, point @ _averages(node)
+        return under_wheels, point
 
 
 def rail_receptances(
@@ -161,9 +161,7 @@ def rail_receptances(
     near: np.ndarray,
     positions: Sequence[float | tuple],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Receptances between positions and nodes, and of the rail about these nodes.
-
-    The latter are averaged over 2.4 m.
+    """Receptances between positions and nodes, and of the rail at these nodes.
 
     Parameters
     ----------
@@ -180,15 +178,25 @@ def rail_receptances(
     -------
     h : (m, n_place, n) array of complex
         [m/N]
-    mean_receptance : (m, n) array of complex
+    under_wheel : (m, n) array of complex
         [m/N]
     """
     node = matrices.node[near]
     h = responses(matrices, frequency, [*positions, *node.tolist()], matrices.node_index[near])
-    return h[:, : len(positions)], np.diagonal(h[:, len(positions) :], axis1=1, axis2=2) @ _averages(node)
+    return h[:, : len(positions)], np.diagonal(h[:, len(positions) :], axis1=1, axis2=2)
 
 
-def _averages(node: np.ndarray) -> np.ndarray:
-    """(n, n) matrix that averages values at nodes over ``SIMULATION.averaging_length`` about each."""
+def averages(node: np.ndarray) -> np.ndarray:
+    """(n, n) matrix that averages values at nodes over ``SIMULATION.averaging_length`` about each.
+
+    Parameters
+    ----------
+    node : (n,) array of float
+        Positions. [m]
+
+    Returns
+    -------
+    (n, n) array of float
+    """
     about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
     return about / about.sum(axis=0)

@@ -1,13 +1,17 @@
 r"""First-order response of sensors to wheels that roll over a wave, without a simulation.
 
-A wave p of the rail or of a tread makes the contact force :math:`F = -p / (A_{wheel} + A_{contact} + A_{rail})`, which
-a free track carries to the sensors. A force of frequency :math:`f_0` that moves at v past nodes with transfer
-:math:`G_{sn}(f)` gives
+A wave p of the rail or of a tread makes a contact force F, which a free track carries to the sensors. A wheel that
+rolls at v past nodes of different receptance responds with sidebands. By a wave with envelope :math:`p(x)` and
+:math:`f_0 = v / L` the force is :math:`a(x) e^{2 \pi i f_0 t}`, with components :math:`\hat a_q` at q per metre:
+
+.. math:: \sum_q C_n(f_0 + v q) e^{2 \pi i q x_n} \hat a_q = -p(x_n), \quad C_n = A_{wheel} + A_{contact} + A_{rail, n}
+
+Here :math:`A_{rail, n}` is the receptance of the rail at node n under the wheel at rest: v is small beside the speed of
+bending waves. A force of frequency :math:`f_0` that moves at v past nodes with transfer :math:`G_{sn}(f)` gives
 
 .. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
-Here :math:`\tau_n` is the time at the node and T the distance between nodes over v. :math:`F_n` is the force on the
-rail about the node: its receptance is averaged over 2.4 m, since a wheel rings on for a few bays.
+with :math:`\tau_n` the time at the node and T the distance between nodes over v.
 
 In a switch the force acts on the rail that the wheel presses, and a change of one top alone also moves load from one
 rail to the other (``wheel_line``).
@@ -110,15 +114,37 @@ class WaveTransfer:
             For cosines exp(i 2 pi x / length), positive and negative frequency.
         """
         f0 = self.speed / np.asarray(lengths)
-        force = -0.5 / _interpolate(np.clip(f0, self.lines[0], self.lines[-1]), self.lines, self.compliance).T
+        force = self._force_envelopes(f0, envelope)
         rotation = np.exp(2j * np.pi * self.sign * self.first / np.asarray(lengths))
         spectra = []
         for sign, amount in ((1.0, force * rotation), (-1.0, (force * rotation).conj())):
-            phase = envelope[:, None] * amount * np.exp(sign * 2j * np.pi * self.node_times[:, None] * f0)
+            phase = amount * np.exp(sign * 2j * np.pi * self.node_times[:, None] * f0)
             hat = self.step * np.sinc((self.grid[:, None] - sign * f0) * self.step) ** 2
             spectra.append((self.node_transfer @ phase) * hat[:, None, :])
         plus, minus = spectra
         return plus, minus
+
+    def _force_envelopes(self, f0: np.ndarray, envelope: np.ndarray) -> np.ndarray:
+        """(n_x, wave) half the complex force at the nodes by waves of frequency ``f0`` [Hz], one metre high [N].
+
+        The nodes are continued at both ends, so that the ringing of a wheel ends before the period of the components.
+        """
+        n, length = self.node.size, self.node[1] - self.node[0]
+        n_beyond = int(np.ceil(SIMULATION.ringing_length / length))
+        path = length * np.arange(n + 2 * n_beyond)  # in the direction of the wheel
+        along = slice(None) if self.sign > 0.0 else slice(None, None, -1)
+        compliance = np.pad(self.compliance[:, along], ((0, 0), (n_beyond, n_beyond)), "edge")
+        wave = np.pad(-0.5 * envelope[along], n_beyond, "edge").astype(complex)
+        cycles = np.fft.fftfreq(path.size, length)
+        components = np.exp(2j * np.pi * path[:, None] * cycles)
+        frequency = f0[:, None] + self.speed * cycles
+        lines = np.clip(np.abs(frequency), self.lines[0], self.lines[-1])
+        force = np.empty((n, f0.size), dtype=complex)
+        for k in range(f0.size):
+            c = _interpolate(lines[k], self.lines, compliance)
+            c = np.where(frequency[k, :, None] < 0.0, c.conj(), c)
+            force[:, k] = (components @ np.linalg.solve(c.T * components, wave))[n_beyond : n_beyond + n]
+        return force[along]
 
     def signals(self, lengths: np.ndarray, envelope: np.ndarray, delay: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high.

@@ -26,7 +26,7 @@ from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.priors import PASSAGE
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.track_under_wheels import rail_receptances
+from turnout.mismatch.turnout.track_under_wheels import averages, rail_receptances
 from turnout.mismatch.turnout.wave_response import wheel_and_contact_receptance
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.rail_corrugation import MIN_AMPLITUDE, fade_envelope
@@ -301,6 +301,7 @@ def response_energy(case: TrackCase, fit: Fit, aligned: AlignedPassage, length: 
     near = np.flatnonzero((matrices.node >= case.predictor.waves.start) & (matrices.node <= case.predictor.waves.end))[
         :: CORRUGATION.node_stride
     ]
-    h, mean_receptance = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
+    h, under_wheel = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
+    mean_receptance = under_wheel @ averages(matrices.node[near])  # a wheel rings on for a few bays
     force = 1.0 / np.abs(wheel_and_contact_receptance(aligned.passage.vehicle, frequency)[:, None] + mean_receptance)[0]
     return matrices.node[near], ((2.0 * np.pi * frequency) ** 2 * force * np.abs(h[0])) ** 2
