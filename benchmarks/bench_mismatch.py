@@ -115,10 +115,16 @@ def campaign_planning():
 
     one, two = small_plan((30.0,), passages=False), small_plan((5.0, 30.0), passages=False)
     rolling = replace(small_plan((15.0,), speeds=(40.0,)), hammer_points=())
-    yield Bar("pad temperature from one temperature", nats_lost(one, "pad_temperature"), 5.0, "nats")
-    yield Bar("pad temperature from two", nats_lost(two, "pad_temperature"), 1000.0, "nats", ">=")
-    yield Bar("frequency-dependent pads from passages alone", nats_lost(rolling, "zener_pad"), 5.0, "nats")
-    yield Bar("the same from impacts", nats_lost(one, "zener_pad"), 1000.0, "nats", ">=")
+    yield Bar(
+        "evidence of pads that soften when warm, from one temperature", nats_lost(one, "pad_temperature"), 5.0, "nats"
+    )
+    yield Bar(
+        "evidence of pads that soften when warm, from two", nats_lost(two, "pad_temperature"), 1000.0, "nats", ">="
+    )
+    yield Bar("evidence of frequency-dependent pads from passages alone", nats_lost(rolling, "zener_pad"), 5.0, "nats")
+    yield Bar(
+        "evidence of frequency-dependent pads from impacts alone", nats_lost(one, "zener_pad"), 1000.0, "nats", ">="
+    )
 
 
 def development():
