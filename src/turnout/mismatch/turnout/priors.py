@@ -217,11 +217,11 @@ class SimulationPriors:
     transfer_cache_size: int = prior(12, "responses", "of the track to forces that are kept", "numerical")
     template_cache_size: int = prior(
         24, "templates", "of matrices that are kept, and rails and link sets of each", "numerical")
-    log_step: float = prior(0.04, "ln", "of the difference quotient by an unsprung mass", "numerical")
-    load_step: float = prior(0.03, "-", "of the difference quotient by a load", "numerical")
+    log_step: float = prior(0.004, "ln", "of the difference quotient by an unsprung mass", "numerical")
+    load_step: float = prior(0.003, "-", "of the difference quotient by a load", "numerical")
     time_step: float = prior(1e-5, "s", "of the difference quotient by the time of a passage", "numerical")
     surface_step: float = prior(
-        0.02, "m or ln", "of the difference quotient by a number of the running surface", "numerical")
+        0.002, "m or ln", "of the difference quotient by a number of the running surface", "numerical")
     lowest_line: float = prior(4.0, "Hz", "of the transfer functions of a passage", "numerical")
     line_step: float = prior(2.0, "Hz", "of the transfer functions of a passage", "numerical")
     band_margin: float = prior(1.3, "-", "highest line of the transfer functions over the end of the band", "numerical")
@@ -229,6 +229,10 @@ class SimulationPriors:
     node_margin: float = prior(0.3, "m", "of nodes beyond the free waves", "numerical")
     difference_reach: float = prior(
         0.5, "prior sd", "of a value, within which a difference quotient is used again; fits stall at 1", "numerical")
+    switch_step_factor: float = prior(
+        10.0, "-", "of these steps in a switch, where contacts open and close: smaller ones are noise", "numerical")
+    clock_share: float = prior(
+        0.2, "-", "of that reach for time and speed of a passage: 0.15 ms are 5 degrees at 100 Hz", "numerical")
     difference_cache_size: int = prior(600, "quotients", "that are kept", "numerical")
     difference_size: float = prior(
         0.4, "ln", "of the size of an effect that counts as a prior sd there: a fifth of it", "numerical")

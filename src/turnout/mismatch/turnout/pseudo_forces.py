@@ -240,8 +240,8 @@ def support_columns(
 ) -> dict[str, np.ndarray]:
     """Derivatives of a passage by support values.
 
-    By the logarithm of each support's own pad and ballast stiffness, and by the values that all supports have in
-    common. Of the latter the contribution of supports beyond the zone is left out.
+    By the logarithms of each support's own pad and ballast, stiffness and damping, and by the sleeper mass and pad
+    damping that all supports have in common. Of the latter the contribution of supports beyond the zone is left out.
 
     Parameters
     ----------
@@ -265,16 +265,14 @@ def support_columns(
     track = track_with(predictor.track(aligned.passage.route), predictor.zone, values)
     zone = predictor.zone.supports
     forces: dict[str, Force | list[Force]] = {}
+    closing, sinking = (np.gradient(x, axis=1) * predictor.solver.rate for x in (rail - sleeper, sleeper))
+    inertia = np.gradient(sinking, axis=1) * predictor.solver.rate
     for k, j in enumerate(zone):
         forces[f"pad_{j}"] = j, PAD, -track.pad_stiffness[j] * (rail[k] - sleeper[k])
         forces[f"ballast_{j}"] = j, SLEEPER, -track.ballast_stiffness[j] * sleeper[k]
-    closing, sinking = (np.gradient(x, axis=1) * predictor.solver.rate for x in (rail - sleeper, sleeper))
-    inertia = np.gradient(sinking, axis=1) * predictor.solver.rate
-    for name, target, motion in (
-        ("pad_damping", PAD, closing), ("ballast_damping", SLEEPER, sinking), ("sleeper_mass", SLEEPER, inertia)
-    ):  # fmt: skip
-        forces[name] = [(j, target, -getattr(track, name)[j] * motion[k]) for k, j in enumerate(zone)]
+        forces[f"pad_damper_{j}"] = j, PAD, -track.pad_damping[j] * closing[k]
+        forces[f"ballast_damper_{j}"] = j, SLEEPER, -track.ballast_damping[j] * sinking[k]
+    forces["sleeper_mass"] = [(j, SLEEPER, -track.sleeper_mass[j] * inertia[k]) for k, j in enumerate(zone)]
     columns = force_responses(predictor, values, terms, aligned, forces)
-    for name in ("pad", "ballast"):
-        columns[f"{name}_stiffness"] = np.asarray(sum(columns[f"{name}_{j}"] for j in zone))
+    columns["pad_damping"] = np.asarray(sum(columns[f"pad_damper_{j}"] for j in zone))
     return columns

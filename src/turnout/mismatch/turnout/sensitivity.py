@@ -191,9 +191,11 @@ def _difference(
     if name in _of_vehicle(aligned):  # the response to waves of the rail depends on it
         values_now |= _in_units_of_reach(values, dict(zip(predictor.waves.names, predictor.waves.sd)))
     if not in_switch:
+        values_now |= _in_units_of_reach(values, predictor.site.support_sds)
         values_now |= _own_values(values, terms, aligned)
     values_then, column = predictor.differences.get(key, ({}, predicted))
     if any(abs(v - values_then.get(n, np.inf)) > SIMULATION.difference_reach for n, v in values_now.items()):
+        step = step * SIMULATION.switch_step_factor if in_switch else step
         column = _quotient(predictor, values, terms, aligned, predicted, name, step)
         predictor.differences[key] = values_now, column
         drop_oldest(predictor.differences, SIMULATION.difference_cache_size)
@@ -221,8 +223,8 @@ def _own_values(values: Values, terms: Terms, aligned: AlignedPassage) -> dict[H
     own_sds = {
         f"wheels_{aligned.train}": TRACK.wheels_sd,
         f"load@{aligned.name}": aligned.passage.load_sd,
-        f"time@{aligned.name}": PASSAGE.time_sd,
-        f"speed@{aligned.name}": PASSAGE.speed_sd,
+        f"time@{aligned.name}": PASSAGE.time_sd * SIMULATION.clock_share,
+        f"speed@{aligned.name}": PASSAGE.speed_sd * SIMULATION.clock_share,
     }
     own_values = _in_units_of_reach(values, own_sds)
     for k, term in enumerate(terms):
@@ -315,9 +317,8 @@ def _passage_columns(
     yield from _seat_columns(predictor, values, terms, aligned, predicted)
     histories = support_motion(predictor, values, terms, aligned)
     columns = support_columns(predictor, values, terms, aligned, histories)
-    simulated = [n.name for n in chair_nuisances([predictor.track(aligned.passage.route)])]
-    if is_in_switch(predictor, aligned):  # chairs open and close with it
-        simulated.append("ballast_stiffness")
-    for name in simulated:
+    # the wheels follow what all supports have in common as they move, those beyond the zone included
+    simulated = ["pad_stiffness", "ballast_stiffness", "ballast_damping"]
+    for name in (*simulated, *(n.name for n in chair_nuisances([predictor.track(aligned.passage.route)]))):
         columns[name] = _difference(predictor, values, terms, aligned, predicted, name, SIMULATION.log_step)
     yield from columns.items()

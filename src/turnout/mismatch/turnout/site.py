@@ -48,6 +48,11 @@ class Site:
         nuisances = [n for n in track_nuisances(self.nominal, self.trains) if n.group == "track"]
         return {n.name: n.sd for n in (*nuisances, *(self.surface.nuisances() if self.surface else ()))}
 
+    @cached_property
+    def support_sds(self) -> dict[str, float]:
+        """Prior standard deviations of the pad and ballast stiffness that each support has of its own."""
+        return {n.name: n.sd for n in track_nuisances(self.nominal, self.trains) if n.group in ("pad", "ballast")}
+
     def nuisances(self, passages: Iterable[PassageInput] = ()) -> tuple[Nuisance, ...]:
         """All nuisances: the shared ones, then rail roughness, running surface and each of the ``passages``.
 
