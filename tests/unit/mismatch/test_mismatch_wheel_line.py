@@ -112,6 +112,7 @@ def quotients(surfaces=()):
     return SimpleNamespace(
         predict_passage=predict_passage, differences=OrderedDict(), values_seen=values_seen,
         site=SimpleNamespace(common_sds={"ballast_stiffness": 0.25}, support_sds={"ballast_3": 0.2}),
+        waves=SimpleNamespace(names=("cos_wave_9",), sd=np.array([1e-5])),
         surface=SimpleNamespace(turnout=SimpleNamespace(surfaces=lambda route: surfaces)),
     )  # fmt: skip
 
@@ -135,6 +136,25 @@ def test_a_quotient_with_an_effect_is_used_again_until_its_size_has_moved_by_a_f
     assert [quotient(predictor, 0.0, (HangingSleeper(5, gap),)) for gap in gaps] == [True, False, True]
     assert quotient(predictor, 0.0, (HangingSleeper(6, 4e-4),))  # of another sleeper
     assert [quotient(predictor, 0.0, (SensorGain("A", gain),)) for gain in (1.1, 1.1, 1.11)] == [True, False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "small", "large"),
+    [
+        ("load", "ballast_3", 0.09, 0.11),  # of a support: half of 0.2
+        ("load", "time@a passage", 0.14e-3, 0.16e-3),  # a tenth of 1.5 ms
+        ("load", "speed@a passage", 3.9e-4, 4.1e-4),  # a tenth of 0.4 %
+        ("wheels_a train", "cos_wave_9", 4.9e-6, 5.1e-6),  # half of 10 um, for the mass of a wheel alone
+    ],
+)
+def test_a_quotient_is_used_again_until_a_support_the_clock_or_a_wave_has_moved(name, value, small, large):
+    aligned = SimpleNamespace(name="a passage", train="a train", passage=SimpleNamespace(load_sd=0.05, route="main"))
+    for moved, is_simulated in ((small, False), (large, True)):
+        predictor = quotients()
+        for size in (0.0, moved):
+            values = {"load": 1.0, name: 1.0, value: size}
+            _difference(predictor, values, (), aligned, np.array([1.0]), name, 0.1)
+        assert (len(predictor.values_seen) == 2) is is_simulated
 
 
 def test_a_sample_in_a_switch_errs_by_a_tenth_of_its_channel():

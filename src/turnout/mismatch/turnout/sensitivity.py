@@ -188,7 +188,7 @@ def _difference(
     paths = tuple(t.name for t in terms if t.effect_type == "path")
     key = (aligned.name, name, paths if in_switch else _kinds_of(terms))
     values_now = _in_units_of_reach(values, predictor.site.common_sds)
-    if name in _of_vehicle(aligned):  # the response to waves of the rail depends on it
+    if name in _of_vehicle(aligned):  # how it responds to waves of the rail
         values_now |= _in_units_of_reach(values, dict(zip(predictor.waves.names, predictor.waves.sd)))
     if not in_switch:
         values_now |= _in_units_of_reach(values, predictor.site.support_sds)
@@ -203,6 +203,7 @@ def _difference(
 
 
 def _of_vehicle(aligned: AlignedPassage) -> tuple[str, str]:
+    """Values of the vehicle of a passage, of one train or of this passage."""
     return f"wheels_{aligned.train}", f"load@{aligned.name}"
 
 

@@ -184,19 +184,3 @@ def rail_receptances(
     node = matrices.node[near]
     h = responses(matrices, frequency, [*positions, *node.tolist()], matrices.node_index[near])
     return h[:, : len(positions)], np.diagonal(h[:, len(positions) :], axis1=1, axis2=2)
-
-
-def averages(node: np.ndarray) -> np.ndarray:
-    """(n, n) matrix that averages values at nodes over ``SIMULATION.averaging_length`` about each.
-
-    Parameters
-    ----------
-    node : (n,) array of float
-        Positions. [m]
-
-    Returns
-    -------
-    (n, n) array of float
-    """
-    about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
-    return about / about.sum(axis=0)

@@ -11,7 +11,7 @@ bending waves. A force of frequency :math:`f_0` that moves at v past nodes with 
 
 .. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
-with :math:`\tau_n` the time at the node and T the distance between nodes over v.
+with :math:`F_n = a(x_n)`, :math:`\tau_n` the time at the node and T the distance between nodes over v.
 
 In a switch the force acts on the rail that the wheel presses, and a change of one top alone also moves load from one
 rail to the other (``wheel_line``).
@@ -106,7 +106,7 @@ class WaveTransfer:
         lengths : array or sequence of float]
             (n_wave,) wavelengths [m].
         envelope : array
-            (n_x,) weight of the wave at ``path_grid``.
+            (n_x,) weight of the wave at ``node``.
 
         Returns
         -------

@@ -24,9 +24,9 @@ from turnout.mismatch.turnout.candidates.corrugation_levels import (
 from turnout.mismatch.turnout.candidates.corrugation_phase import wave_in_band
 from turnout.mismatch.turnout.defect_priors import CORRUGATION
 from turnout.mismatch.turnout.matrix_cache import matrices_of
-from turnout.mismatch.turnout.priors import PASSAGE
+from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.track_parameters import track_with
-from turnout.mismatch.turnout.track_under_wheels import averages, rail_receptances
+from turnout.mismatch.turnout.track_under_wheels import rail_receptances
 from turnout.mismatch.turnout.wave_response import wheel_and_contact_receptance
 from turnout.physics.hypothesis import Hypothesis
 from turnout.physics.rail_corrugation import MIN_AMPLITUDE, fade_envelope
@@ -302,6 +302,12 @@ def response_energy(case: TrackCase, fit: Fit, aligned: AlignedPassage, length: 
         :: CORRUGATION.node_stride
     ]
     h, under_wheel = rail_receptances(matrices, frequency, near, [s.probe(track).place for s in aligned.sensors])
-    mean_receptance = under_wheel @ averages(matrices.node[near])  # a wheel rings on for a few bays
+    mean_receptance = under_wheel @ _averages(matrices.node[near])  # a wheel rings on for a few bays
     force = 1.0 / np.abs(wheel_and_contact_receptance(aligned.passage.vehicle, frequency)[:, None] + mean_receptance)[0]
     return matrices.node[near], ((2.0 * np.pi * frequency) ** 2 * force * np.abs(h[0])) ** 2
+
+
+def _averages(node: np.ndarray) -> np.ndarray:
+    """(n, n) matrix that averages values at nodes over ``SIMULATION.averaging_length`` about each."""
+    about = np.abs(node[:, None] - node) < 0.5 * SIMULATION.averaging_length
+    return about / about.sum(axis=0)
