@@ -1,17 +1,11 @@
 r"""First-order response of sensors to wheels that roll over a wave, without a simulation.
 
-A wave p of the rail or of a tread makes a contact force F, which a free track carries to the sensors. A wheel that
-rolls at v past nodes of different receptance responds with sidebands. By a wave with envelope :math:`p(x)` and
-:math:`f_0 = v / L` the force is :math:`a(x) e^{2 \pi i f_0 t}`, with components :math:`\hat a_q` at q per metre:
-
-.. math:: \sum_q C_n(f_0 + v q) e^{2 \pi i q x_n} \hat a_q = -p(x_n), \quad C_n = A_{wheel} + A_{contact} + A_{rail, n}
-
-Here :math:`A_{rail, n}` is the receptance of the rail at node n under the wheel at rest: v is small beside the speed of
-bending waves. A force of frequency :math:`f_0` that moves at v past nodes with transfer :math:`G_{sn}(f)` gives
+A wave of the rail or of a tread makes a contact force F (``rolling_wheel``), which a free track carries to the sensors.
+A force of frequency :math:`f_0` that moves at v past nodes with transfer :math:`G_{sn}(f)` gives
 
 .. math:: S_s(f) = T \mathrm{sinc}^2((f - f_0) T) \sum_n F_n G_{sn}(f) e^{-2 \pi i (f - f_0) \tau_n}
 
-with :math:`F_n = a(x_n)`, :math:`\tau_n` the time at the node and T the distance between nodes over v.
+with :math:`F_n` the force at node n, :math:`\tau_n` the time at the node and T the distance between nodes over v.
 
 In a switch the force acts on the rail that the wheel presses, and a change of one top alone also moves load from one
 rail to the other (``wheel_line``).
@@ -26,6 +20,7 @@ import numpy as np
 from turnout.mismatch.turnout import passage_band
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION
 from turnout.mismatch.turnout.receptance_observation import channel_factor
+from turnout.mismatch.turnout.rolling_wheel import force_envelopes, interpolate
 from turnout.mismatch.turnout.track_parameters import vehicle_with
 from turnout.mismatch.turnout.track_under_wheels import TrackUnderWheels
 
@@ -70,14 +65,14 @@ class WaveTransfer:
         self.grid = grid[self.inside]
         self.node_times = self.sign * (self.node - self.first) / self.speed
         self.step = (self.node[1] - self.node[0]) / self.speed
-        transfer_at_grid = _interpolate(self.grid, lines, transfer)  # (f, sensor, node)
+        transfer_at_grid = interpolate(self.grid, lines, transfer)  # (f, sensor, node)
         self.node_transfer = transfer_at_grid * np.exp(-2j * np.pi * self.grid[:, None, None] * self.node_times)
         self.lines, self.compliance = lines, point + wheel_and_contact_receptance(vehicle, lines)[:, None]
         start_time = aligned.time[0] - aligned.reference - values[f"time@{aligned.name}"]
         gate = passage_band.band_window(self.grid, PASSAGE.band_low, aligned.high)
         channels = channel_responses(values, terms, aligned, self.grid)
         self.clock = (gate * self.rate * np.exp(2j * np.pi * self.grid * start_time))[:, None] * channels
-        self.pair_transfer = None if pair is None else self._pair_transfer(track, _interpolate(self.grid, lines, pair))
+        self.pair_transfer = None if pair is None else self._pair_transfer(track, interpolate(self.grid, lines, pair))
 
     def train(self) -> np.ndarray:
         """(f,) sum over all wheels of their delays."""
@@ -114,7 +109,9 @@ class WaveTransfer:
             For cosines exp(i 2 pi x / length), positive and negative frequency.
         """
         f0 = self.speed / np.asarray(lengths)
-        force = self._force_envelopes(f0, envelope)
+        along = slice(None) if self.sign > 0.0 else slice(None, None, -1)  # nodes in the direction of the wheel
+        step = self.node[1] - self.node[0]
+        force = force_envelopes(self.compliance[:, along], self.lines, envelope[along], step, self.speed, f0)[along]
         rotation = np.exp(2j * np.pi * self.sign * self.first / np.asarray(lengths))
         spectra = []
         for sign, amount in ((1.0, force * rotation), (-1.0, (force * rotation).conj())):
@@ -123,28 +120,6 @@ class WaveTransfer:
             spectra.append((self.node_transfer @ phase) * hat[:, None, :])
         plus, minus = spectra
         return plus, minus
-
-    def _force_envelopes(self, f0: np.ndarray, envelope: np.ndarray) -> np.ndarray:
-        """(n_x, wave) half the complex force at the nodes by waves of frequency ``f0`` [Hz], one metre high [N].
-
-        The nodes are continued at both ends, so that the ringing of a wheel ends before the period of the components.
-        """
-        n, length = self.node.size, self.node[1] - self.node[0]
-        n_beyond = int(np.ceil(SIMULATION.ringing_length / length))
-        path = length * np.arange(n + 2 * n_beyond)  # in the direction of the wheel
-        along = slice(None) if self.sign > 0.0 else slice(None, None, -1)
-        compliance = np.pad(self.compliance[:, along], ((0, 0), (n_beyond, n_beyond)), "edge")
-        wave = np.pad(-0.5 * envelope[along], n_beyond, "edge").astype(complex)
-        cycles = np.fft.fftfreq(path.size, length)
-        components = np.exp(2j * np.pi * path[:, None] * cycles)
-        frequency = f0[:, None] + self.speed * cycles
-        lines = np.clip(np.abs(frequency), self.lines[0], self.lines[-1])
-        force = np.empty((n, f0.size), dtype=complex)
-        for k in range(f0.size):
-            c = _interpolate(lines[k], self.lines, compliance)
-            c = np.where(frequency[k, :, None] < 0.0, c.conj(), c)
-            force[:, k] = (components @ np.linalg.solve(c.T * components, wave))[n_beyond : n_beyond + n]
-        return force[along]
 
     def signals(self, lengths: np.ndarray, envelope: np.ndarray, delay: np.ndarray) -> np.ndarray:
         """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high.
@@ -333,7 +308,7 @@ class WaveTransfer:
         spectrum /= np.sinc(self.grid / self.rate)  # what the mean over the block took
         start_time = 0.5 / self.rate - SIMULATION.lead_time
         spectrum = spectrum * np.exp(-2j * np.pi * self.grid * start_time) / self.rate
-        response = _interpolate(self.grid, self.lines, transfer) * spectrum.T[:, None, :]
+        response = interpolate(self.grid, self.lines, transfer) * spectrum.T[:, None, :]
         return self._on_clock(np.add.reduceat(response, first, axis=-1))
 
     def _on_clock(self, spectrum: np.ndarray) -> np.ndarray:
@@ -398,11 +373,3 @@ def wheel_and_contact_receptance(vehicle: Vehicle, frequency: np.ndarray) -> np.
     unit[row] = 1.0
     wheel = [np.linalg.solve(stiffness + 1j * w * damping - w * w * mass, unit)[row] for w in omega]
     return np.array(wheel) + 1.0 / contact
-
-
-def _interpolate(grid: np.ndarray, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Linear interpolation between lines, along the first axis."""
-    index = np.interp(grid, frequency, np.arange(frequency.size))
-    low = np.minimum(index.astype(int), frequency.size - 2)
-    fraction = (index - low).reshape(-1, *(1,) * (values.ndim - 1))
-    return (1.0 - fraction) * values[low] + fraction * values[low + 1]
