@@ -113,7 +113,7 @@ def test_errors_of_wheels_that_leave_the_rail_are_those_of_simulations_with_each
     modes = profile_modes(case.predictor, values, aligned, transfer)
     n_wheel, grid = len(forces), transfer.fine_grid
     deeper = _deviations(DEEP, grid)[0]
-    linear = transfer.tops_response(deeper[None], deeper[None], transfer.wheel(1))[:, 0]
+    linear = transfer.tops_response(deeper[None], deeper[None], [transfer.wheel(1)])[0, :, 0]
     up, down = (
         case.predictor.predict_over(values, aligned, (OfOneWheel(grid, sign * deeper),))[0] - signal
         for sign in (1.0, -1.0)
@@ -133,6 +133,30 @@ class OfOneWheel(Deviation):
 
 def cosine(a, b):
     return a @ b / np.sqrt((a @ a) * (b @ b))
+
+
+class CountedTransfer(WaveTransfer):
+    """One line and one sensor, with a response that is the sum of the path; counts how often it is computed."""
+
+    def __init__(self, n_wheel):
+        self.load_transfer, self.grid, self.wheel_delays, self.n_computed = None, np.ones(1), np.arange(n_wheel), 0
+        self.start, self.period = 0.0, 1.0
+
+    def _harmonics(self, paths):
+        self.n_computed += 1
+        return np.ones((1, 1, 1)), np.ones((1, 1, 1)), paths.sum(axis=1, keepdims=True)
+
+    def _on_clock(self, spectrum):
+        return spectrum[0]
+
+
+def test_the_response_to_a_path_is_computed_once_for_all_wheels():
+    transfer, path = CountedTransfer(8), np.array([[1.0, 2.0]])
+    delays = [np.full(1, w + 1.0) for w in range(8)]
+    together = transfer.tops_response(path, path, delays)
+    assert transfer.n_computed == 1
+    assert together.ravel() == pytest.approx([6.0 * (w + 1.0) for w in range(8)])
+    assert [d.tolist() for d in transfer.wheels()] == [transfer.wheel(w).tolist() for w in range(8)]
 
 
 def test_principal_directions_are_those_of_the_whole_matrix():

@@ -231,7 +231,7 @@ def _path_changes(case: PredictedCase, fit: Fit, aligned: AlignedPassage, chosen
         of_both = [p for p in components if not is_on_blade([p])]
         on_stock.append(sum((p(grid, 0) for p in of_both), np.zeros(grid.size)))
         on_blade.append(sum((p(grid, 0) for p in components), np.zeros(grid.size)))
-    columns = transfer.tops_response(np.array(on_stock), np.array(on_blade), transfer.train())
+    (columns,) = transfer.tops_response(np.array(on_stock), np.array(on_blade), [transfer.train()])
     return {(c.key, k): column for (c, k), column in zip(chosen, columns.T)}
 
 

@@ -78,6 +78,10 @@ class WaveTransfer:
         """(f,) sum over all wheels of their delays."""
         return np.exp(-2j * np.pi * self.grid[:, None] * self.wheel_delays).sum(axis=1)
 
+    def wheels(self) -> list[np.ndarray]:
+        """Delay of each wheel, (f,)."""
+        return [self.wheel(w) for w in range(self.wheel_delays.size)]
+
     def wheel(self, w: int) -> np.ndarray:
         """(f,) delay of one wheel.
 
@@ -159,19 +163,19 @@ class WaveTransfer:
         cosine_and_sine = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
         return self._on_clock(cosine_and_sine.reshape(*cosine_and_sine.shape[:2], -1) * delay[:, None, None])
 
-    def tops_response(self, on_stock: np.ndarray, on_blade: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    def tops_response(self, on_stock: np.ndarray, on_blade: np.ndarray, delays: Sequence[np.ndarray]) -> np.ndarray:
         """Response when the tops of stock rail and blade are lower by some paths.
 
         Parameters
         ----------
         on_stock, on_blade : (n_key, n_x) array of float
             Dips at ``fine_grid``; both the same where there is no blade. [m]
-        delay : (f,) array of complex
-            ``train()``, or ``wheel`` of one.
+        delays : sequence of (f,) array of complex
+            ``train()``, or ``wheel`` of several.
 
         Returns
         -------
-        (n_sensor * n_time, n_key) array of float
+        (n_delay, n_sensor * n_time, n_key) array of float
             [m/s²]
         """
         weight = 0.0 if self.load_transfer is None else self.load_transfer.blade_weight(self.fine_grid)
@@ -181,7 +185,7 @@ class WaveTransfer:
             x, _ = self.load_transfer.positions()
             difference = [np.interp(x, self.fine_grid, d) for d in on_stock - on_blade]
             spectrum = spectrum + self.pair_transfer @ np.array(difference).T
-        return self._on_clock(spectrum * delay[:, None, None])
+        return np.array([self._on_clock(spectrum * delay[:, None, None]) for delay in delays])
 
     def pair_response(self, differences: np.ndarray) -> np.ndarray:
         """Response to the load that goes from one rail to the other under each wheel.
@@ -242,7 +246,7 @@ class WaveTransfer:
         plus, minus, amplitude = (x.astype(np.complex64) for x in self._harmonics(paths))
         total: Any = 0.0
         for w in range(self.wheel_delays.size):
-            a = amplitude[:, w].T
+            a = np.ascontiguousarray(amplitude[:, w].T)  # numpy multiplies a transposed one without BLAS
             total = total + (plus @ a + minus @ a.conj()) * self.wheel(w).astype(np.complex64)[:, None, None]
         return self._on_clock(total)
 

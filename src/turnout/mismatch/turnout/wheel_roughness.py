@@ -67,8 +67,8 @@ def profile_modes(predictor: Predictor, values: Values, aligned: AlignedPassage,
     ]
     if not paths:
         return np.zeros((len(aligned.sensors) * aligned.time.size, 0))
-    deviations, delays = np.array(paths), [transfer.wheel(w) for w in range(transfer.wheel_delays.size)]
-    linear = np.array([transfer.tops_response(deviations, deviations, delay) for delay in delays])
+    deviations = np.array(paths)
+    linear = transfer.tops_response(deviations, deviations, transfer.wheels())
     simulated = flight_modes(predictor, values, aligned, (grid, deviations), linear)
     return np.concatenate(list(linear if simulated is None else simulated), axis=1)
 

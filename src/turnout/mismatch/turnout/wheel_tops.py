@@ -135,8 +135,7 @@ def top_modes(
     paths = [c.deviation(1.0, c.on_blade)(grid) for c in changes]
     on_stock = np.array([blank if c.on_blade else p for c, p in zip(changes, paths)])
     on_blade = np.array([p if c.on_blade else blank for c, p in zip(changes, paths)])
-    n_wheel = transfer.wheel_delays.size
-    linear = np.array([transfer.tops_response(on_stock, on_blade, transfer.wheel(w)) for w in range(n_wheel)])
+    linear = transfer.tops_response(on_stock, on_blade, transfer.wheels())
     common = _simulated_responses(predictor, values, aligned, changes)
     window = max(1, round(WHEELS.sharing_time * aligned.clock))
     modes = linear if common is None else share_difference(linear, common, len(aligned.sensors), window)
