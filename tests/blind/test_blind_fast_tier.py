@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.blind_bridge import finding_rows
 
+from turnout.config.load import load_configuration, with_raw
 from turnout_blind.archive import plan_of, read_archive, verify_archive, verify_recordings
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
@@ -82,6 +83,14 @@ def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
     case, folder, truth = again
     verify_recordings(held, case, folder)
     assert truth["visible"] == json.loads(held["truths"][case])["visible"]
+
+
+def test_a_case_has_the_tests_and_the_trains_of_a_campaign(again):
+    case, folder, _ = again
+    raw = folder / case / "raw" / case
+    assert len(list(raw.glob("hammer/*/*.npz"))) == 6 and len(list(raw.glob("passages/*.npz"))) == 8
+    turnout = with_raw(load_configuration(folder / case / "config").turnout(case), folder / case / "raw")
+    assert len(turnout.campaigns) == 2 and len(turnout.trains) == 8
 
 
 @pytest.mark.slow

@@ -31,13 +31,22 @@ from turnout_blind.site import draw_site
 pytestmark = pytest.mark.slow
 
 
+def with_two_passages(plan, effects):
+    """As ``stage``, with two of the eight passages: a passage, and how visible an effect is in it, is a second each."""
+    rng, site, world, concealed = stage(plan, effects)
+    return rng, replace(site, passages=site.passages[:2]), world, concealed
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """(out, truth) of a control and a single, made once; never changed by a test."""
+    """(out, truth) of a control and a single, made once and never changed. A whole case is in test_blind_fast_tier."""
     folder = tmp_path_factory.mktemp("blind")
     out, truth = folder / "set", folder / "truth"
     seed = 19  # whose first two cases in shuffled order are a control and a single
-    make_set(out, truth, seed, only={"pad"}, limit=2)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("turnout_blind.campaign.stage", with_two_passages)
+        patch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)  # which has what is patched
+        make_set(out, truth, seed, only={"pad"}, limit=2)
     return out, truth
 
 
@@ -59,11 +68,11 @@ def test_a_user_of_the_project_can_read_the_case(made):
     for case in cases(made[0]):
         turnout = with_raw(load_configuration(case / "config").turnout(case.name), case / "raw")
         assert len(turnout.campaigns) == 2
-        assert len(turnout.trains) == 8
+        assert len(turnout.trains) == 2
         raw = case / "raw" / case.name
         passages = sorted(raw.glob("passages/*.npz"))
-        assert len(passages) == 8
-        for path in passages[:2]:
+        assert len(passages) == 2
+        for path in passages:
             result = read(path, case / "raw", turnout.passages.description)
             assert not result.errors
             recording = result.recordings[0]
@@ -324,12 +333,6 @@ def scored(copy, tmp_path):
         diagnose_set(out, truth, f"{{python}} {tool} {{out}}", report=lambda line: None, label=label)
     reveal(out, truth)
     return out
-
-
-def with_two_passages(plan, effects):
-    """As ``stage``, with two passages to choose the picture from: each costs two simulations."""
-    rng, site, world, concealed = stage(plan, effects)
-    return rng, replace(site, passages=site.passages[:2]), world, concealed
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
