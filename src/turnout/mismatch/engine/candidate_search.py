@@ -120,8 +120,7 @@ class RefitTask:
     """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
 
     ``cheap_gain`` is the gain from the cheap observations alone [nats]. A ``rival`` is refitted only if another effect
-    of its component gains something. With ``own_derivatives`` the refit of an expensive case starts with derivatives at
-    its start, otherwise with those of the fit without the candidate.
+    of its component gains something.
     """
 
     candidate: Candidate
@@ -129,7 +128,6 @@ class RefitTask:
     values: dict[str, float]
     cheap_gain: float = 0.0
     rival: bool = False
-    own_derivatives: bool = False
 
 
 def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> list[RefitTask]:

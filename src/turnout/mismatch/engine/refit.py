@@ -180,19 +180,16 @@ def _refit_equivalent_forms(search: Search, fit: Fit, ranked: list[Score]) -> li
 
     Equivalent are families that cannot be distinguished from the leader as fitted: its ``limit_form`` and
     ``simpler_form``. A limit form equals the leader at its largest sizes, where its own fit may never have been: its
-    refit begins at the least costly of its estimate and its starts. It is tried with the derivatives of ``fit``, which
-    has neither effect, and with those at its start: with either of them a refit may end far above its optimum.
+    refit begins at the least costly of its estimate and its starts.
     """
     leader = ranked[0]
     for k, score in enumerate(ranked[1:], 1):
         is_equivalent = score.is_limit_of(leader) or score.is_simpler_form_of(leader)
         if leader.gain > search.settings.threshold and is_equivalent:
-            for label, own_derivatives in (("beside", False), ("at its start", True)):
-                start = score.estimates[0]
-                task = RefitTask(score.candidate, start, leader.fit.values, own_derivatives=own_derivatives)
-                refitted = _score_task(search.with_label(f"{search.label}:{label}"), fit, task)
-                if refitted is not None and refitted.gain > ranked[k].gain:
-                    ranked[k] = refitted
+            task = RefitTask(score.candidate, score.estimates[0], leader.fit.values)
+            refitted = _score_task(search.with_label(f"{search.label}:beside"), fit, task)
+            if refitted is not None and refitted.gain > score.gain:
+                ranked[k] = refitted
     return sorted(ranked, key=lambda s: -s.gain)
 
 
@@ -253,53 +250,17 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     threshold, candidate, is_channel = search.settings.threshold, task.candidate, task.candidate.frame == "sensor"
     accepted = "+".join(c.key for c in fit.candidates)
     key = f"{search.label}:{accepted}:{candidate.key}:{tuple(np.round(task.start, 12))}"
-    is_far = task.own_derivatives or (is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold)
+    is_far = is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold
     refit = search.stored_fit(key, lambda: _refit(search, fit, task, is_far), (*fit.candidates, candidate))
     if refit is None:
         return None
     score = score_of(search, fit, refit, candidate)
     if not search.case.expensive:
         return score
-    whole_track = candidate.site.n_scanned == 1 and candidate.refit.from_base
-    if whole_track and score.gain < threshold and not _keeps_cheap_gain(task, score):
-        score = max(score, _score_from_farther(search, fit, task, score, key), key=lambda s: s.gain)
     min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
     if score.gain < THRESHOLDS.min_held_share * task.cheap_gain and task.cheap_gain > min_cheap_gain:
         return _polish(search, fit, score)
     return score
-
-
-def _keeps_cheap_gain(task: RefitTask, score: Score) -> bool:
-    """Whether a refit from a fit to the cheap observations, which begins at the priors, keeps half of its gain."""
-    return bool(task.values) and 0.0 < THRESHOLDS.min_held_share * task.cheap_gain <= score.gain
-
-
-def _score_from_farther(search: Search, fit: Fit, task: RefitTask, score: Score, key: str) -> Score:
-    """Best score of a task restarted at more than its promised size, once also with maskable nuisances at their priors.
-
-    If common values of the base fit have absorbed part of an effect of the whole track, a small size gains nothing and
-    a large one costs more, until these values return. If the waves of the rail absorbed it, they return on no straight
-    path. ``score`` if no restart is better, or the simulation fails.
-    """
-    candidate, candidates = task.candidate, (*fit.candidates, task.candidate)
-    first, start = candidate.parameters[0], np.array(task.start, dtype=float)
-    start[0] = np.clip(first.neutral + THRESHOLDS.overshoot_factor * (start[0] - first.neutral), *first.bounds)
-    psi, values = np.concatenate([fit.psi, start]), {**fit.values, **task.values}
-    scores = [score]
-    for label, start_values in (("farther", values), ("unbent", values | search.prior_values())):
-
-        def compute(start_values: dict[str, float] = start_values) -> Fit | None:
-            try:
-                sought_cost = search.least_cost_of_interest(fit)
-                refit = search.fit(candidates, psi, start_values, fit.jacobian, sought_cost=sought_cost)
-                return refit.without_jacobian()
-            except SimulationError:
-                return None
-
-        refit = search.stored_fit(f"{key}:{label}", compute, candidates)
-        if refit is not None:
-            scores.append(score_of(search, fit, refit, candidate))
-    return max(scores, key=lambda s: s.gain)
 
 
 def _polish(search: Search, fit: Fit, score: Score) -> Score:

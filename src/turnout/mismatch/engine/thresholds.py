@@ -191,10 +191,6 @@ class Thresholds:
     far_start_gain: float = threshold(
         4.0, "thresholds", "promised by cheap observations; beyond, a start needs derivatives of its own", FITS
     )
-    overshoot_factor: float = threshold(
-        2.0, "of the promised size", "an effect that gained too little is restarted there: the base masks part of it",
-        FITS,
-    )  # fmt: skip
     max_halvings: int = threshold(
         4, "halvings", "of a start that costs more than no effect; a sixteenth of it is linear", FITS
     )
