@@ -40,7 +40,7 @@ exit codes:
   3    not done: a fault of the program
   124  nightly: ended at the limit of time
   130  interrupted"""
-COLLECTION_THRESHOLD = 50_000  # new containers between searches for cycles; Python's 700 cost 3 % of a diagnosis
+COLLECTION_THRESHOLD = 50_000  # new containers between searches for cycles; Python's 700 cost 1 % of a diagnosis
 COMMON_DEFAULTS = {"json": False, "quiet": False, "verbose": False, "result": None, "nothing_used": False}
 
 

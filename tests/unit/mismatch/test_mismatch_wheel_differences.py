@@ -1,12 +1,14 @@
 """Each wheel meets a nose otherwise than the file has it: an error of the passage's own, as a simulation has it."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.candidates.out_of_roundness import _products
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.surface_priors import WHEELS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
@@ -157,6 +159,29 @@ def test_the_response_to_a_path_is_computed_once_for_all_wheels():
     assert transfer.n_computed == 1
     assert together.ravel() == pytest.approx([6.0 * (w + 1.0) for w in range(8)])
     assert [d.tolist() for d in transfer.wheels()] == [transfer.wheel(w).tolist() for w in range(8)]
+
+
+class RandomTransfer(WaveTransfer):
+    """Random spectra of seven waves on the lines 5 to 24 of a transform of 64 samples, for three sensors."""
+
+    def __init__(self, rng):
+        self.size, self.inside, self.sign = 64, np.arange(5, 25), -1.0
+        self.aligned = SimpleNamespace(time=np.arange(40), sensors=("a", "b", "c"))
+        self.clock = complex_normal(rng, (20, 3))
+
+
+def complex_normal(rng, shape):
+    return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+
+def test_products_with_a_residual_are_those_of_the_columns():
+    rng = np.random.default_rng(4)
+    transfer, residual = RandomTransfer(rng), rng.normal(size=120)
+    spectra, delays = (complex_normal(rng, (20, 3, 7)), complex_normal(rng, (20, 3, 7))), complex_normal(rng, (2, 20))
+    columns = [transfer.signals_from(spectra, delay) for delay in delays]
+    assert columns[0].shape == (120, 14)
+    products = _products(transfer, residual, spectra, delays)
+    assert products == pytest.approx(np.array([c.T @ residual for c in columns]), rel=1e-12, abs=1e-12)
 
 
 def test_principal_directions_are_those_of_the_whole_matrix():

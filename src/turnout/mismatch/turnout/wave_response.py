@@ -159,9 +159,23 @@ class WaveTransfer:
         (n_sensor * n_time, 2 n_wave) array
             Signals of ``spectra`` at the times of the observation.
         """
+        return self._on_clock(self.cosines_and_sines(spectra) * delay[:, None, None])
+
+    def cosines_and_sines(self, spectra: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Spectra of the responses to cosine and sine of each wave.
+
+        Parameters
+        ----------
+        spectra : tuple[array, array]
+            As ``signals_from``.
+
+        Returns
+        -------
+        (f, n_sensor, 2 n_wave) array of complex
+        """
         plus, minus = spectra
-        cosine_and_sine = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
-        return self._on_clock(cosine_and_sine.reshape(*cosine_and_sine.shape[:2], -1) * delay[:, None, None])
+        pairs = np.stack([plus + minus, (plus - minus) * (-1j * self.sign)], axis=-1)
+        return pairs.reshape(*pairs.shape[:2], -1)
 
     def tops_response(self, on_stock: np.ndarray, on_blade: np.ndarray, delays: Sequence[np.ndarray]) -> np.ndarray:
         """Response when the tops of stock rail and blade are lower by some paths.

@@ -110,13 +110,22 @@ def _slopes(
     spectra = transfer.spectra(wavelengths, np.ones(transfer.node.size))
     weight = o.effective / fit.scale[o.data_type]
     rewhitened = o.whiten(np.asarray(white) * o.sigma) / o.sigma  # the whitening is symmetric: columns need not pass it
-    slopes = []
-    for wheel in range(n_wheel):
-        columns = transfer.signals_from(spectra, transfer.wheel(wheel))
-        slopes.append(weight * (columns.T @ rewhitened).reshape(-1, 2))
-        if wheel == 0:
-            whitened = o.whiten(columns).reshape(o.data.size, -1, 2)
-    return np.array(slopes), weight * np.einsum("nki,nkj->kij", whitened, whitened)
+    delays = [transfer.wheel(w) for w in range(n_wheel)]
+    slopes = weight * _products(transfer, rewhitened, spectra, delays).reshape(n_wheel, -1, 2)
+    whitened = o.whiten(transfer.signals_from(spectra, delays[0])).reshape(o.data.size, -1, 2)
+    return slopes, weight * np.einsum("nki,nkj->kij", whitened, whitened)
+
+
+def _products(
+    transfer: WaveTransfer, residual: np.ndarray, spectra: tuple[np.ndarray, np.ndarray], delays: Sequence[np.ndarray]
+) -> np.ndarray:
+    """(n_delay, 2 n_wave) ``transfer.signals_from(spectra, delay).T @ residual`` of each delay.
+
+    One transform of the residual (n_sensor * n_time,) instead of one for each column.
+    """
+    rows = residual.reshape(len(transfer.aligned.sensors), -1)
+    seen = np.fft.rfft(rows, transfer.size)[:, transfer.inside].T.conj() * transfer.clock * (2.0 / transfer.size)
+    return (np.array(delays) @ np.einsum("fsk,fs->fk", transfer.cosines_and_sines(spectra), seen)).real
 
 
 def _passage_evidence(slope: np.ndarray, size: np.ndarray) -> np.ndarray:
