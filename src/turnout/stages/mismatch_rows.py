@@ -23,6 +23,7 @@ from turnout.stages.mismatch_curves import (
     reach_of,
 )
 from turnout.stages.mismatch_text import headline, interval, requirements_in_words, surface_sentence
+from turnout.stages.possible_effect import agreement_sentence, sentence_on_possible_effect
 from turnout.stages.values_off_file import sentences_on_values
 
 if TYPE_CHECKING:
@@ -68,10 +69,7 @@ def finding_tables(
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
     row |= _summary_columns(diagnosis, case, group, about)
-    of_surface = map(surface_sentence, surface_estimates(case, diagnosis.fit))
-    of_values = sentences_on_values(case.nuisances, diagnosis.fit)
-    limits = requirements_in_words(case.unmet_requirements) if row["verdict"] == "none" else ""
-    row["sentence"] = " ".join(filter(None, [headline(row), *of_surface, *of_values, limits]))
+    row["sentence"] = _sentence(diagnosis, case, row)
     ambiguity = case.ambiguity() if diagnosis.verdict.is_ambiguous else None
     if ambiguity:
         row["next_measurement"] = f"Measure {ambiguity.measurement}"
@@ -83,6 +81,17 @@ def finding_tables(
         "mismatch_parameters": parameter_rows(diagnosis, case, row),
         "mismatch_curves": curve_rows(case, diagnosis, comparison, key),
     }
+
+
+def _sentence(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]) -> str:
+    """The finding in words, with what follows from the values of the fit and what these recordings cannot show."""
+    surface = (surface_sentence(s) for s in surface_estimates(case, diagnosis.fit))
+    values = [*filter(None, surface), *sentences_on_values(case.nuisances, diagnosis.fit)]
+    if row["verdict"] != "none":
+        return " ".join([headline(row), *values])
+    possible = sentence_on_possible_effect(diagnosis.verdict, case, row)
+    limits = requirements_in_words(case.unmet_requirements)
+    return " ".join(filter(None, [agreement_sentence(headline(row), bool(values)), *values, possible, limits]))
 
 
 def _identity(group: Group, about: Mapping[str, Any], case: TrackCase) -> dict[str, Any]:

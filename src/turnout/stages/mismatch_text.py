@@ -186,9 +186,8 @@ def title(finding: Mapping[str, Any]) -> str:
     terms = json.loads(finding["term_json"] or "[]")
     if finding["verdict"] in ("named", "a_or_b") and terms:
         rivals = [finding["rival_term"] if finding["verdict"] == "a_or_b" else None, *(None for _ in terms[1:])]
-        return (
-            "; ".join(_sentence(t, finding) + _rival_text(t.get("or", rival)) for t, rival in zip(terms, rivals)) + "."
-        )
+        pairs = zip(terms, rivals)
+        return "; ".join(effect_in_words(t, finding) + _rival_text(t.get("or", rival)) for t, rival in pairs) + "."
     low, high = finding["place_low_m"], finding["place_high_m"]
     if finding["verdict"] == "unknown":
         where = _location_text(finding, low, high)
@@ -304,7 +303,20 @@ def _wheel_text(train: str, axle: int | None) -> str:
     return f"axle {axle} of {train}" if axle else f"an axle of {train}"
 
 
-def _sentence(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
+def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
+    """The message of an effect, with its position and sizes, without a full stop.
+
+    Parameters
+    ----------
+    term : mapping
+        As ``accepted_effects.describe_term`` gives it.
+    finding : mapping
+        Row of ``mismatch_findings``.
+
+    Returns
+    -------
+    str
+    """
     fixed = term["fixed"]
     of_term = fixed.get("train") or "a train", fixed["wheel"] + 1 if "wheel" in fixed else None
     train, axle = _train_and_axle(finding) if finding["train"] else of_term

@@ -1,0 +1,65 @@
+"""What the answer "none" states beside it: the likeliest effect with too little evidence, and values off the files."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine.decision import judge
+from turnout.mismatch.engine.score import Score
+from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout.stages.possible_effect import agreement_sentence, sentence_on_possible_effect
+
+FINDING = {"train": None, "axle": None, "channel": None}
+
+
+@pytest.fixture(scope="module")
+def case():
+    return PlannedCase(small_plan(), families=("sensor_gain", "local_pad", "unsprung_mass"))
+
+
+def score_of(case, family, gain, size, error, worst_gain=0.0):
+    """Score of the first candidate of a family, as a fit of that size would give it."""
+    candidate = next(c for c in case.candidates if c.family == family)
+    fit = SimpleNamespace(psi=np.array([size]), psi_se=np.array([error]), part=lambda _: slice(0, 1))
+    return Score(candidate, gain, worst_gain, 1.0, fit)
+
+
+def sentence_of(case, *scores):
+    return sentence_on_possible_effect(judge(list(scores), 0.9, case.settings), case, FINDING)
+
+
+def test_the_likeliest_effect_is_stated_with_its_evidence_and_size(case):
+    gain, pad = score_of(case, "sensor_gain", 9.23, 1.2, 0.03), score_of(case, "local_pad", 7.0, 0.5, 0.1)
+    channel = gain.candidate.where["sensor"]
+    assert sentence_of(case, gain, pad) == (
+        f"Possible, with 9.2 of the 12 nats of evidence that a name needs: “Sensor {channel} reads 1.2 times the true "
+        "value.”"
+    )
+    place = pad.candidate.where["place"]
+    assert f"at {place:.1f} m is 0.5 times as stiff" in sentence_of(case, pad)
+
+
+def test_an_effect_of_a_train_has_the_name_of_the_train(case):
+    mass = score_of(case, "unsprung_mass", 6.1, 1.4, 0.05)
+    assert f"The wheelsets of {mass.candidate.where['train']} are 1.4 times as heavy" in sentence_of(case, mass)
+
+
+@pytest.mark.parametrize(("gain", "is_stated"), [(5.9, False), (6.0, True), (12.0, True), (12.1, False)])
+def test_half_of_the_evidence_of_a_name_is_needed_and_a_name_is_none(case, gain, is_stated):
+    assert bool(sentence_of(case, score_of(case, "sensor_gain", gain, 1.2, 0.03))) is is_stated
+    assert "with 11.9 of the 12 nats" in sentence_of(case, score_of(case, "sensor_gain", 11.99, 1.2, 0.03))
+
+
+def test_what_is_too_small_to_act_on_or_contradicted_is_not_stated(case):
+    too_small = score_of(case, "sensor_gain", 9.0, 1.0005, 1e-4)
+    assert sentence_of(case, too_small) == "" == sentence_of(case)
+    other = score_of(case, "local_pad", 7.0, 0.5, 0.1)
+    assert "0.5 times as stiff" in sentence_of(case, too_small, other)
+    contradicted = score_of(case, "sensor_gain", 14.7, 1.2, 0.03, worst_gain=-9.0)
+    assert sentence_of(case, contradicted) == ""
+
+
+def test_agreement_with_other_values_than_those_of_the_files_is_said_so():
+    assert agreement_sentence("Both agree.", False) == "Both agree."
+    assert agreement_sentence("Both agree.", True) == "Both agree, but only with other values than the files have."
