@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.registry.database import build_database
@@ -21,10 +22,13 @@ from turnout.registry.generation import (
 )
 from turnout.registry.generation_history import HISTORY_FOLDER, TIME_FORMAT, entries_of
 
+if TYPE_CHECKING:
+    import duckdb
+
 KEPT_TIME = timedelta(days=1)
 
 
-def publish(registry_dir: Path, generation: Generation) -> None:
+def publish(registry_dir: Path, generation: Generation, con: duckdb.DuckDBPyConnection) -> None:
     """Publish a generation and delete the files that only expired generations name.
 
     Parameters
@@ -33,6 +37,8 @@ def publish(registry_dir: Path, generation: Generation) -> None:
         Folder of the registry.
     generation : Generation
         List of the live and retired files; ``retired`` is changed.
+    con : DuckDB connection
+        Any connection; it is closed.
 
     Raises
     ------
@@ -56,7 +62,7 @@ def publish(registry_dir: Path, generation: Generation) -> None:
             f"cannot write {GENERATION_FILE} in {root}: {error}. The new rows do not count yet: make room or give "
             "write permission, then run again."
         ) from error
-    build_database(root, generation)
+    build_database(root, generation, con)
     delete_files(root, due)
     for number, (path, _) in entries_of(root).items():
         if number < max(expired, default=0):
