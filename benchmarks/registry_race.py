@@ -52,7 +52,7 @@ def append(root: Path, k: int, rows: int = ROWS) -> None:
         file = write_sorted(con, root, "modes", 2026, batch_sql(k, rows), f"batch-{k}")
         now.files.append(file)
         now.schemas[file.schema] = schema_of("modes")
-        publish(root, now, con)
+        publish(root, now)
 
 
 def write(root: Path, stop: Path, rows: int = ROWS) -> int:

@@ -127,7 +127,7 @@ def _rewrite(
     files = sorted(count_superseded(con, root, files), key=lambda f: f.path)
     schemas = {f.schema: before.schemas.get(f.schema) or schema_of(f.table) for f in files}
     now = replace(before, number=number, files=files, retired=retired, schemas=schemas)
-    publish(root, now, con)
+    publish(root, now)
     return summary
 
 

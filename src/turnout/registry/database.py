@@ -116,7 +116,7 @@ def _has_copied_template(connection: duckdb.DuckDBPyConnection) -> bool:
     return True
 
 
-def build_database(registry_dir: Path, generation: Generation, con: duckdb.DuckDBPyConnection | None = None) -> None:
+def build_database(registry_dir: Path, generation: Generation) -> None:
     """Make ``registry.duckdb`` for a generation as a temporary file, then replace the old one in one step.
 
     The views hold absolute paths, so that it can be opened from any folder.
@@ -127,8 +127,6 @@ def build_database(registry_dir: Path, generation: Generation, con: duckdb.DuckD
         Folder of the registry.
     generation : Generation
         List of the live files.
-    con : DuckDB connection or None
-        Connection that is there already and is closed afterwards: another one takes 16 ms. None: a new one.
 
     Raises
     ------
@@ -137,7 +135,7 @@ def build_database(registry_dir: Path, generation: Generation, con: duckdb.DuckD
     """
     root = Path(registry_dir).resolve()
     unfinished = temporary_path(root / "registry")
-    con = con or connect()
+    con = connect()
     try:
         unfinished.write_bytes(catalogue_template())
         con.execute(f"attach {literal(str(unfinished))} as registry")

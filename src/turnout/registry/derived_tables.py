@@ -79,7 +79,7 @@ def publish(
             return before
         schemas = before.schemas | {f.schema: schema_of(f.table) for f in files if f.table in frames}
         now = Generation(number, files, [*before.retired, *removed], schemas, before.consumed, before.incomplete)
-        publish_generation(root, now, con)
+        publish_generation(root, now)
         return now
 
 

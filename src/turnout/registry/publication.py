@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from turnout.errors import RegistryError
 from turnout.registry.database import build_database
@@ -22,13 +21,10 @@ from turnout.registry.generation import (
 )
 from turnout.registry.generation_history import HISTORY_FOLDER, TIME_FORMAT, entries_of
 
-if TYPE_CHECKING:
-    import duckdb
-
 KEPT_TIME = timedelta(days=1)
 
 
-def publish(registry_dir: Path, generation: Generation, con: duckdb.DuckDBPyConnection) -> None:
+def publish(registry_dir: Path, generation: Generation) -> None:
     """Publish a generation and delete the files that only expired generations name.
 
     Parameters
@@ -37,8 +33,6 @@ def publish(registry_dir: Path, generation: Generation, con: duckdb.DuckDBPyConn
         Folder of the registry.
     generation : Generation
         List of the live and retired files; ``retired`` is changed.
-    con : DuckDB connection
-        Any connection; it is closed.
 
     Raises
     ------
@@ -62,7 +56,7 @@ def publish(registry_dir: Path, generation: Generation, con: duckdb.DuckDBPyConn
             f"cannot write {GENERATION_FILE} in {root}: {error}. The new rows do not count yet: make room or give "
             "write permission, then run again."
         ) from error
-    build_database(root, generation, con)
+    build_database(root, generation)
     delete_files(root, due)
     for number, (path, _) in entries_of(root).items():
         if number < max(expired, default=0):

@@ -100,8 +100,6 @@ class Registration:
         """Connection with the staging tables and the views of the live rows; a night without news needs none."""
         con = connect(temp_directory=str(self.root / ".spill"))
         limit_memory(con)  # a second thread would take more CPU time, too
-        con.execute("attach ':memory:' as staging")
-        con.execute("use staging")
         create_staging(con, self.is_indexed)
         for table in tables():
             con.execute(f"create view old_{table} as {read_live(con, self.root, table, self.before.of(table))}")
@@ -199,10 +197,8 @@ class Registration:
         if n_superseded:
             now.files = self._count_superseded(now.files)
         now.consumed = consumed
-        self.con.execute("use memory")
-        self.con.execute("detach staging")  # the rows are written: their memory is free for the catalogue
-        with self.con:
-            publish(self.root, now, self.con)
+        self.con.close()  # the rows are written: their memory is free for the catalogue
+        publish(self.root, now)
         return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
 
     def has_duplicates(self) -> bool:

@@ -8,8 +8,6 @@ from datetime import UTC, datetime
 import duckdb
 import pytest
 
-from turnout.registry import publication
-from turnout.registry.compaction import compact
 from turnout.registry.job import register
 from turnout.workflow.batches import read_results, write_batch
 
@@ -35,29 +33,6 @@ def test_years_lie_apart_and_a_run_makes_one_file_per_table_and_year(bench, hamm
     bench.register(*some_results(hammer, quarantined))
     files = [p.parent.name for p in (bench.registry / "modes").rglob("batch-*.parquet")]
     assert sorted(files) == ["year=2025", "year=2026"]
-
-
-def test_what_is_published_takes_one_database_in_which_nothing_staged_is_left(bench, hammer, monkeypatch):
-    """To make one takes 16 CPU ms, a tenth of a registration; staged rows may need much memory."""
-    bench.register(hammer("t1"))
-    made, held, connect, build = [], [], duckdb.connect, publication.build_database
-
-    def counted(*args, **options):
-        made.append(connect(*args, **options))
-        return made[-1]
-
-    def seen(root, generation, con):
-        held.append(con.execute("select database_name from duckdb_databases() where not internal").fetchall())
-        build(root, generation, con)
-
-    monkeypatch.setattr(duckdb, "connect", counted)
-    monkeypatch.setattr(publication, "build_database", seen)
-    bench.register(hammer("t2"))
-    assert compact(bench.registry)
-    assert len(made) == 2 and held == [[("memory",)]] * 2
-    for con in made:
-        with pytest.raises(duckdb.ConnectionException, match="closed"):
-            con.execute("select 1")
 
 
 def test_the_same_batch_again_adds_nothing(bench, hammer, quarantined, hashes):
