@@ -13,7 +13,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_use, add_work
+from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -60,8 +60,6 @@ def run(args: argparse.Namespace) -> int:
 
     model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)
     add_result(args, answer_rows(model))
-    n_used = len(model.history.used_steps)
-    add_use(args, n_used, len(model.history.steps) - n_used + len(model.held))
     print("\n".join(model_text(args.turnout, model, args.all)))
     return 0
 

@@ -15,9 +15,9 @@ from turnout.cli.main import EXIT_CODES, main
 from turnout.workflow.nightly import NightReport
 from turnout.workflow.project import create_project
 
-GO_ON = {"blind", "diagnose", "nightly", "plan", "trains", "twin"}  # without the inputs that they cannot use
+GO_ON = {"blind", "diagnose", "nightly", "plan", "trains"}  # without the inputs that they cannot use
 JUDGE = {"check", "hammer", "inspect", "passage"}  # 1 by one problem, or without a train
-NEED = {"calibrate", "compare", "layout", "paper"}  # 2 without a usable input
+NEED = {"calibrate", "compare", "layout", "paper", "twin"}  # 2 without a usable input
 OTHERS = {  # answer a question of a registry or a track file, or write what was typed
     "acknowledge", "add", "alert", "completion", "config", "demo", "distinguish", "events", "export", "init", "query",
     "real", "registry", "report", "simulate", "worklist",
@@ -55,15 +55,6 @@ def diagnose(monkeypatch, n_used, n_left_out):
     return ["diagnose", "--turnout", "t1"]
 
 
-def twin(monkeypatch, n_used, n_left_out):
-    used, held = [object()] * n_used, {str(k): "named" for k in range(n_left_out)}
-    model = SimpleNamespace(history=SimpleNamespace(used_steps=used, steps=used), held=held)
-    monkeypatch.setattr("turnout.stages.calibrated_model.calibrate_turnout", lambda *args: model)
-    monkeypatch.setattr("turnout.stages.calibrated_model.answer_rows", lambda model: [])
-    monkeypatch.setattr("turnout.cli.twin.model_text", lambda *args: ["text"])
-    return ["twin", "--turnout", "t1"]
-
-
 def trains(monkeypatch, n_used, n_left_out):
     """Used: the clusters. Left out: the turnout without weighed trains, which is always there."""
     cluster = SimpleNamespace(id="a", mean=[4.0], n=9)
@@ -97,13 +88,24 @@ def blind(monkeypatch, n_used, n_left_out):
 
 
 @pytest.mark.parametrize(("n_used", "n_left_out", "code"), [(0, 2, 1), (1, 2, 0), (1, 0, 0)])
-@pytest.mark.parametrize("command", [diagnose, twin, trains, plan, nightly, blind], ids=lambda c: c.__name__)
+@pytest.mark.parametrize("command", [diagnose, trains, plan, nightly, blind], ids=lambda c: c.__name__)
 def test_only_a_command_that_could_use_nothing_has_exit_code_1(
     project, monkeypatch, capsys, command, n_used, n_left_out, code
 ):
     words = command(monkeypatch, n_used, n_left_out)
     assert main([*words, "--json"]) == code
     assert json.loads(capsys.readouterr().out)["exit_code"] == code
+
+
+@pytest.mark.parametrize("held", [{}, {"2024-05-13": "named"}])
+def test_visits_that_all_differ_from_the_file_are_an_answer(project, monkeypatch, held):
+    """Ballast of a third from the first day on: no visit agrees with the file, which is what the model has to say."""
+    history = SimpleNamespace(used_steps=[], steps=[object()] * 4)
+    model = SimpleNamespace(history=history, held=held)
+    monkeypatch.setattr("turnout.stages.calibrated_model.calibrate_turnout", lambda *args: model)
+    monkeypatch.setattr("turnout.stages.calibrated_model.answer_rows", lambda model: [])
+    monkeypatch.setattr("turnout.cli.twin.model_text", lambda *args: ["against the file: local ballast"])
+    assert main(["twin", "--turnout", "t1"]) == 0
 
 
 def test_the_page_of_commands_lists_them(repository):
