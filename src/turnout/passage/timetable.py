@@ -101,9 +101,30 @@ def listed_for(moment: datetime, n_axles: int, trains: Sequence[ListedTrain], to
     ListedTrain or None
         The train, if it is certain.
     """
+    return listed_at(moment, [t for t in trains if t.n_axles in (None, n_axles)], tolerance)
+
+
+def listed_at(moment: datetime, trains: Sequence[ListedTrain], tolerance: float) -> ListedTrain | None:
+    """The listed train nearest in time to ``moment``, within ``tolerance`` [s], whatever its number of axles.
+
+    None where a second one fits nearly as well.
+
+    Parameters
+    ----------
+    moment : datetime
+        Time of the passage, naive UTC.
+    trains : sequence of ListedTrain
+        Trains to choose from.
+    tolerance : float
+        Largest difference in time. [s]
+
+    Returns
+    -------
+    ListedTrain or None
+        The train, if it is certain.
+    """
     near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
     near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])
-    fitting = [x for x in near if x[1].n_axles in (None, n_axles)]
-    if not fitting or (len(fitting) > 1 and fitting[1][0] < 2.0 * fitting[0][0] + 5.0):
+    if not near or (len(near) > 1 and near[1][0] < 2.0 * near[0][0] + 5.0):
         return None
-    return fitting[0][1]
+    return near[0][1]

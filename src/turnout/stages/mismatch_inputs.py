@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.electrical_pulses import without_pulses
+from turnout.passage.timetable import listed_at, listed_trains
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 from turnout.stages.copied_files import without_copies
@@ -234,7 +236,7 @@ def _passage_input(
         notes.append(Note("two trains at the same time, not used", name))
         return None
     try:
-        train = train_of(row, recording.conditions, Path(turnout.folder) / "vehicles")
+        train = train_of(row, _train_notes(row, recording, turnout), Path(turnout.folder) / "vehicles")
     except TrainUnknownError as error:
         notes.append(Note(str(error), name))
         return None
@@ -250,6 +252,19 @@ def _passage_input(
     return PassageInput(
         name, usable, train.vehicle, train.speed, train.name, *heading, _passage_conditions(row, usable), train.load_sd
     )
+
+
+def _train_notes(row: Mapping[str, Any], recording: Recording, turnout: TurnoutConfig) -> Mapping[str, Any]:
+    """Notes in the file, with the number of axles of the train data where the file has none and the type agrees."""
+    notes, moment = recording.conditions, row.get("passed_at_utc") or recording.started_at
+    trains, _ = listed_trains(turnout.trains)
+    if moment is None or not trains:
+        return notes
+    moment = datetime.fromisoformat(str(moment)).replace(tzinfo=None)
+    listed = listed_at(moment, trains, turnout.settings["passage"].train_data_tolerance)
+    if listed is None or listed.n_axles is None or notes.get("train_type") not in (None, listed.train_type):
+        return notes
+    return {"n_axles": listed.n_axles, **notes}
 
 
 def _trains(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, notes: list[Note]) -> Iterator[Recording]:

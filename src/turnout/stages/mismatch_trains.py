@@ -68,8 +68,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     IdentifiedTrain
     """
     noted_speed = KMH * (noted_number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
-    min_axle_share = MIN_AXLE_SHARE
-    if _is_uncertain(row) and noted_speed and _type_names({**row, "train_type": None}, notes):
+    recorded, min_axle_share = row, MIN_AXLE_SHARE
+    is_taken_as_noted = _is_uncertain(row) and noted_speed and _type_names({**row, "train_type": None}, notes)
+    if is_taken_as_noted:
         row, min_axle_share = {**row, "train_type": None, "speed_kmh": None, "axle_times_s": None}, 0.0
     speed = row.get("speed_kmh") or noted_speed
     type_names = _type_names(row, notes)
@@ -80,8 +81,11 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
             f"the train's {missing_quantity} is not known ({row.get('detail') or 'no axles found'})"
         )
     trusted_speed = noted_speed if type_name in _type_names({**row, "train_type": None}, notes) else None
+    n_axles = row.get("n_axles") or None
+    if is_taken_as_noted and n_axles:
+        n_axles = _likely_axles(type_name, recorded, notes, float(speed) / KMH, folder)
     vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(
-        type_name, row.get("n_axles") or None, row, notes, folder, min_axle_share if trusted_speed else np.inf
+        type_name, n_axles, row, notes, folder, min_axle_share if trusted_speed else np.inf
     )
     if trusted_speed and (type_name != type_names[0] or axle_doubts):
         speed = trusted_speed  # the measured one is from axle distances of another train, or from impacts between axles
@@ -96,7 +100,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
             raise
         speed, further_doubts = float(trusted_speed) / KMH, (f"{error}; taken as noted",)
         if len(axles := vehicle.wheels) == row.get("n_axles"):
-            n = _axles_by_length(type_name, row, speed, folder)
+            n = _likely_axles(type_name, row, notes, speed, folder)
             vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(type_name, n, row, notes, folder, MIN_AXLE_SHARE)
             further_doubts += (f"{len(axles)} axles recorded over the length of {n}",) if n < len(axles) else ()
     direction, direction_doubts = _heading(("facing", "trailing"), "direction", row, notes)
@@ -158,8 +162,8 @@ def _loaded_vehicle(
         single_unit = load_vehicle(name, 0.0, folder)
     except (SimulationError, ConfigError) as error:
         raise TrainUnknownError(f"type {name}: {error}") from None
-    noted_units = noted_number(notes, "n_units") or noted_number(notes, "units") or 1.0
-    n, units = len(single_unit.wheels), max(1, round(noted_units))
+    n = len(single_unit.wheels)
+    units = _noted_units(notes, n) or 1
     axle_doubts: tuple[str, ...] = ()
     if n_axles_heard and n_axles_heard % n:
         axle_doubts = (
@@ -171,6 +175,30 @@ def _loaded_vehicle(
         units = n_axles_heard // n
     share, load_sd, doubts = _load_share(name, row, notes, folder, units)
     return load_vehicle(name, share, folder, units), load_sd, doubts, axle_doubts
+
+
+def _noted_units(notes: Mapping[str, Any], n_axles_of_unit: int) -> int | None:
+    """Number of units that is noted, by itself or by the number of axles; None if neither is, or axles do not divide.
+
+    >>> _noted_units({"n_units": 2}, 4), _noted_units({"n_axles": 8}, 4), _noted_units({"n_axles": 6}, 4)
+    (2, 2, None)
+    """
+    units, axles = noted_number(notes, "n_units") or noted_number(notes, "units"), noted_number(notes, "n_axles")
+    if units:
+        return max(1, round(units))
+    return round(axles / n_axles_of_unit) if axles and axles % n_axles_of_unit == 0 else None
+
+
+def _likely_axles(name: str, row: Mapping[str, Any], notes: Mapping[str, Any], speed: float, folder: Path) -> int:
+    """Number of axles of a train whose recorded ones are in doubt: as noted, else by its length, else as recorded."""
+    try:
+        n = len(load_vehicle(name, 0.0, folder).wheels)
+    except (SimulationError, ConfigError):
+        return row["n_axles"]
+    if units := _noted_units(notes, n):
+        return units * n
+    is_known = row["n_axles"] % n == 0 and row.get("axle_times_s") is not None
+    return _axles_by_length(name, row, speed, folder) if is_known else row["n_axles"]
 
 
 def _axles_by_length(name: str, row: Mapping[str, Any], speed: float, folder: Path) -> int:

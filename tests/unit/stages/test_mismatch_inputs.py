@@ -1,7 +1,7 @@
 """What the files of strangers say, or leave unsaid: read as far as it goes, else told, never mistaken."""
 
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import partial
 from types import SimpleNamespace
 
@@ -95,6 +95,43 @@ def test_train_data_precede_a_train_whose_axles_are_uncertain(repository, codes,
 def test_an_uncertain_train_without_train_data_is_taken_as_recorded(repository):
     row = {"train_type": "locomotive", "speed_kmh": 144.0, "reason_codes": ["axles_uncertain"]}
     assert train(row, {}, repository).speed == pytest.approx(40.0)
+
+
+def test_the_noted_number_of_axles_decides_where_the_recorded_ones_match_no_train(repository):
+    """Impacts at a nose lengthen a train: eight axles over the length of two locomotives, and four are listed."""
+    one, two = (load_vehicle("locomotive", 0.0, repository / "config/vehicles", n).wheel_positions for n in (1, 2))
+    impacts = np.sort(np.concatenate([one, one + 0.6 * (two[-1] - one[-1])]))
+    said = {"speed": 35.0, "train_type": "locomotive"}
+    for places, noted, axles in ((impacts, {}, 8), (impacts, {"n_axles": 4}, 4), (impacts, {"n_axles": 5}, 8)):
+        row = {"n_axles": 8, "speed_kmh": 120.0, "axle_times_s": places / 35.0}
+        found = train(row, said | noted, repository)
+        assert len(found.vehicle.wheels) == axles and found.speed == 35.0
+    nose = {"reason_codes": ["axles_uncertain"], "train_type": "unknown", "n_axles": 8, "speed_kmh": 161.0}
+    impacts = np.sort(np.concatenate([one, one + 1.3]))  # over the length of one unit
+    for places, noted, axles in ((impacts, {}, 4), (two, {}, 8), (two, {"n_axles": 4}, 4), (impacts, {"units": 2}, 8)):
+        found = train(nose | {"axle_times_s": places / 35.0}, said | noted, repository)
+        assert len(found.vehicle.wheels) == axles and found.speed == 35.0
+    row = {"n_axles": 8, "speed_kmh": 126.0, "axle_times_s": two / 35.0}  # two units as they stand in the file
+    assert len(train(row, said | {"n_axles": 4}, repository).vehicle.wheels) == 8
+
+
+@pytest.mark.parametrize(
+    ("known", "listed_type", "axles"),
+    [
+        ({}, "ic3", 8),
+        ({"train_type": "ic3"}, "ic3", 8),
+        ({"train_type": "locomotive"}, "ic3", None),
+        ({"n_axles": 16}, "ic3", 16),
+    ],
+)
+def test_the_train_data_give_the_number_of_axles_that_the_file_does_not_note(known, listed_type, axles):
+    rows = ({"passed_at_utc": "2024-07-16T13:00:02", "train_type": listed_type, "n_axles": "8"},)
+    settings = {"passage": SimpleNamespace(train_data_tolerance=60.0)}
+    turnout = SimpleNamespace(trains=rows, settings=settings)
+    recording = SimpleNamespace(conditions=known, started_at=datetime(2024, 7, 16, 13, tzinfo=UTC))
+    assert mismatch_inputs._train_notes({}, recording, turnout).get("n_axles") == axles
+    later = {"passed_at_utc": datetime(2024, 7, 16, 13, 30)}
+    assert mismatch_inputs._train_notes(later, recording, turnout) == known
 
 
 def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository):
