@@ -81,9 +81,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
             f"the train's {missing_quantity} is not known ({row.get('detail') or 'no axles found'})"
         )
     trusted_speed = noted_speed if type_name in _type_names({**row, "train_type": None}, notes) else None
-    n_axles = row.get("n_axles") or None
+    n_axles, count_doubts = row.get("n_axles") or None, tuple[str, ...]()
     if is_taken_as_noted and n_axles:
-        n_axles = _likely_axles(type_name, recorded, notes, float(speed) / KMH, folder)
+        n_axles, count_doubts = _likely_axles(type_name, recorded, notes, float(speed) / KMH, folder)
     vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(
         type_name, n_axles, row, notes, folder, min_axle_share if trusted_speed else np.inf
     )
@@ -99,10 +99,9 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         if not trusted_speed:
             raise
         speed, further_doubts = float(trusted_speed) / KMH, (f"{error}; taken as noted",)
-        if len(axles := vehicle.wheels) == row.get("n_axles"):
-            n = _likely_axles(type_name, row, notes, speed, folder)
+        if len(vehicle.wheels) == row.get("n_axles"):
+            n, count_doubts = _likely_axles(type_name, row, notes, speed, folder)
             vehicle, load_sd, doubts, axle_doubts = _loaded_vehicle(type_name, n, row, notes, folder, MIN_AXLE_SHARE)
-            further_doubts += (f"{len(axles)} axles recorded over the length of {n}",) if n < len(axles) else ()
     direction, direction_doubts = _heading(("facing", "trailing"), "direction", row, notes)
     route, route_doubts = _heading(("main", "diverging"), "track", row, notes)
     return IdentifiedTrain(
@@ -111,7 +110,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         speed,
         direction,
         route,
-        (*doubts, *axle_doubts, *further_doubts, *direction_doubts),
+        (*doubts, *axle_doubts, *count_doubts, *further_doubts, *direction_doubts),
         load_sd,
         route_doubts,
     )
@@ -189,16 +188,24 @@ def _noted_units(notes: Mapping[str, Any], n_axles_of_unit: int) -> int | None:
     return round(axles / n_axles_of_unit) if axles and axles % n_axles_of_unit == 0 else None
 
 
-def _likely_axles(name: str, row: Mapping[str, Any], notes: Mapping[str, Any], speed: float, folder: Path) -> int:
-    """Number of axles of a train whose recorded ones are in doubt: as noted, else by its length, else as recorded."""
+def _likely_axles(
+    name: str, row: Mapping[str, Any], notes: Mapping[str, Any], speed: float, folder: Path
+) -> tuple[int, tuple[str, ...]]:
+    """(number of axles of a train whose recorded ones are in doubt, the doubt in words if it is another number).
+
+    It is the noted number, else that of the train's length, else that of the recording.
+    """
+    recorded = row["n_axles"]
     try:
         n = len(load_vehicle(name, 0.0, folder).wheels)
     except (SimulationError, ConfigError):
-        return row["n_axles"]
+        return recorded, ()
+    n_axles, source = recorded, ""
     if units := _noted_units(notes, n):
-        return units * n
-    is_known = row["n_axles"] % n == 0 and row.get("axle_times_s") is not None
-    return _axles_by_length(name, row, speed, folder) if is_known else row["n_axles"]
+        n_axles, source = units * n, "as noted"
+    elif recorded % n == 0 and row.get("axle_times_s") is not None:
+        n_axles, source = _axles_by_length(name, row, speed, folder), "by its length"
+    return n_axles, (f"{recorded} axles recorded, {n_axles} assumed {source}",) if n_axles != recorded else ()
 
 
 def _axles_by_length(name: str, row: Mapping[str, Any], speed: float, folder: Path) -> int:

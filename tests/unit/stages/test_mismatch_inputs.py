@@ -106,11 +106,13 @@ def test_the_noted_number_of_axles_decides_where_the_recorded_ones_match_no_trai
         row = {"n_axles": 8, "speed_kmh": 120.0, "axle_times_s": places / 35.0}
         found = train(row, said | noted, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 35.0
+        assert ("8 axles recorded, 4 assumed as noted" in found.doubts) == (axles == 4)
     nose = {"reason_codes": ["axles_uncertain"], "train_type": "unknown", "n_axles": 8, "speed_kmh": 161.0}
     impacts = np.sort(np.concatenate([one, one + 1.3]))  # over the length of one unit
     for places, noted, axles in ((impacts, {}, 4), (two, {}, 8), (two, {"n_axles": 4}, 4), (impacts, {"units": 2}, 8)):
         found = train(nose | {"axle_times_s": places / 35.0}, said | noted, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 35.0
+        assert any("8 axles recorded, 4 assumed" in doubt for doubt in found.doubts) == (axles == 4)
     row = {"n_axles": 8, "speed_kmh": 126.0, "axle_times_s": two / 35.0}  # two units as they stand in the file
     assert len(train(row, said | {"n_axles": 4}, repository).vehicle.wheels) == 8
 
@@ -145,7 +147,7 @@ def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository
         row = {"train_type": "ic3", "n_axles": 16, "speed_kmh": 81.0, "axle_times_s": places / 25.0}
         found = train(row, said, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 25.0
-        assert any("over the length of 8" in d for d in found.doubts) == doubt
+        assert ("16 axles recorded, 8 assumed by its length" in found.doubts) == doubt
     row |= {"speed_kmh": 90.0, "axle_times_s": two / 25.0}
     found = train(row, said, repository)
     assert len(found.vehicle.wheels) == 16 and not any("axles" in doubt for doubt in found.doubts)
