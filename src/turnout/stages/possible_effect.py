@@ -40,7 +40,7 @@ def sentence_on_possible_effect(verdict: Verdict, case: TrackCase, finding: Mapp
     threshold = case.settings.threshold
     if WITHOUT_EVIDENCE not in verdict.trail or score is None:
         return ""
-    if score.gain < THRESHOLDS.min_leader_gain * threshold:
+    if score.gain < THRESHOLDS.min_leader_gain * threshold:  # below, its fit is not continued to convergence
         return ""
     sizes, errors = score.estimates
     term = describe_term(score.candidate.term(sizes), score.candidate, errors, case.predictor.track())
