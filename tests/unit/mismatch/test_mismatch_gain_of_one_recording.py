@@ -118,7 +118,8 @@ class Struck(Days):
             16.0,
             "all impacts at 4.2 m",
         ),  # 13 against 2.5; no campaign would do alone
-        ((3.5, 4.0, 7.0, 6.0, 1.0, 0.5, 4.0), 26.0, ""),  # 13 of others, of whom none would do alone
+        ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 1.9), 36.0, "all impacts at 4.2 m"),  # 33, and 5.9 of the others
+        ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 2.1), 36.0, ""),  # 6.1 of the others: half a name confirms one
         ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all impacts at 4.2 m"),  # 11, half a name, against 2.5
         ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others say half of one
         ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5

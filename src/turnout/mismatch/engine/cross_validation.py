@@ -321,9 +321,10 @@ def single_witness(
 def _single_hammer_position(
     hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float], threshold: float
 ) -> str:
-    """Position, in words, whose impacts alone support a name, or half of one, while all others do not.
+    """Position, in words, whose impacts alone support half of a name or more, while all others do not.
 
-    "" if there is none, or if recordings without impacts support the name.
+    "" if there is none, or if recordings without impacts support the name. Half of a name is enough to confirm one:
+    the price of a name is that of a search among many effects, and others need to confirm only the one that was found.
     """
     gains: dict[float, float] = {}
     for condition, condition_gain in by_condition.items():
@@ -338,11 +339,8 @@ def _single_hammer_position(
         return ""
     if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
         return ""
-    return (
-        f"all impacts at {strongest:g} m"
-        if any(gains[strongest] > s * threshold > other_gain for s in THRESHOLDS.single_position_levels)
-        else ""
-    )
+    is_alone = gains[strongest] > THRESHOLDS.min_confirmation * threshold > other_gain
+    return f"all impacts at {strongest:g} m" if is_alone else ""
 
 
 def effect_energy(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:

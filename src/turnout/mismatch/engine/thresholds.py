@@ -98,8 +98,8 @@ class Thresholds:
         FITS,
     )  # fmt: skip
     min_hammer_positions: int = threshold(3, "positions", "of fewer none can be called the exception", FITS)
-    single_position_levels: tuple[float, float] = threshold(
-        (1.0, 0.5), "thresholds", "impacts at one position gain more, and all other conditions together less", FITS
+    min_confirmation: float = threshold(
+        0.5, "thresholds", "impacts at one position gain more, and all other conditions together less", FITS
     )
 
     # Reserved recordings
