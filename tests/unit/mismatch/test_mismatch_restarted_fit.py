@@ -8,10 +8,10 @@ import pytest
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.leaders import restart_leader
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.refit import restart_leader
 from turnout.mismatch.engine.search import Search
 from turnout.physics import Parameter
 

@@ -1,13 +1,12 @@
 """Joint refits of the shortlisted candidates on top of a fit: starts, convergence, and the score of each.
 
-A leader that explains too little is restarted from smaller sizes. Fits are stored by key.
+Fits are stored by key.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,7 @@ from turnout.mismatch.engine.candidate_search import Entry, RefitTask, prescreen
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score, single_witness
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
+from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -25,58 +25,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
-
-
-def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
-    """The better of a leader that explains too little and its restart. Other leaders stay.
-
-    The restart begins at the least costly of smaller sizes, with all nuisances that can mask an effect at their priors.
-    A base fit that imitates a large effect has local minima, and so has an effect that lifts wheels off the rail.
-
-    Parameters
-    ----------
-    search : Search
-    fit : Fit
-        Without the leader.
-    score : Score
-        The leader.
-
-    Returns
-    -------
-    Score
-    """
-    if score.explained >= search.settings.explained or not score.candidate.parameters:
-        return score
-    reset_values = score.fit.values | search.prior_values()
-
-    def compute() -> Fit | None:
-        try:
-            psi = _cheapest_psi(search.case, score, reset_values)
-            return search.converge(search.fit(score.fit.candidates, psi, reset_values))
-        except SimulationError:
-            return None
-
-    refit = search.stored_fit(search.key_of("again", score, fit), compute, score.fit.candidates)
-    restarted = score if refit is None else score_of(search, fit, refit, score.candidate)
-    return max(score, restarted, key=lambda s: s.gain)
-
-
-def _cheapest_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndarray:
-    """``psi`` with the first two parameters of the leader at those shares of their values that cost least."""
-    candidate, psi_slice = score.candidate, score.fit.part(score.candidate)
-    sizes, costs = score.fit.psi[psi_slice], []
-    for shares in product(THRESHOLDS.size_factors, repeat=min(2, sizes.size)):
-        psi, size = np.array(score.fit.psi), np.array(sizes)
-        size[0] = candidate.neutral[0] + shares[0] * (sizes[0] - candidate.neutral[0])
-        size[1 : len(shares)] = sizes[1 : len(shares)] * shares[1:]
-        psi[psi_slice] = [np.clip(v, *p.bounds) for v, p in zip(size, candidate.parameters)]
-        try:
-            costs.append((cost_at(case, score.fit.candidates, psi, values), tuple(psi)))
-        except SimulationError:
-            continue
-    if not costs:
-        raise SimulationError(f"{candidate.key} cannot be simulated at any size")
-    return np.array(min(costs)[1])
 
 
 def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> tuple[tuple[Score, ...], Fit]:
@@ -145,7 +93,7 @@ def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score
         min(material[0].gain - settings.margin, THRESHOLDS.min_held_share * material[0].gain) if material else 0.0
     )
     leaders = [s for s in material if s.gain > max(THRESHOLDS.min_leader_gain * settings.threshold, min_close_gain)]
-    polished = [_polish(search, fit, s) for s in leaders]
+    polished = [at_best_position(search, fit, polish(search, fit, s)) for s in leaders]
     if polished and not fit.candidates:  # beside another effect the residual is also an error in its shape
         polished[0] = restart_leader(search, fit, polished[0])
     return sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
@@ -259,16 +207,8 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
         return score
     min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
     if score.gain < THRESHOLDS.min_held_share * task.cheap_gain and task.cheap_gain > min_cheap_gain:
-        return _polish(search, fit, score)
+        return polish(search, fit, score)
     return score
-
-
-def _polish(search: Search, fit: Fit, score: Score) -> Score:
-    """A leader refitted to convergence, with derivatives of its own: the verdict rests on these."""
-    key = search.key_of("polished", score, fit)
-    refit = search.stored_fit(key, lambda: search.converge(score.fit), score.fit.candidates)
-    assert refit is not None
-    return score_of(search, fit, refit, score.candidate)
 
 
 def _with_condition_gains(search: Search, fit: Fit, score: Score) -> Score:

@@ -1,0 +1,99 @@
+"""A leader moves to the neighbouring position that explains more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.errors import SimulationError
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.evidence import score_of
+from turnout.mismatch.engine.leaders import at_best_position
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.search import Search
+from turnout.physics import Parameter
+
+X = np.linspace(0.0, 9.0, 300)
+POSITIONS = (1.8, 2.4, 3.0, 3.6, 4.2, 4.8, 5.4, 6.6, 7.2)  # one support has no candidate
+DEPTH, WIDTH = 0.8, 1.1
+SIZE = (Parameter("depth", "-", 0.0, (-9.0, 9.0), "size", "made up 2026", (0.0, 3.0)),)
+
+
+class Dented(Case):
+    """A bump of a known width and an unknown depth at a support, four recordings, a slope, and an effect everywhere."""
+
+    expensive = True
+
+    def __init__(self, true_position, impossible=()):
+        rng = np.random.default_rng(6)
+        self.impossible = impossible
+        self.nuisances = (Nuisance("slope", "-", 0.0, 0.5),)
+        self.candidates = (
+            *(
+                Candidate.of("bump", SIZE, lambda p, x=x: p | {"place": x}, ((1.0,),), {"place": x}, n_scanned=9)
+                for x in POSITIONS
+            ),
+            Candidate.of("shift", SIZE, lambda p: p | {"place": None}, ((1.0,),)),
+        )
+        true = self.shape(DEPTH, true_position)
+        self.observations = tuple(
+            Observation(f"o{k}", f"day {k}", true + 0.05 * rng.normal(size=X.size), 0.05) for k in range(4)
+        )
+
+    def shape(self, depth, place):
+        return depth * (np.ones(X.size) if place is None else np.exp(-(((X - place) / WIDTH) ** 2)))
+
+    def predict(self, values, terms, observations):
+        if any(t["place"] in self.impossible for t in terms):
+            raise SimulationError("cannot be simulated there")
+        return [values["slope"] * X / 9.0 + sum((self.shape(**t) for t in terms), 0.0 * X) for _ in observations]
+
+
+def leader_at(case, position):
+    base = fit_jointly(case)
+    (candidate,) = (c for c in case.candidates if c.where.get("place") == position)
+    return base, score_of(Search(case), base, fit_jointly(case, (candidate,), [1.0]), candidate)
+
+
+@pytest.mark.parametrize(("start", "true"), [(1.8, 4.2), (3.6, 4.2), (5.4, 4.2), (5.4, 7.2), (3.0, 1.8)])
+def test_a_leader_at_another_position_moves_to_the_true_one(start, true):
+    case = Dented(true)
+    base, leader = leader_at(case, start)
+    moved = at_best_position(Search(case), base, leader)
+    assert moved.candidate.where["place"] == true
+    assert moved.estimates[0][0] == pytest.approx(DEPTH, abs=4.0 * moved.estimates[1][0])
+    assert moved.gain > leader.gain
+
+
+def test_the_gain_is_that_of_a_fit_which_starts_there():
+    case = Dented(4.2)
+    base, leader = leader_at(case, 3.0)
+    _, there = leader_at(case, 4.2)
+    moved = at_best_position(Search(case), base, leader)
+    assert moved.gain == pytest.approx(there.gain, abs=0.01)  # a linear model: one optimum
+    assert moved.fit.jacobian  # the gain by condition needs it
+
+
+@pytest.mark.parametrize("position", [4.2, None])
+def test_a_leader_at_its_best_position_or_without_one_stays(position):
+    case = Dented(4.2)
+    base, leader = leader_at(case, position)
+    assert at_best_position(Search(case), base, leader) is leader
+
+
+def test_a_stretch_in_words_has_no_neighbours():
+    case = Dented(4.2)
+    base, leader = leader_at(case, 3.0)
+    site = replace(leader.candidate.site, where={"place": "all supports"})
+    of_all = replace(leader.candidate, site=site)
+    stretch = replace(leader, candidate=of_all, fit=leader.fit.with_candidates((of_all,)))
+    assert at_best_position(Search(case), base, stretch) is stretch
+
+
+def test_a_neighbour_that_cannot_be_simulated_leaves_the_leader():
+    case = Dented(4.2, impossible=(2.4, 3.6))
+    base, leader = leader_at(case, 3.0)
+    assert at_best_position(Search(case), base, leader) is leader
