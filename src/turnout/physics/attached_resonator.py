@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from turnout.simulate.track import Track
 
 SOURCE = "Den Hartog 1934, Mechanical vibrations, ch. 3: the auxiliary mass"
-STARTS = tuple((15.0, f, 0.03) for f in np.geomspace(90.0, 500.0, 6))  # [kg, Hz, -]; it acts over half an octave
+STARTS = tuple((15.0, f, 0.03) for f in np.geomspace(60.0, 800.0, 45))  # [kg, Hz, -], two widths of the resonance apart
 
 
 @dataclass(frozen=True)
