@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine import leaders
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.evidence import score_of
@@ -82,6 +83,36 @@ def test_a_leader_at_its_best_position_or_without_one_stays(position):
     case = Dented(4.2)
     base, leader = leader_at(case, position)
     assert at_best_position(Search(case), base, leader) is leader
+
+
+def test_a_neighbour_of_another_length_is_another_effect():
+    """A long bump at the true position, and one as long as the leader beside it."""
+    case = Dented(4.2)
+    long_one = replace(case.candidates[4].site, where={"place": 4.2, "sleepers": 3})
+    case.candidates = (*case.candidates[:4], replace(case.candidates[4], site=long_one), *case.candidates[5:])
+    base, leader = leader_at(case, 3.0)
+    assert at_best_position(Search(case), base, leader).candidate.where == {"place": 3.6}
+
+
+def test_each_position_is_tried_once_even_if_a_fit_to_convergence_has_less_evidence(monkeypatch):
+    case, tried = Dented(4.2), []
+    base, leader = leader_at(case, 3.0)
+    score_at = leaders._score_at
+    monkeypatch.setattr(leaders, "_score_at", lambda s, f, x, c: tried.append(c.key) or score_at(s, f, x, c))
+    monkeypatch.setattr(leaders, "polish", lambda search, fit, score: replace(score, gain=leader.gain + len(tried)))
+    at_best_position(Search(case), base, leader)
+    assert len(tried) == len(set(tried))
+    monkeypatch.setattr(leaders, "polish", lambda search, fit, score: replace(score, gain=leader.gain - 1.0))
+    assert at_best_position(Search(case), base, leader) is leader
+
+
+@pytest.mark.parametrize("where", [{"place": "all supports"}, {}])
+def test_an_effect_without_a_coordinate_is_no_neighbour(where):
+    case = Dented(4.2)
+    elsewhere = replace(case.candidates[1], site=replace(case.candidates[1].site, where=where))  # 2.4 m
+    case.candidates = (case.candidates[0], elsewhere, *case.candidates[2:])
+    base, leader = leader_at(case, 3.0)
+    assert at_best_position(Search(case), base, leader).candidate.where["place"] == 4.2
 
 
 def test_a_stretch_in_words_has_no_neighbours():

@@ -45,7 +45,8 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     """A leader fitted to convergence at the best position that is reached by steps to a better neighbour.
 
     The position was chosen by the cheap observations, or by columns of one size. It is a parameter like others, but
-    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances.
+    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. Each
+    position is tried once.
 
     Parameters
     ----------
@@ -60,12 +61,18 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     Score
         The same where no neighbour gains more, and for an effect without a position.
     """
+    tried = {score.candidate.key}
     while True:
-        trials = [_score_at(search, fit, score, neighbour) for neighbour in _neighbours(search.case, score.candidate)]
-        best = max((s for s in trials if s is not None), key=lambda s: s.gain, default=score)
+        neighbours = [c for c in _neighbours(search.case, score.candidate) if c.key not in tried]
+        tried.update(c.key for c in neighbours)
+        trials = [s for s in (_score_at(search, fit, score, c) for c in neighbours) if s is not None]
+        best = max(trials, key=lambda s: s.gain, default=score)
         if best.gain <= score.gain:
             return score
-        score = polish(search, fit, best)
+        moved = polish(search, fit, best)
+        if moved.gain <= score.gain:  # smaller in evidence, though it costs no more
+            return score
+        score = moved
 
 
 def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> Score | None:
@@ -85,14 +92,25 @@ def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> S
 
 
 def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
-    """The candidates of the same effect at the next position before and behind. [] if it has no position."""
-    place = candidate.where.get("place")
-    if not isinstance(place, (int, float)):
+    """The candidates that differ from this one by the next position before and behind. [] if it has no position."""
+    if not _has_coordinate(candidate):
         return []
-    others = [c for c in case.candidates if c.family == candidate.family and c.key != candidate.key]
+    place = candidate.where["place"]
+    others = [c for c in case.candidates if c.family == candidate.family and _is_same_but_for_position(c, candidate)]
     before = max((c for c in others if c.where["place"] < place), key=lambda c: c.where["place"], default=None)
     behind = min((c for c in others if c.where["place"] > place), key=lambda c: c.where["place"], default=None)
     return [c for c in (before, behind) if c is not None]
+
+
+def _is_same_but_for_position(first: Candidate, second: Candidate) -> bool:
+    """Whether two candidates of one effect have positions, and the same length, wavelength and so on."""
+    a, b = ({k: v for k, v in c.where.items() if k not in ("place", "sleeper")} for c in (first, second))
+    return _has_coordinate(first) and _has_coordinate(second) and a == b
+
+
+def _has_coordinate(candidate: Candidate) -> bool:
+    """Whether it is at a position in metres. Positions in words have no coordinate."""
+    return isinstance(candidate.where.get("place"), (int, float))
 
 
 def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
