@@ -248,7 +248,7 @@ def test_nothing_is_located_in_noise():
 
 def test_the_refused_candidate_is_heard_where_it_explains_more():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
-    candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k")
+    candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k", position=None)
     refused = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
     found = locate(case, fit_jointly(case), refused)
     assert (found.frame, found.train, found.axle) == ("wheel", "freight", 3)

@@ -278,6 +278,12 @@ class Candidate:
         return f"{self.family}[{position}]" if position else self.family
 
     @property
+    def position(self) -> float | None:
+        """Position of the effect. None if it has none, or one in words. [m]"""
+        place = self.where.get("place")
+        return place if isinstance(place, (int, float)) else None
+
+    @property
     def in_words(self) -> str:
         """Family and site as text.
 
@@ -288,8 +294,8 @@ class Candidate:
         ['soft pad at 8.4 m', 'soft pad at sensor A8', 'soft pad at wheelset 3 of ic3', 'soft pad']
         """
         words, where = [self.family.replace("_", " ")], self.where
-        if isinstance(where.get("place"), (int, float)):  # words have no coordinate
-            words.append(f"at {where['place']:.1f} m")
+        if self.position is not None:
+            words.append(f"at {self.position:.1f} m")
         if "sensor" in where:
             words.append(f"at sensor {where['sensor']}")
         if "axle" in where:

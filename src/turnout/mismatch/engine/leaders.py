@@ -93,24 +93,20 @@ def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> S
 
 def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
     """The candidates that differ from this one by the next position before and behind. [] if it has no position."""
-    if not _has_coordinate(candidate):
+    position = candidate.position
+    if position is None:
         return []
-    place = candidate.where["place"]
-    others = [c for c in case.candidates if c.family == candidate.family and _is_same_but_for_position(c, candidate)]
-    before = max((c for c in others if c.where["place"] < place), key=lambda c: c.where["place"], default=None)
-    behind = min((c for c in others if c.where["place"] > place), key=lambda c: c.where["place"], default=None)
-    return [c for c in (before, behind) if c is not None]
+    alike = (c for c in case.candidates if c.family == candidate.family and _is_same_but_for_position(c, candidate))
+    others = [(c.position, c) for c in alike if c.position is not None]
+    before = max((x for x in others if x[0] < position), key=lambda x: x[0], default=None)
+    behind = min((x for x in others if x[0] > position), key=lambda x: x[0], default=None)
+    return [x[1] for x in (before, behind) if x is not None]
 
 
 def _is_same_but_for_position(first: Candidate, second: Candidate) -> bool:
-    """Whether two candidates of one effect have positions, and the same length, wavelength and so on."""
+    """Whether two candidates of one effect have the same length, wavelength and so on."""
     a, b = ({k: v for k, v in c.where.items() if k not in ("place", "sleeper")} for c in (first, second))
-    return _has_coordinate(first) and _has_coordinate(second) and a == b
-
-
-def _has_coordinate(candidate: Candidate) -> bool:
-    """Whether it is at a position in metres. Positions in words have no coordinate."""
-    return isinstance(candidate.where.get("place"), (int, float))
+    return a == b
 
 
 def restart_leader(search: Search, fit: Fit, score: Score) -> Score:

@@ -184,9 +184,7 @@ def _train_of(witness: SpaceEvidence) -> Any:
 
 
 def _location_of_candidate(score: Score) -> Location:
-    where = score.candidate.where
-    position = where.get("place")
-    position = position if isinstance(position, (int, float)) else None  # words have no coordinate
+    where, position = score.candidate.where, score.candidate.position
     return Location(
         score.candidate.frame, score.candidate.key, score.gain, position, position, position, where.get("sensor"),
         where.get("train"), where.get("axle"),

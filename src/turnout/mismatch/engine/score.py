@@ -55,7 +55,7 @@ class Score:
     @property
     def has_position(self) -> bool:
         """Whether it is at one position, not of the whole track, a train, a wheel or a sensor."""
-        return isinstance(self.candidate.where.get("place"), (int, float))
+        return self.candidate.position is not None
 
     @property
     def is_reportable(self) -> bool:
