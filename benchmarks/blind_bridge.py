@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from turnout.config.load import load_configuration, with_raw
+from turnout.config.campaign_notes import with_raw
+from turnout.config.load import load_configuration
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate_search import shortlist
 from turnout.mismatch.engine.diagnose import diagnose

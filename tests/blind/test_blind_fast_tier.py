@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from benchmarks.blind_bridge import finding_rows
 
-from turnout.config.load import load_configuration, with_raw
+from turnout.config.campaign_notes import with_raw
+from turnout.config.load import load_configuration
 from turnout_blind.archive import plan_of, read_archive, verify_archive, verify_recordings
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects

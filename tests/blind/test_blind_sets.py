@@ -10,7 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from turnout.config.load import load_configuration, with_raw
+from turnout.config.campaign_notes import with_raw
+from turnout.config.load import load_configuration
 from turnout.readers import read
 from turnout_blind.archive import read_archive, verify_archive, verify_recordings, write_archive
 from turnout_blind.campaign import stage

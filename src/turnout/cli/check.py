@@ -142,7 +142,7 @@ def _planned_events(events: Iterable[Event]) -> Iterator[str]:
 
 def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
-    from turnout.config.load import read_notes
+    from turnout.config.campaign_notes import read_notes
     from turnout.workflow.notes_check import note_contradictions
     from turnout.workflow.scan import scan
 
@@ -190,7 +190,7 @@ def _folders_without_turnout(configuration: Configuration, raw: Path) -> list[Pa
 
 def _report_readings(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print what the reading of one file per section gave; returns the number of faults."""
-    from turnout.config.load import with_raw
+    from turnout.config.campaign_notes import with_raw
     from turnout.stages.layout_reading import file_readings, sections_without_files
     from turnout.workflow.scan import scan
 

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _show(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
-    from turnout.config.load import sources
+    from turnout.config.configuration import sources
 
     configuration = load_configuration(args.configuration)
     configuration.turnout(args.turnout)

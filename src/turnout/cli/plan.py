@@ -105,7 +105,7 @@ def _print_gone(
 
 def _print_changes(turnout: TurnoutConfig, raw: Path, earlier: _EarlierResults, counts: dict[str, int]) -> int:
     """Print and count the new and changed units of one turnout; print the files left out and return their number."""
-    from turnout.config.load import read_notes
+    from turnout.config.campaign_notes import read_notes
     from turnout.workflow.notes import notes_of
     from turnout.workflow.plan import PlannedUnit
     from turnout.workflow.scan import scan, unit_id

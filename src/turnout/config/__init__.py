@@ -4,9 +4,10 @@
 ``with_raw(turnout, raw_root)`` adds the campaigns and trains that are listed in the raw folder.
 """
 
-from turnout.config.campaign_notes import unlisted_campaign
+from turnout.config.campaign_notes import unlisted_campaign, with_raw
+from turnout.config.configuration import Configuration
 from turnout.config.events import Event
-from turnout.config.load import Configuration, load_configuration, with_raw
+from turnout.config.load import load_configuration
 from turnout.config.turnout import Campaign, HammerConfig, PassageConfig, Section, TurnoutConfig
 
 __all__ = [

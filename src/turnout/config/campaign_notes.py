@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import date as day
 from datetime import datetime
 from pathlib import Path
@@ -10,7 +11,7 @@ from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
 from turnout.config.events import parse_utc, time_problem
 from turnout.config.frozen_mapping import Frozen
-from turnout.config.turnout import Campaign
+from turnout.config.turnout import Campaign, TurnoutConfig
 from turnout.errors import ReadError
 
 NOTE_FILES = ("campaigns.csv", "trains.csv")
@@ -102,6 +103,45 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
 
     errors = _read_rows(path, name, TRAIN_COLUMNS, 1, add_train, allow_others=True)
     return tuple(trains), errors
+
+
+def with_raw(turnout: TurnoutConfig, raw_root: Path) -> TurnoutConfig:
+    """The turnout with the campaigns and trains that are listed in its raw folder; invalid rows are left out.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    TurnoutConfig
+        A copy with the notes.
+    """
+    return read_notes(turnout, raw_root)[0]
+
+
+def read_notes(turnout: TurnoutConfig, raw_root: Path) -> tuple[TurnoutConfig, list[ReadError]]:
+    """The turnout with the campaigns and trains of its raw folder, and an error for each invalid row.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : Path
+        The raw root.
+
+    Returns
+    -------
+    tuple of (TurnoutConfig, list of ReadError)
+        A copy with the notes, and the errors.
+    """
+    folder = Path(raw_root) / turnout.raw
+    campaigns, campaign_errors = read_campaigns(folder / "campaigns.csv", f"{turnout.raw}/campaigns.csv")
+    trains, train_errors = read_trains(folder / "trains.csv", f"{turnout.raw}/trains.csv")
+    return replace(turnout, campaigns=Campaigns(campaigns), trains=trains), campaign_errors + train_errors
 
 
 class _CellError(Exception):

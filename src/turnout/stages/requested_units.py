@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from turnout.config import TurnoutConfig
-from turnout.config.load import read_notes
+from turnout.config.campaign_notes import read_notes
 from turnout.errors import ConfigError, ReadError
 from turnout.records import EMPTY_MAPPING, Unit
 from turnout.stages.hammer import hammer_config, hammer_unit

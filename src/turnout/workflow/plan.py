@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from turnout.config import Configuration, TurnoutConfig
-from turnout.config.load import read_notes
+from turnout.config.campaign_notes import read_notes
 from turnout.config.settings.fleet import FleetSettings
 from turnout.errors import ConfigError, ReadError
 from turnout.files import is_truncated, write_if_changed

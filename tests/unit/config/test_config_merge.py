@@ -5,8 +5,8 @@ import pickle
 import pytest
 
 from turnout.config import load_configuration, with_raw
+from turnout.config.configuration import sources
 from turnout.config.document import load, merge_branches, plain_values
-from turnout.config.load import sources
 from turnout.errors import ConfigError
 
 LAYOUT = """\
@@ -146,7 +146,7 @@ campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator
 
 
 def test_unsound_campaigns_are_said_and_the_others_used(folder, tmp_path):
-    from turnout.config.load import read_notes
+    from turnout.config.campaign_notes import read_notes
 
     (tmp_path / "raw/t1").mkdir(parents=True)
     (tmp_path / "raw/t1/campaigns.csv").write_text(CAMPAIGNS)
