@@ -14,10 +14,10 @@ from scipy.special import ndtri
 
 from turnout.registry.arrow_types import arrow_schema
 from turnout.registry.schema import tables
+from turnout.trend.detectable_change import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.epochs import by_epoch
 from turnout.trend.quantities import DAMPING_SCALE, is_damping
 from turnout.trend.residuals import first_epoch
-from turnout.trend.states import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.threshold import run_lengths
 from turnout.trend.times import timestamps
 

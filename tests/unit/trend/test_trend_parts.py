@@ -10,11 +10,11 @@ from scipy import stats
 
 from turnout.trend.baseline import fit_baseline, pooled_autocorrelation, spread_and_autocorrelation
 from turnout.trend.cusum import cusum
+from turnout.trend.detectable_change import campaigns_a_year
 from turnout.trend.drift import adjusted_p_values, slopes
 from turnout.trend.epochs import epochs_of
 from turnout.trend.forecast import crossing_interval, fit_line, forecast
 from turnout.trend.siblings import median_of_group, median_of_siblings
-from turnout.trend.states import campaigns_a_year
 
 
 def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
