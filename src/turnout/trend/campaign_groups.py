@@ -13,22 +13,22 @@ from turnout.trend.times import SECONDS_PER_DAY
 ISOLATED_FIRST_GAP = 5 * DAYS_PER_YEAR
 
 
-def keys_of(visits: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Row of visits and time combined in one sortable integer.
+def keys_of(calendar: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Number of the calendar and time combined in one sortable integer.
 
     Parameters
     ----------
-    visits : (n,) array of int
-        Row of ``Panel.time``.
+    calendar : (n,) array of int
+        Number of the calendar, the row of ``Panel.time``.
     time : (n,) array of float
         Time. [d]
 
     Returns
     -------
     (n,) array of int
-        Sorts by row of visits, then by time.
+        Sorts by calendar, then by time.
     """
-    return visits * 2**40 + np.round((time + 2e6) * SECONDS_PER_DAY).astype(np.int64)
+    return calendar * 2**40 + np.round((time + 2e6) * SECONDS_PER_DAY).astype(np.int64)
 
 
 def unique_of(key: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +52,7 @@ def unique_of(key: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def campaigns_of(
-    visits: np.ndarray, time: np.ndarray, gap: float, n_visits: int, resets: np.ndarray
+    calendar: np.ndarray, time: np.ndarray, gap: float, n_calendar: int, resets: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Group values in campaigns.
 
@@ -60,53 +60,53 @@ def campaigns_of(
 
     Parameters
     ----------
-    visits : (n,) array of int
-        Row of ``Panel.time`` of each value.
+    calendar : (n,) array of int
+        Number of the calendar of each value, its row of ``Panel.time``.
     time : (n,) array of float
         Time of each value. [d]
     gap : float
         Longest duration of a campaign. [d]
-    n_visits : int
-        Number of rows of ``Panel.time``.
+    n_calendar : int
+        Number of calendars, the rows of ``Panel.time``.
     resets : (n_reset,) array of int
         Sorted ``keys_of`` the events that reset charts.
 
     Returns
     -------
-    (n,) array of int, (n_visits, n_campaign) array of float
+    (n,) array of int, (n_calendar, n_campaign) array of float
         Number of the campaign of each row within its turnout, and start times [d], nan where there are fewer.
     """
     if not time.size:  # one empty column, so that later steps need no special case
-        return np.zeros(0, dtype=np.int64), np.full((n_visits, 1), np.nan)
-    stamp, row = unique_of(keys_of(visits, time))
-    visit, moment = stamp >> 40, (stamp & (2**40 - 1)) / SECONDS_PER_DAY - 2e6
-    new_turnout = np.diff(visit, prepend=-1) != 0
+        return np.zeros(0, dtype=np.int64), np.full((n_calendar, 1), np.nan)
+    stamp, row = unique_of(keys_of(calendar, time))
+    of_calendar, moment = stamp >> 40, (stamp & (2**40 - 1)) / SECONDS_PER_DAY - 2e6
+    new_turnout = np.diff(of_calendar, prepend=-1) != 0
     after_reset = np.diff(np.searchsorted(resets, stamp, side="right"), prepend=0) > 0
     new = split(new_turnout | after_reset | (np.diff(moment, prepend=0.0) > gap), moment, gap)
     running = np.cumsum(new) - 1
-    first = np.zeros(n_visits, dtype=np.int64)
-    first[visit[new_turnout]] = running[new_turnout]
-    number = running - first[visit]
-    starts = np.full((n_visits, int(number.max()) + 1), np.nan)
-    starts[visit[new], number[new]] = moment[new]
+    first = np.zeros(n_calendar, dtype=np.int64)
+    first[of_calendar[new_turnout]] = running[new_turnout]
+    number = running - first[of_calendar]
+    starts = np.full((n_calendar, int(number.max()) + 1), np.nan)
+    starts[of_calendar[new], number[new]] = moment[new]
     return number[row], starts
 
 
-def is_isolated_first(visits: np.ndarray, time: np.ndarray, gap: float, n_visits: int) -> np.ndarray:
+def is_isolated_first(calendar: np.ndarray, time: np.ndarray, gap: float, n_calendar: int) -> np.ndarray:
     """Which rows belong to a first campaign more than ``ISOLATED_FIRST_GAP`` before the next, if at least two follow.
 
     A baseline that begins with it would last a year without a value in summer.
 
     Parameters
     ----------
-    visits : (n,) array of int
-        Row of ``Panel.time`` of each value.
+    calendar : (n,) array of int
+        Number of the calendar of each value, its row of ``Panel.time``.
     time : (n,) array of float
         Time of each value. [d]
     gap : float
         Longest duration of a campaign. [d]
-    n_visits : int
-        Number of rows of ``Panel.time``.
+    n_calendar : int
+        Number of calendars, the rows of ``Panel.time``.
 
     Returns
     -------
@@ -118,14 +118,14 @@ def is_isolated_first(visits: np.ndarray, time: np.ndarray, gap: float, n_visits
     >>> is_isolated_first(np.zeros(4, int), np.array([0.0, 9000.0, 1.0, 9007.0]), 1.5, 1)
     array([ True, False,  True, False])
     """
-    first, second = np.full((2, n_visits), np.inf)
-    last = np.full(n_visits, -np.inf)
-    np.minimum.at(first, visits, time)
-    early = time <= first[visits] + gap
-    np.minimum.at(second, visits[~early], time[~early])
-    np.maximum.at(last, visits, time)
+    first, second = np.full((2, n_calendar), np.inf)
+    last = np.full(n_calendar, -np.inf)
+    np.minimum.at(first, calendar, time)
+    early = time <= first[calendar] + gap
+    np.minimum.at(second, calendar[~early], time[~early])
+    np.maximum.at(last, calendar, time)
     lone = (second > first + ISOLATED_FIRST_GAP) & (last > second + gap)
-    return early & lone[visits]
+    return early & lone[calendar]
 
 
 def split(new: np.ndarray, moment: np.ndarray, gap: float) -> np.ndarray:

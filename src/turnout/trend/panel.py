@@ -39,14 +39,16 @@ WHOLE_TURNOUT = "*"
 
 @dataclass(frozen=True)
 class Panel:
-    """Values of charts x campaigns. A chart is one section, band and source; a campaign is one visit to its turnout.
+    """Values of charts x campaigns. A chart is one section, band and source.
+
+    A calendar is the sequence of the campaigns of one turnout and source.
 
     Parameters
     ----------
     charts : DataFrame
         ``turnout_id, band, source, section_id``, sorted; ``group`` numbers turnout, band and source (the
-        siblings of a chart share it) and ``visits`` the row of ``time``.
-    time : (n_visits, n_campaign) array of float
+        siblings of a chart share it) and ``calendar`` numbers turnout and source.
+    time : (n_calendar, n_campaign) array of float
         Start of each campaign, nan where the turnout had fewer. [d since 1970-01-01]
     frequency, error, temperature : (n_chart, n_campaign) arrays of float
         Natural frequency and its standard error [Hz], rail temperature [°C]; nan where not known.
@@ -67,7 +69,7 @@ class Panel:
     @property
     def chart_time(self) -> np.ndarray:
         """(n_chart, n_campaign) time of each cell. [d]"""
-        return self.time[self.charts["visits"].to_numpy()]
+        return self.time[self.charts["calendar"].to_numpy()]
 
 
 def panel_of(
@@ -157,12 +159,12 @@ def lay_out(
     has_value = np.isfinite(frequency) & (frequency > 0.0)
     charts = charts.assign(
         group=charts.groupby(CHART_KEYS[:3], sort=True, observed=True).ngroup().to_numpy(),
-        visits=charts.groupby(["turnout_id", "source"], sort=True, observed=True).ngroup().to_numpy(),
+        calendar=charts.groupby(["turnout_id", "source"], sort=True, observed=True).ngroup().to_numpy(),
     )
-    visits, gap = charts["visits"].to_numpy(), settings.campaign_gap_hours / 24.0
-    n_visits = int(visits.max()) + 1 if len(visits) else 0
+    calendar, gap = charts["calendar"].to_numpy(), settings.campaign_gap_hours / 24.0
+    n_calendar = int(calendar.max()) + 1 if len(calendar) else 0
     use = is_believable & has_value
-    is_believable[use] = ~is_isolated_first(visits[chart[use]], time[use], gap, n_visits)
+    is_believable[use] = ~is_isolated_first(calendar[chart[use]], time[use], gap, n_calendar)
     use &= is_believable
     is_left_out = ~use
     left_out = charts[CHART_KEYS].iloc[chart[is_left_out]].reset_index(drop=True)
@@ -172,7 +174,7 @@ def lay_out(
         chart, time = chart[use], time[use]
         frequency, error, temperature = frequency[use], error[use], temperature[use]
     resets = _reset_keys(charts, events)
-    column, starts = campaigns_of(visits[chart], time, gap, n_visits, resets)
+    column, starts = campaigns_of(calendar[chart], time, gap, n_calendar, resets)
     order = _write_order(chart, column, starts.shape[1], time)
     cell = (chart[order], column[order])
 
@@ -213,12 +215,12 @@ def _charts(rows: pd.DataFrame) -> tuple[pd.DataFrame, np.ndarray]:
 
 
 def _reset_keys(charts: pd.DataFrame, events: pd.DataFrame | None) -> np.ndarray:
-    """Sorted ``keys_of`` the events that reset charts, for every row of visits."""
+    """Sorted ``keys_of`` the events that reset charts, of every calendar."""
     if events is None or not len(events):
         return np.zeros(0, dtype=np.int64)
     flags = zip(events["resets_ballast"], events["resets_railpad"])
     resetting = np.array([is_true(ballast) or is_true(railpad) for ballast, railpad in flags])
     resets = events[resetting & events["event_at_utc"].notna().to_numpy()]
-    rows = charts[["turnout_id", "visits"]].drop_duplicates().astype({"turnout_id": object})
+    rows = charts[["turnout_id", "calendar"]].drop_duplicates().astype({"turnout_id": object})
     pairs = rows.merge(resets[["turnout_id", "event_at_utc"]].astype({"turnout_id": object}), on="turnout_id")
-    return np.sort(keys_of(pairs["visits"].to_numpy(dtype=np.int64), days(pairs["event_at_utc"])))
+    return np.sort(keys_of(pairs["calendar"].to_numpy(dtype=np.int64), days(pairs["event_at_utc"])))

@@ -53,7 +53,7 @@ def chart_status(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     mask = present & np.isfinite(charts.residual) & is_temperature_known(charts)
     slope, error, p_value = slopes(charts.residual, p.time, mask, charts.autocorrelation)
     is_too_short = span(p.time, mask) < settings.drift_days
-    status = p.charts.drop(columns=["group", "visits"]).copy()
+    status = p.charts.drop(columns=["group", "calendar"]).copy()
     status["last_measured_at_utc"] = timestamps(np.where(np.isfinite(last), last, np.nan))
     status["n_campaigns"] = measured.sum(axis=1)
     status["campaigns_per_year"] = campaigns
