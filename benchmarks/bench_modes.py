@@ -98,7 +98,7 @@ def mistaken_modes():
         for number in range(N_COMPLEX):
             modes, decays = complex_section(number)
             model = identify(list(decays), RATE, SETTINGS)
-            reasons = [*model.rejections, *(r for _, r in model.diagnostics["dropped_impacts"])]
+            reasons = [*model.rejections, *(r for _, r in model.diagnostics["rejected_impacts"])]
             failed += any("identification fail" in (r.detail or "") for r in reasons)
             for mode in model.modes:
                 n_mode += 1

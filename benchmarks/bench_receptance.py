@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks import hammer_blows as blows
+from benchmarks import hammer_impacts as simulated
 from benchmarks import off_axis
 from benchmarks.bar import Bar, stopwatch
 from turnout.config.settings.receptance import ReceptanceSettings
@@ -31,7 +31,7 @@ def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
     rng = np.random.default_rng(17)
     n_named = n_faulty = n_alarms = n_sound = 0
     for _ in range(N_TEST):
-        impacts = find_impacts(blows.test_of(rng, fault, tips=tips, noise=noise), "hammer", "rail")
+        impacts = find_impacts(simulated.test_of(rng, fault, tips=tips, noise=noise), "hammer", "rail")
         sound_impacts = impacts if fault is None else impacts[:-1]
         n_alarms += sum(bool(i.rejections or i.notes) for i in sound_impacts)
         n_sound += len(sound_impacts)
@@ -42,11 +42,11 @@ def detection_rates(fault, tips=(1e-4, 3e-3), noise=(1e-3, 1e-2), reason=None):
 
 
 def impact_quality():
-    detected, alarms, n, m = detection_rates(blows.second_impact, reason="double_hit")
+    detected, alarms, n, m = detection_rates(simulated.second_impact, reason="double_hit")
     yield Bar("second hits found", detected, 0.99, sense=">=", n=f"n={n}")
     yield Bar("findings on accepted impacts of the same tests", alarms, 0.01, n=f"n={m}")
     for name in ("hard_clip", "analog_clip", "soft_clip"):
-        fault = getattr(blows, name)
+        fault = getattr(simulated, name)
         detected, alarms, n, m = detection_rates(fault, reason="overload")
         yield Bar(f"{name.replace('_', ' ')} found, tips 0.1-3 ms", detected, 0.95, sense=">=", n=f"n={n}")
         short, _, n, _ = detection_rates(fault, (1e-4, 3e-4), reason="overload")
@@ -56,11 +56,13 @@ def impact_quality():
     yield Bar("findings on quiet 12-bit channels without noise", alarms, 0.01, n=f"n={m}")
     rng, clipped = np.random.default_rng(3), []
     for _ in range(100):
-        recordings = blows.test_of(rng, None, tips=(5e-4, 3e-3))
+        recordings = simulated.test_of(rng, None, tips=(5e-4, 3e-3))
         samples = recordings[-1].samples.copy()
         limit = rng.uniform(0.5, 0.9) * np.max(np.abs(samples[1]))
         samples[1] = np.clip(samples[1], -limit, limit)
-        last = find_impacts([*recordings[:-1], Recording(samples, blows.RATE, blows.CHANNELS)], "hammer", "rail")[-1]
+        last = find_impacts(
+            [*recordings[:-1], Recording(samples, simulated.RATE, simulated.CHANNELS)], "hammer", "rail"
+        )[-1]
         clipped.append("overload" in {r.reason for r in last.rejections})
     yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n=100")
 
@@ -68,14 +70,14 @@ def impact_quality():
 def windowed_receptance(settings, noise=0.0):
     """(receptance, pole, residue) of a 150 Hz mode with 0.3 % damping in 0.2 s: 59 % of it remains at the end."""
     pole, residue = -0.003 * 2 * np.pi * 150 + 2j * np.pi * 150, 0.7 - 0.4j
-    t = np.arange(4000) / blows.RATE
+    t = np.arange(4000) / simulated.RATE
     response = np.real(residue * np.exp(pole * t))
     rng, recordings = np.random.default_rng(2), []
     for k in range(10):
         force = rng.uniform(800, 1200) * force_pulse("half-sine", t - 5e-3, 1.5e-3)
         answer = np.convolve(force, response)[:4000]
         answer += noise * np.max(answer) * rng.standard_normal(4000)
-        recordings.append(Recording(np.stack([force, answer]), blows.RATE, blows.CHANNELS, record=k))
+        recordings.append(Recording(np.stack([force, answer]), simulated.RATE, simulated.CHANNELS, record=k))
     return receptance_of(find_impacts(recordings, "hammer", "rail", settings), settings), pole, residue
 
 
@@ -84,12 +86,12 @@ def fit_mode(result, decay):
     is_near = (result.frequency > 100) & (result.frequency < 200)
     f = result.frequency[is_near]
     h = result.h1[is_near] * (2j * np.pi * f + decay) ** 2
-    q = np.exp(-2j * np.pi * f / blows.RATE)
+    q = np.exp(-2j * np.pi * f / simulated.RATE)
     rows = np.stack([np.ones_like(q), q, -q * h, -(q**2) * h], axis=1)
     system = np.concatenate([rows.real, rows.imag]), np.concatenate([h.real, h.imag])
     b0, b1, a1, a2 = np.linalg.lstsq(*system, rcond=None)[0]
     z = next(r for r in np.roots([1.0, a1, a2]) if r.imag > 0)
-    return np.log(z) * blows.RATE, 2.0 * (b0 * z + b1) / (z - np.conj(z))
+    return np.log(z) * simulated.RATE, 2.0 * (b0 * z + b1) / (z - np.conj(z))
 
 
 def windows_and_gate():
@@ -104,7 +106,7 @@ def windows_and_gate():
     yield Bar("   the same damping left uncorrected", 100 * abs(raw / truth - 1), unit="%", sense="")
     yield Bar("lowest line (0 Hz masked)", result.frequency[0], 5.0, "Hz", ">=", note="one line spacing")
     rng = np.random.default_rng(4)
-    impacts = find_impacts(blows.test_of(rng, None, tips=(1e-3, 2e-3), noise=(3e-3, 1e-2)), "hammer", "rail")
+    impacts = find_impacts(simulated.test_of(rng, None, tips=(1e-3, 2e-3), noise=(3e-3, 1e-2)), "hammer", "rail")
     r = receptance_of(impacts)
     h1, hv, h2 = np.abs(r.h1), np.abs(r.hv), np.abs(r.h2)
     inside = np.mean((h1 <= hv * (1 + 1e-9)) & (hv <= h2 * (1 + 1e-9)))
@@ -144,7 +146,7 @@ def best_subset():
 
 def speed():
     rng = np.random.default_rng(6)
-    sections = [blows.test_of(rng, None, n_impact=30, tips=(1e-3, 2e-3)) for _ in range(8)]
+    sections = [simulated.test_of(rng, None, n_impact=30, tips=(1e-3, 2e-3)) for _ in range(8)]
     with stopwatch() as finding:
         tests = [find_impacts(recordings, "hammer", "rail") for recordings in sections]
     yield Bar("part of the hammer test: 8 x 30 impacts of 4,000 samples found and judged", finding.cpu, 1.0, "CPU s")

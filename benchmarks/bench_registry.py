@@ -1,4 +1,4 @@
-"""Size, registering, questions on 29 million rows, race, re-run, storage version, refusals, empty registry.
+"""Size, registering, questions on 29 million rows, race, re-run, storage version, rejected rows, empty registry.
 
 CPU seconds, best of three, warm. TURNOUT_BENCH_SHARE (default 1) scales the network for a quick look.
 """
@@ -29,7 +29,7 @@ REGISTER = (
     "import sys, glob, time, resource; from turnout.registry.job import register;"
     "from turnout.workflow.batches import read_results; b = sorted(glob.glob(sys.argv[1] + '/*.parquet'));"
     "t = time.process_time(); d = register(b, sys.argv[2], read=read_results); c = time.process_time() - t;"
-    "print(c, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, d.n_units, d.n_refused)"
+    "print(c, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, d.n_units, d.n_rejected)"
 )
 
 
@@ -44,7 +44,7 @@ def bars():
 
 
 def _register_in_own_process(work, registry):
-    """(CPU s, GB, units, refused) of a cold process."""
+    """(CPU s, GB, units, rejected rows) of a cold process."""
     out = subprocess.run(
         [sys.executable, "-c", REGISTER, str(work), str(registry)], capture_output=True, text=True, check=True
     ).stdout.split()
@@ -101,13 +101,13 @@ def _ask(registry, sql):
 
 
 def empty_registry(folder):
-    """An empty registry here; refusals by the tests of each case."""
+    """An empty registry here; rejected rows by the tests of each case."""
     register([], folder / "registry", read=iter)
     failed = sum(_fails(folder / "registry", call) for call in views())
     yield Bar("views and macros that fail on an empty registry", failed, 0, "", n=f"of {len(views())}")
-    tests = Path(__file__).resolve().parents[1] / "tests" / "unit" / "registry" / "test_registry_refusals.py"
+    tests = Path(__file__).resolve().parents[1] / "tests" / "unit" / "registry" / "test_registry_rejected_rows.py"
     result = subprocess.run([sys.executable, "-m", "pytest", "-q", "-x", str(tests)], capture_output=True, text=True)
-    yield Bar("refusals that fail", result.returncode, 0, "", n=result.stdout.strip().splitlines()[-1])
+    yield Bar("rejected rows that fail", result.returncode, 0, "", n=result.stdout.strip().splitlines()[-1])
 
 
 ARGUMENTS = {

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import fftconvolve
 
-from benchmarks.hammer_blows import CHANNELS, N_SAMPLE, RATE, TIME, TRIGGER, digitise
+from benchmarks.hammer_impacts import CHANNELS, N_SAMPLE, RATE, TIME, TRIGGER, digitise
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test import find_impacts

@@ -51,9 +51,12 @@ def messages(path):
 
 
 def texts(repository):
-    """(place, text) of README, docs, pages and messages; decision pages may speak of former words."""
-    pages = (repository / "src" / "turnout" / "report" / "templates").glob("*.html")
-    for path in [repository / "README.md", *(repository / "docs").glob("*.md"), *pages]:
+    """(place, text) of README, docs, pages, views, settings and messages; decision pages may speak of former words."""
+    package, docs = repository / "src" / "turnout", repository / "docs"
+    pages = (package / "report" / "templates").glob("*.html")
+    registry = [package / "registry" / "columns.csv", *(package / "registry" / "views").glob("*.sql")]
+    settings = (repository / "config").rglob("*.yaml")
+    for path in [repository / "README.md", *docs.glob("*.md"), *pages, *registry, *settings]:
         if path.name != "glossary.md":
             yield path.name, path.read_text(encoding="utf-8")
     for path in sorted((repository / "src" / "turnout").rglob("*.py")):

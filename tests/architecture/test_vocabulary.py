@@ -29,11 +29,18 @@ NO_NOUNS = frozenset(
 )
 # Words of the private dialect of former versions, and the term of docs/glossary.md that replaces each.
 DIALECT = {
+    "bang": "impact",
+    "bangs": "impacts",
     "blow": "impact",
     "blows": "impacts",
     "foretell": "predict",
     "foretold": "predicted",
     "mended": "fixed",
+    "refusal": "rejection",
+    "refusals": "rejections",
+    "refuse": "reject",
+    "refused": "rejected",
+    "refuses": "rejects",
     "struck": "position of an impact",
     "unforetold": "unpredicted",
     "whereabouts": "localization",
@@ -130,15 +137,29 @@ def test_every_module_is_named_by_a_noun(repository):
     assert not wrong, "\n".join(wrong)
 
 
+# Tests and benchmarks of the diagnosis, whose names still have words of former versions.
+FORMER_TESTS = ("tests/blind/", "tests/unit/mismatch/")
+
+
+def scripts(repository):
+    """(path, tree) of every module of the packages, the tests, the benchmarks and the examples."""
+    for folder in ("src", "tests", "benchmarks", "examples"):
+        for path in sorted((repository / folder).rglob("*.py")):
+            name = path.relative_to(repository).as_posix()
+            if not name.startswith(FORMER_TESTS):
+                yield name, tree_of(path)
+
+
 @cache
 def names(repository):
-    """Name -> the first place where it stands, of all variables, functions, classes and arguments."""
+    """Name -> the first place where it stands, of all modules, variables, functions, classes and arguments."""
     table = {}
-    for path, tree in modules(repository):
+    for path, tree in scripts(repository):
+        table.setdefault(path.rsplit("/", 1)[-1].removesuffix(".py"), path)
         for node in ast.walk(tree):
             name = getattr(node, "id", None) or getattr(node, "name", None) or getattr(node, "arg", None)
             if isinstance(name, str):
-                table.setdefault(name, f"src/{path}:{getattr(node, 'lineno', 0)}")
+                table.setdefault(name, f"{path}:{getattr(node, 'lineno', 0)}")
     return table
 
 

@@ -45,7 +45,7 @@ def said(done):
 def fleet(tmp_path_factory, repository):
     folder = tmp_path_factory.mktemp("diagnosed")
     config = small.lay_out(folder, repository)
-    small.strike(folder, small.soft_pad)
+    small.write_hammer_tests(folder, small.soft_pad)
     (config / "turnouts.tsv").write_text("turnout\tlayout\nt1\tsmall\nt2\tsmall\nt3\tsmall\n")
     for name in ("t2", "t3"):
         shutil.copytree(folder / "raw/t1", folder / "raw" / name)
@@ -87,7 +87,7 @@ def test_a_setting_asks_for_one_turnout_alone(fleet):
 
 
 def test_a_new_campaign_is_a_new_visit_and_the_old_one_stays(fleet):
-    small.strike(fleet, small.soft_pad, day=small.DAY.replace(month=9), seed=9, turnout="t2")
+    small.write_hammer_tests(fleet, small.soft_pad, day=small.DAY.replace(month=9), seed=9, turnout="t2")
     assert said(run(fleet))[1] == 1
     found = {r for r in toy.rows(fleet)["mismatch_findings"] if "t2" in r}
     assert {v for r in found for v in r} >= {"2026-07-25", "2026-09-25"}

@@ -229,7 +229,7 @@ def _impact_rows(connection: duckdb.DuckDBPyConnection, truth: Path) -> Iterator
     """How many of the double and overloaded impacts were rejected."""
     for fault, words in IMPACT_FAULTS.items():
         n_true = n_rejected = 0
-        for path in sorted((truth / "blows").glob("*.json")):
+        for path in sorted((truth / "impacts").glob("*.json")):
             turnout, day, section = path.stem.rsplit("_", 2)
             for impact in json.loads(path.read_text(encoding="utf-8")):
                 if impact["fault"] == fault and not impact["file_fault"]:

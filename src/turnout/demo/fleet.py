@@ -145,8 +145,8 @@ def _make_tests(job: Job) -> int:
         impacts += [asdict(impact) | {"file_fault": fault} for impact in truths if impact.fault or fault]
     if impacts:
         name = f"{scenario.turnout}_{day.isoformat()}_{section}.json"
-        (Path(truth) / "blows").mkdir(parents=True, exist_ok=True)
-        (Path(truth) / "blows" / name).write_text(json.dumps(impacts))
+        (Path(truth) / "impacts").mkdir(parents=True, exist_ok=True)
+        (Path(truth) / "impacts" / name).write_text(json.dumps(impacts))
     return 3
 
 

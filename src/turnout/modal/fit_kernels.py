@@ -139,7 +139,7 @@ def iterate_common(
     columns: np.ndarray,
     power_sums: np.ndarray,
     dof: int,
-    dropped_power: float,
+    omitted_power: float,
     iterations: int,
     tolerance: float,
     limits: tuple[float, float, float, float],
@@ -158,7 +158,7 @@ def iterate_common(
         As in :func:`~turnout.modal.wave_kernels.fit_waves`.
     dof : int
         Degrees of freedom of the residual.
-    dropped_power : float
+    omitted_power : float
         Sum of squares that is not in the decays.
     iterations, tolerance
         As in ``fit_common``.
@@ -183,7 +183,7 @@ def iterate_common(
             gain += step[i] * score[i]
             scale = min(scale, limits[i % 2] / max(abs(step[i]), SMALLEST))
         rss = fit[3].sum()
-        size = np.sqrt(max(0.0, gain) / max((rss + dropped_power) / dof, SMALLEST))
+        size = np.sqrt(max(0.0, gain) / max((rss + omitted_power) / dof, SMALLEST))
         is_better = False
         trial, moved, candidate = mean, 0.0, fit
         for _ in range(MAX_REDUCTIONS):

@@ -67,7 +67,7 @@ def identify(
     Notes
     -----
     If the estimator itself fails, one impact at a time is left out, the least typical one first. The impact without
-    which it succeeds is among ``dropped_impacts``. If there is none, the model is rejected with the failure.
+    which it succeeds is among ``rejected_impacts``. If there is none, the model is rejected with the failure.
     """
     method = settings.method if method is None else method
     if method not in METHODS:
@@ -96,9 +96,9 @@ def _identify_without_one(
     options: dict[str, Any],
     error: Exception,
 ) -> ModalModel:
-    """A model that reports the impact without which the estimator succeeds as dropped, else a rejected model.
+    """A model that reports the impact without which the estimator succeeds as rejected, else a rejected model.
 
-    The caller fits again without the dropped impact, so the numbers of the impacts are those of the full list.
+    The caller fits again without the rejected impact, so the numbers of the impacts are those of the full list.
     """
     failure = f"{type(error).__name__}: {error}"
     for k in _least_typical_first(decays) if len(decays) > MIN_IMPACTS_LEFT else ():
@@ -113,7 +113,7 @@ def _identify_without_one(
         rejection = Rejection("odd_one_out", None, None, f"the identification fails with this impact ({failure})")
         return _with_test_numbers(model, kept, (k, rejection))
     reason = Rejection("not_identified", None, None, f"the identification failed ({failure})")
-    return no_model(rate, method, (reason,), {"dropped_impacts": ()})
+    return no_model(rate, method, (reason,), {"rejected_impacts": ()})
 
 
 def _least_typical_first(decays: Sequence[np.ndarray]) -> list[int]:
@@ -124,7 +124,7 @@ def _least_typical_first(decays: Sequence[np.ndarray]) -> list[int]:
     return np.argsort(unit @ unit.mean(axis=0), kind="stable").tolist()
 
 
-def _with_test_numbers(model: ModalModel, impacts: Sequence[int], dropped: tuple[int, Rejection]) -> ModalModel:
+def _with_test_numbers(model: ModalModel, impacts: Sequence[int], rejected: tuple[int, Rejection]) -> ModalModel:
     """A model of some impacts of a test, with the numbers that the impacts have in the test.
 
     Parameters
@@ -133,7 +133,7 @@ def _with_test_numbers(model: ModalModel, impacts: Sequence[int], dropped: tuple
         Model whose impacts are numbered from 0.
     impacts : sequence of int
         Number in the test of each of them.
-    dropped : (int, Rejection)
+    rejected : (int, Rejection)
         Number of the impact that was left out, and why.
 
     Returns
@@ -143,9 +143,9 @@ def _with_test_numbers(model: ModalModel, impacts: Sequence[int], dropped: tuple
     """
     per_impact = tuple({**row, "impact": impacts[row["impact"]]} for row in model.per_impact)
     diagnostics = dict(model.diagnostics)
-    diagnostics["dropped_impacts"] = (
-        *((impacts[i], rejection) for i, rejection in diagnostics.get("dropped_impacts", ())),
-        dropped,
+    diagnostics["rejected_impacts"] = (
+        *((impacts[i], rejection) for i, rejection in diagnostics.get("rejected_impacts", ())),
+        rejected,
     )
     if "impacts" in diagnostics:
         diagnostics["impacts"] = tuple(impacts[i] for i in diagnostics["impacts"])

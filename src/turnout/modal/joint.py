@@ -1,6 +1,6 @@
 """Identify all resonances of a test together from its unfiltered decays, and build the modal model.
 
-The steps: cut the decays to one length, select the modes, drop outlier impacts, assign modes to bands, average over
+The steps: cut the decays to one length, select the modes, reject outlier impacts, assign modes to bands, average over
 the impacts. The model also holds the error of the choice between explanations, the stabilisation table and the noise.
 """
 
@@ -63,7 +63,7 @@ def stabilisation_rows(selection: Selection, tolerance: float) -> tuple[dict, ..
 
 
 def fit_diagnostics(
-    selection: Selection, index: Sequence[int] | np.ndarray, dropped: Sequence[tuple[int, Rejection]]
+    selection: Selection, index: Sequence[int] | np.ndarray, rejected: Sequence[tuple[int, Rejection]]
 ) -> dict:
     """Diagnostics of the fit.
 
@@ -73,7 +73,7 @@ def fit_diagnostics(
         Modes of the test and their fit.
     index : (n_impact,) array of int
         Numbers of the impacts in the fit.
-    dropped : sequence of (int, Rejection)
+    rejected : sequence of (int, Rejection)
         Impacts that are not in it.
 
     Returns
@@ -81,7 +81,7 @@ def fit_diagnostics(
     dict
         Entries of ``ModalModel.diagnostics``; only the impacts where there is no fit.
     """
-    diagnostics = {"impacts": tuple(int(i) for i in index), "dropped_impacts": tuple(dropped)}
+    diagnostics = {"impacts": tuple(int(i) for i in index), "rejected_impacts": tuple(rejected)}
     fit = selection.fit
     if fit is None:
         return diagnostics
@@ -107,7 +107,7 @@ def outlier_impacts(residual_power: np.ndarray) -> list[tuple[int, Rejection]]:
     """Impacts whose residual is three times (in power nine) that of the median impact.
 
     The power of white noise over some hundred samples is known to ten per cent, so such a ratio is not due to chance.
-    Empty where more than a third would be dropped: then the model is wrong.
+    Empty where more than a third would be rejected: then the model is wrong.
 
     Parameters
     ----------
@@ -153,27 +153,27 @@ def common_length(
     usable : (n_usable, n) array of float
     index : (n_usable,) array of int
         Index of each in ``decays``.
-    dropped : list of (index, Rejection)
+    rejected : list of (index, Rejection)
     """
     target_length, min_length = round(settings.duration * rate), round(settings.shortest_decay * rate)
-    usable, dropped = [], []
+    usable, rejected = [], []
     for i, decay in enumerate(decays):
         decay = np.asarray(decay, dtype=float)
         if len(decay) < min_length:
-            dropped.append((i, Rejection("late", len(decay) / rate, settings.shortest_decay, "decay too short [s]")))
+            rejected.append((i, Rejection("late", len(decay) / rate, settings.shortest_decay, "decay too short [s]")))
         elif not np.all(np.isfinite(decay[:target_length])):
             first_bad = int(np.argmin(np.isfinite(decay)))
-            dropped.append(
+            rejected.append(
                 (i, Rejection("not_finite", first_bad, None, "first sample of the decay that is not finite"))
             )
         elif np.ptp(decay[:target_length]) == 0.0:
-            dropped.append((i, Rejection("dead_channel", 0.0, 0.0, "the decay is constant")))
+            rejected.append((i, Rejection("dead_channel", 0.0, 0.0, "the decay is constant")))
         else:
             usable.append((i, decay))
     if not usable:
-        return np.empty((0, 0)), np.empty(0, dtype=int), dropped
+        return np.empty((0, 0)), np.empty(0, dtype=int), rejected
     n = min(target_length, *(len(d) for _, d in usable))
-    return np.array([d[:n] for _, d in usable]), np.array([i for i, _ in usable]), dropped
+    return np.array([d[:n] for _, d in usable]), np.array([i for i, _ in usable]), rejected
 
 
 def identify_joint(
@@ -208,16 +208,16 @@ def identify_joint(
     ModalModel
         Status "rejected" with reasons where no mode is identified.
     """
-    records, index, dropped = common_length(decays, rate, settings)
+    records, index, rejected = common_length(decays, rate, settings)
     if not len(records):
-        return no_decays(rate, "joint", dropped)
-    selection, records, index, dropped = _select_without_outliers(records, index, dropped, rate, settings)
+        return no_decays(rate, "joint", rejected)
+    selection, records, index, rejected = _select_without_outliers(records, index, rejected, rate, settings)
     pair = None if second is None or selection.fit is None else second_records(second, index, records.shape[1])
     if pair is not None:
         selection = with_second_response(selection, records, pair, rate, settings)
     choice = choose_bands(selection, settings, receptance)
     estimates, modes = _band_modes(selection, choice, records, index, rate, settings)
-    diagnostics = fit_diagnostics(selection, index, dropped) | {"responses": 1 + (pair is not None)}
+    diagnostics = fit_diagnostics(selection, index, rejected) | {"responses": 1 + (pair is not None)}
     model_fields: dict[str, Any] = {
         "rejections": tuple(choice.rejections),
         "rejected_modes": tuple(choice.rejected_modes),
@@ -244,7 +244,7 @@ def identify_joint(
 def _select_without_outliers(
     records: np.ndarray,
     index: np.ndarray,
-    dropped: list[tuple[int, Rejection]],
+    rejected: list[tuple[int, Rejection]],
     rate: float,
     settings: IdentifySettings,
 ) -> tuple[Selection, np.ndarray, np.ndarray, list[tuple[int, Rejection]]]:
@@ -253,10 +253,10 @@ def _select_without_outliers(
     outliers = [] if selection.fit is None else outlier_impacts(selection.residual_power)
     if outliers:
         rows = [row for row, _ in outliers]
-        dropped = [*dropped, *((int(index[row]), rejection) for row, rejection in outliers)]
+        rejected = [*rejected, *((int(index[row]), rejection) for row, rejection in outliers)]
         records, index = np.delete(records, rows, axis=0), np.delete(index, rows)
         selection = select_modes(records, rate, settings)
-    return selection, records, index, dropped
+    return selection, records, index, rejected
 
 
 def _band_modes(

@@ -127,14 +127,14 @@ def fit_common(
         Ln f [Hz] and zeta of each mode; whether the fit converged.
     """
     dof = degrees_of_freedom(decays, len(start), len(drift))
-    decays, dropped_power = _principal_decays(decays)
+    decays, omitted_power = _principal_decays(decays)
     # At the first use, since numba takes a third of a second to import.
     from turnout.modal.fit_kernels import iterate_common
 
     theta, group = group_decays(np.asarray(start, dtype=float)[None], decays)
     terms = power_sums(group.shape[-1])
     mean, _, converged = iterate_common(
-        theta[0], rate, group, contiguous(drift), terms, dof, dropped_power, iterations, tolerance, LIMITS
+        theta[0], rate, group, contiguous(drift), terms, dof, omitted_power, iterations, tolerance, LIMITS
     )
     return mean, converged
 

@@ -34,7 +34,7 @@ class Candidate:
 
 
 MAX_SCREENING_PROBABILITY = (
-    0.01  # probability of being absent above which all modes are dropped at once, not one by one
+    0.01  # probability of being absent above which all modes are removed at once, not one by one
 )
 MIN_LISTED_PRESENCE = 0.2  # share of orders and starts from which on a rejected pole is listed
 # During the search a fit within a tenth of the errors of single impacts is accurate enough to choose modes.
@@ -128,7 +128,7 @@ class ModeSearch:
     """Search for the candidates that are modes of the decays of a test.
 
     ``decays`` (n_decay, n) [m/s²] at ``rate`` [Hz]; ``columns`` (n_column, n) of the background; ``settings`` of the
-    identification. ``rejected`` are rows of rejected candidates, to which those that are dropped here are added.
+    identification. ``rejected`` are rows of rejected candidates, to which those that are removed here are added.
     """
 
     decays: np.ndarray
@@ -156,13 +156,13 @@ class ModeSearch:
             sigma2 = linearisation.rss.sum() / degrees_of_freedom(self.decays, len(candidates), len(self.columns))
             probability = common_probability(mode_chi_squared(linearisation, sigma2))
             is_clear = probability > MAX_SCREENING_PROBABILITY
-            dropped = set(np.flatnonzero(is_clear).tolist()) or {int(np.argmax(probability))}
-            dropped = {m for m in dropped if probability[m] > limit}
-            if not dropped:
+            absent = set(np.flatnonzero(is_clear).tolist()) or {int(np.argmax(probability))}
+            absent = {m for m in absent if probability[m] > limit}
+            if not absent:
                 break
-            for m in sorted(dropped):
+            for m in sorted(absent):
                 self.rejected.append(rejection(candidates[m], "not significant", probability[m], limit))
-            candidates = [c for m, c in enumerate(candidates) if m not in dropped]
+            candidates = [c for m, c in enumerate(candidates) if m not in absent]
         return candidates
 
     def fit_and_prune(
@@ -172,7 +172,7 @@ class ModeSearch:
         max_damping: float | None = None,
         indispensable: set[int] | None = None,
     ) -> tuple[MixedFit | None, list[Candidate]]:
-        """Maximum likelihood with all modes; drops the worst mode that fails a test until none does.
+        """Maximum likelihood with all modes; removes the worst mode that fails a test until none does.
 
         The fits have the accuracy of ``SEARCH_OPTIONS``, enough to choose modes.
 

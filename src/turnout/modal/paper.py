@@ -254,16 +254,16 @@ def identify_paper(
     ModalModel
         Its ``diagnostics`` hold ``simulated_bias`` per band and ``bias_words``, the same to print.
     """
-    records, index, dropped = common_length(decays, rate, settings)
+    records, index, rejected = common_length(decays, rate, settings)
     if not len(records):
-        return no_decays(rate, "paper", dropped)
+        return no_decays(rate, "paper", rejected)
     lead_ins = [np.asarray(leads[i], dtype=float) if leads is not None else np.empty(0) for i in index]
     full_records = [
         np.concatenate([lead, np.asarray(decays[i], float)]) for lead, i in zip(lead_ins, index, strict=True)
     ]
     band_values = band_modes(full_records, [len(lead) for lead in lead_ins], records.shape[1], rate, settings)
     selection = select_modes(records, rate, settings)
-    diagnostics = fit_diagnostics(selection, index, dropped) | {
+    diagnostics = fit_diagnostics(selection, index, rejected) | {
         "filters_start_at": "decay" if leads is None else "record"
     }
     estimates, rejections = _estimates(band_values, records, index, settings, receptance)

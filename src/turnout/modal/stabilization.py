@@ -205,7 +205,7 @@ def likely_poles(
 
     These poles need not recur. The leading right singular vector of the decays is their weighted mean: as long as one
     decay, with the noise of one and the signal of all. It is fitted by maximum likelihood from the poles of each order.
-    Modes are dropped, the weakest first, as long as the criterion falls.
+    Modes are removed, the weakest first, as long as the criterion falls.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def _as_candidates(
 
 
 def _prune_poles(theta: np.ndarray, shared: np.ndarray, rate: float, columns: np.ndarray) -> tuple[float, np.ndarray]:
-    """(criterion, modes) at which dropping the least significant mode no longer reduces the criterion."""
+    """(criterion, modes) at which removing the least significant mode no longer reduces the criterion."""
     n = shared.size
     lowest_criterion, poles = np.inf, theta[:0]
     while len(theta):

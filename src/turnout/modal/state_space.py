@@ -195,7 +195,7 @@ def no_model(
     )
 
 
-def no_decays(rate: float, method: str, dropped: Sequence[tuple[int, Rejection]]) -> ModalModel:
+def no_decays(rate: float, method: str, rejected: Sequence[tuple[int, Rejection]]) -> ModalModel:
     """A rejected model without a usable decay.
 
     Parameters
@@ -204,7 +204,7 @@ def no_decays(rate: float, method: str, dropped: Sequence[tuple[int, Rejection]]
         Sampling rate. [Hz]
     method : str
         Name of the method.
-    dropped : sequence of (int, Rejection)
+    rejected : sequence of (int, Rejection)
         Number of each impact, and why its decay is not usable.
 
     Returns
@@ -212,5 +212,5 @@ def no_decays(rate: float, method: str, dropped: Sequence[tuple[int, Rejection]]
     ModalModel
         Model of order 0.
     """
-    rejection = Rejection("not_identified", 0, 1, "no decay is long enough" if dropped else "no decays")
-    return no_model(rate, method, (rejection, *(r for _, r in dropped)), {"dropped_impacts": tuple(dropped)})
+    rejection = Rejection("not_identified", 0, 1, "no decay is long enough" if rejected else "no decays")
+    return no_model(rate, method, (rejection, *(r for _, r in rejected)), {"rejected_impacts": tuple(rejected)})

@@ -26,7 +26,7 @@ _DATE = re.compile(r"(?<!\d)(\d{4})(?:-\d\d-\d\d|\d{4}T?)")
 
 
 @dataclass(frozen=True)
-class Refusal:
+class RejectedRow:
     """A rejected row: index of its unit, table and row, column and value at fault, and the ``requirement``."""
 
     unit: int
@@ -91,7 +91,7 @@ def unit_year(unit: str, rows: Mapping[str, list[dict]]) -> int:
     return next((int(t[:4]) for t in times if t[:4].isdigit()), UNDATED)
 
 
-def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refusal]]:
+def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[RejectedRow]]:
     """Typed columns of one table over all units, and columns ``_unit``, ``_row``, ``_year`` and ``_result_id``.
 
     Parameters
@@ -103,8 +103,8 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
 
     Returns
     -------
-    (Table, list of Refusal)
-        All rows whose values fit their types; a refusal for every other row: one with a column that is not in
+    (Table, list of RejectedRow)
+        All rows whose values fit their types; a rejected row for every other one: one with a column that is not in
         ``columns.csv``, or with a value of another type.
     """
     column_names = frozenset(names(table))
@@ -118,11 +118,11 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
         years += [arrival.year] * n
         result_ids += [arrival.result_id] * n
         rows += unit_rows
-    refusals: list[Refusal] = []
+    rejected_rows: list[RejectedRow] = []
     stated = set[str]().union(*(row for row in rows if isinstance(row, dict)))
     if not (column_names.issuperset(stated) and set(map(type, rows)) <= {dict}):
         known = [isinstance(row, dict) and column_names.issuperset(row) for row in rows]
-        refusals = [
+        rejected_rows = [
             _rejected_row(unit, table, k, row, column_names)
             for unit, k, row, is_known in zip(units, row_numbers, rows, known)
             if not is_known
@@ -130,27 +130,29 @@ def gather(table: str, arrivals: Iterable[Arrival]) -> tuple[pa.Table, list[Refu
         units, row_numbers, years = (list(compress(numbers, known)) for numbers in (units, row_numbers, years))
         result_ids, rows = list(compress(result_ids, known)), list(compress(rows, known))
     columns = [c for c in tables()[table] if c.name not in FILLED_BY_REGISTER]
-    bad: dict[int, Refusal] = {}
+    bad: dict[int, RejectedRow] = {}
     arrays = {c.name: pa.nulls(len(rows), arrow_type(c)) for c in columns}
     columns = [c for c in columns if c.name in stated]
     for column, values in zip(columns, _by_column(rows, [c.name for c in columns])):
         arrays[column.name], wrong = to_arrow(column, values)
         for i in wrong:
             value = repr(values[i])[:200]
-            bad.setdefault(i, Refusal(units[i], table, row_numbers[i], column.name, value, f"of type {column.type}"))
+            bad.setdefault(
+                i, RejectedRow(units[i], table, row_numbers[i], column.name, value, f"of type {column.type}")
+            )
     numbers = {"_unit": units, "_row": row_numbers, "_year": years}
     marks = {name: arrow_array(values, pa.int32()) for name, values in numbers.items()}
     gathered = arrow_table(arrays | marks | {"_result_id": arrow_array(result_ids, pa.string())})
     if bad:
         gathered = gathered.filter(pa.array([i not in bad for i in range(len(rows))]))
-    return gathered, refusals + [bad[i] for i in sorted(bad)]
+    return gathered, rejected_rows + [bad[i] for i in sorted(bad)]
 
 
-def _rejected_row(unit: int, table: str, row_number: int, row: Any, column_names: Collection[str]) -> Refusal:
+def _rejected_row(unit: int, table: str, row_number: int, row: Any, column_names: Collection[str]) -> RejectedRow:
     if not isinstance(row, dict):
-        return Refusal(unit, table, row_number, "all", repr(row)[:200], "a row")
+        return RejectedRow(unit, table, row_number, "all", repr(row)[:200], "a row")
     name = min(map(str, row.keys() - column_names))
-    return Refusal(unit, table, row_number, name, repr(row.get(name))[:200], "a column of columns.csv")
+    return RejectedRow(unit, table, row_number, name, repr(row.get(name))[:200], "a column of columns.csv")
 
 
 def _by_column(rows: list[dict], wanted: list[str]) -> list[Sequence]:

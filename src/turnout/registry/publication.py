@@ -78,7 +78,7 @@ def _due_for_deletion(generation: Generation, expired: set[int]) -> list[str]:
     """Remove from ``retired``, and return, the files that were removed by an expired generation."""
     live = {f.path for f in generation.files}
     # a small table that was changed back has its old path again, which may be live or retired a second time
-    dropped = dict(sorted(generation.retired, key=lambda entry: entry[1]))
-    waiting = {path: n for path, n in dropped.items() if path not in live}
+    retired = dict(sorted(generation.retired, key=lambda entry: entry[1]))
+    waiting = {path: n for path, n in retired.items() if path not in live}
     generation.retired = sorted((path, n) for path, n in waiting.items() if n not in expired)
     return sorted(path for path, n in waiting.items() if n in expired)

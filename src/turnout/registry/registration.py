@@ -17,7 +17,7 @@ from turnout.registry.connection import connect, limit_memory
 from turnout.registry.database import build_database, is_behind
 from turnout.registry.generation import GENERATION_FILE, Generation, commit, schema_of
 from turnout.registry.ids import content_id
-from turnout.registry.intake import Arrival, Refusal, gather
+from turnout.registry.intake import Arrival, RejectedRow, gather
 from turnout.registry.parquet import read_live, write_sorted
 from turnout.registry.publication import publish
 from turnout.registry.schema import CHILDREN, WHOLE_TABLES, key, literal, tables
@@ -75,7 +75,7 @@ class RegistrationResult:
     generation: int
     n_units: int = 0
     rows: Mapping[str, int] = field(default_factory=dict)
-    n_refused: int = 0
+    n_rejected: int = 0
     n_superseded: int = 0
     faults: Mapping[str, str] = field(default_factory=dict)
 
@@ -90,7 +90,7 @@ class Registration:
         self.root, self.before, self.is_indexed = root, before, is_indexed
         self.lost_duplicates = False
         self.result_ids: list[str] = []
-        self.n_refused = self.n_bad = 0
+        self.n_rejected = self.n_bad = 0
         self.filled = {"results", "runs", "supersedes"}  # tables that may have new rows
         self.whole: set[str] = set()
         self.replaced: set[str] = set()
@@ -122,7 +122,7 @@ class Registration:
         note_arrivals(self.con, arrivals)
         by_index = {a.index: a for a in arrivals}
         quarantine = {a.index: [r for r in a.tables.get("quarantine", ())] for a in arrivals}
-        refusals = [
+        rejected_rows = [
             _unknown_table(a, t) for a in arrivals for t in sorted(a.tables.keys() - tables().keys()) if a.tables[t]
         ]
         arrived = set[str]().union(*(a.tables for a in arrivals))
@@ -130,16 +130,16 @@ class Registration:
         for table in tables():
             if table not in INTERNAL_TABLES and table in arrived:
                 gathered, untyped = gather(table, arrivals)
-                refusals += untyped + admit(self.con, table, gathered, PENDING)
-        self._note_duplicates({r.table for r in refusals})
-        reject_orphans(self.con, refusals, by_index)
-        for refusal in refusals:
-            quarantine[refusal.unit].append(quarantine_of(refusal, by_index[refusal.unit]))
+                rejected_rows += untyped + admit(self.con, table, gathered, PENDING)
+        self._note_duplicates({r.table for r in rejected_rows})
+        reject_orphans(self.con, rejected_rows, by_index)
+        for rejected in rejected_rows:
+            quarantine[rejected.unit].append(quarantine_of(rejected, by_index[rejected.unit]))
         self._admit_quarantine(arrivals, quarantine)
         for arrival in arrivals:
             arrival.tables = {"results": [_result_row(arrival)]}
         admit(self.con, "results", gather("results", arrivals)[0], PENDING)
-        self.n_refused += len(refusals)
+        self.n_rejected += len(rejected_rows)
         self.n_bad += sum(bool(rows) for rows in quarantine.values())
         self.result_ids += [a.result_id for a in arrivals]
 
@@ -168,7 +168,7 @@ class Registration:
         Returns
         -------
         RegistrationResult
-            Numbers of units, rows and refusals.
+            Numbers of units, rows and rejected rows.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class Registration:
         now.consumed = consumed
         self.con.close()  # the rows are written: their memory is free for the catalogue
         publish(self.root, now)
-        return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_refused, n_superseded, faults)
+        return RegistrationResult(run_id, number, len(self.result_ids), rows, self.n_rejected, n_superseded, faults)
 
     def has_duplicates(self) -> bool:
         """Whether rows that were taken have the same key, so that they must be taken again with an index."""
@@ -231,16 +231,16 @@ class Registration:
         by_index = {a.index: a for a in arrivals}
         for arrival in arrivals:
             arrival.tables["quarantine"] = _by_id(quarantine[arrival.index], arrival.unit)
-        gathered, refusals = gather("quarantine", arrivals)
-        refusals += admit(self.con, "quarantine", gathered, PENDING)
+        gathered, rejected_rows = gather("quarantine", arrivals)
+        rejected_rows += admit(self.con, "quarantine", gathered, PENDING)
         replacements: dict[int, list[dict]] = {}
-        for refusal in refusals:
-            replacements.setdefault(refusal.unit, []).append(quarantine_of(refusal, by_index[refusal.unit]))
+        for rejected in rejected_rows:
+            replacements.setdefault(rejected.unit, []).append(quarantine_of(rejected, by_index[rejected.unit]))
         wrong_arrivals = [by_index[i] for i in sorted(replacements)]
         for arrival in wrong_arrivals:
             arrival.tables["quarantine"] = _by_id(replacements[arrival.index], arrival.unit)
         admit(self.con, "quarantine", gather("quarantine", wrong_arrivals)[0], PENDING)
-        self.n_refused += len(refusals)
+        self.n_rejected += len(rejected_rows)
 
     def _run_id(self, number: int) -> str:
         run_id = content_id("run", sorted(self.result_ids))
@@ -313,8 +313,8 @@ def _by_id(rows: list[dict], unit: str) -> list[dict]:
     return [rows_by_id[i] for i in sorted(rows_by_id)]
 
 
-def _unknown_table(arrival: Arrival, table: str) -> Refusal:
-    return Refusal(arrival.index, table, 0, "any", f"a table {table!r}", "a table of columns.csv")
+def _unknown_table(arrival: Arrival, table: str) -> RejectedRow:
+    return RejectedRow(arrival.index, table, 0, "any", f"a table {table!r}", "a table of columns.csv")
 
 
 def _result_row(arrival: Arrival) -> dict:

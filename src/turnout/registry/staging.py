@@ -15,7 +15,7 @@ import pyarrow as pa
 
 from turnout.registry.arrow_arrays import arrow_array, arrow_table
 from turnout.registry.ids import content_id
-from turnout.registry.intake import Arrival, Refusal
+from turnout.registry.intake import Arrival, RejectedRow
 from turnout.registry.schema import CHILDREN, create_table, key, names, tables
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def note_arrivals(con: duckdb.DuckDBPyConnection, arrivals: list[Arrival]) -> No
     con.unregister("_arrivals")
 
 
-def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id: str) -> list[Refusal]:
+def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id: str) -> list[RejectedRow]:
     """Insert the valid rows into ``new_<table>``.
 
     All rows are inserted at once; only if a constraint fails are the bad rows searched.
@@ -98,34 +98,36 @@ def admit(con: duckdb.DuckDBPyConnection, table: str, gathered: pa.Table, run_id
 
     Returns
     -------
-    list of Refusal
-        Refusals of the rows that break a rule.
+    list of RejectedRow
+        The rows that break a rule.
     """
     if gathered.num_rows == 0:
         return []
     con.register("_gathered", gathered)
-    refusals: list[Refusal] = []
+    rejected_rows: list[RejectedRow] = []
     try:
         con.execute(f"insert into new_{table} {_select(table, run_id)}")
     except duckdb.ConstraintException:
         con.execute(f"create or replace temp table arriving as {_select(table, run_id)}")
-        refusals = _bad_values(con, table) + _duplicate_keys(con, table)
+        rejected_rows = _bad_values(con, table) + _duplicate_keys(con, table)
         con.execute(f"insert into new_{table} select * from arriving")
         con.execute("drop table arriving")
     finally:
         con.unregister("_gathered")
-    return refusals
+    return rejected_rows
 
 
-def reject_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arrivals: Mapping[int, Arrival]) -> int:
-    """Remove the rows that belong to a rejected model or passage, and their refusals.
+def reject_orphans(
+    con: duckdb.DuckDBPyConnection, rejected_rows: list[RejectedRow], arrivals: Mapping[int, Arrival]
+) -> int:
+    """Remove the rows that belong to a rejected model or passage, and what was reported of them.
 
     Parameters
     ----------
     con : DuckDB connection
         Connection with the staging tables.
-    refusals : list of Refusal
-        All refusals of the chunk; changed.
+    rejected_rows : list of RejectedRow
+        Rejected rows of the chunk; changed.
     arrivals : mapping
         Units of the chunk by their number.
 
@@ -135,20 +137,20 @@ def reject_orphans(con: duckdb.DuckDBPyConnection, refusals: list[Refusal], arri
         Number of rows that were removed.
     """
     n_removed = 0
-    for refusal in list(refusals):
-        if refusal.table not in CHILDREN:
+    for rejected in list(rejected_rows):
+        if rejected.table not in CHILDREN:
             continue
-        id_column, children = CHILDREN[refusal.table]
-        parent = arrivals[refusal.unit].tables[refusal.table][refusal.row].get(id_column)
+        id_column, children = CHILDREN[rejected.table]
+        parent = arrivals[rejected.unit].tables[rejected.table][rejected.row].get(id_column)
         for child in children:
             where = f"from new_{child} where _unit = ? and {id_column} is not distinct from ?"
-            n_removed += con.execute(f"select count(*) {where}", [refusal.unit, parent]).fetchall()[0][0]
-            con.execute(f"delete {where}", [refusal.unit, parent])
-            child_rows = arrivals[refusal.unit].tables.get(child, ())
-            refusals[:] = [
+            n_removed += con.execute(f"select count(*) {where}", [rejected.unit, parent]).fetchall()[0][0]
+            con.execute(f"delete {where}", [rejected.unit, parent])
+            child_rows = arrivals[rejected.unit].tables.get(child, ())
+            rejected_rows[:] = [
                 r
-                for r in refusals
-                if (r.unit, r.table) != (refusal.unit, child) or child_rows[r.row].get(id_column) != parent
+                for r in rejected_rows
+                if (r.unit, r.table) != (rejected.unit, child) or child_rows[r.row].get(id_column) != parent
             ]
     return n_removed
 
@@ -160,9 +162,9 @@ def _select(table: str, run_id: str) -> str:
     return f"select {', '.join(expressions)}, _unit, _row, _year from _gathered"
 
 
-def _bad_values(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:
-    """Refusals of rows that break a CHECK or lack a value; these rows are deleted from ``arriving``."""
-    refusals = []
+def _bad_values(con: duckdb.DuckDBPyConnection, table: str) -> list[RejectedRow]:
+    """Rejected rows: those that break a CHECK or lack a value; these rows are deleted from ``arriving``."""
+    rejected_rows = []
     for column in tables()[table]:
         rules = ([f'"{column.name}" is null'] if column.required or column.key else []) + (
             [f"not ({column.check})"] if column.check else []
@@ -176,16 +178,18 @@ def _bad_values(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:
         ).fetchall()
         for unit, row, value, figure in rows:
             requirement = "given" if value is None else column.rule
-            refusals.append(
-                Refusal(unit, table, row, column.name, "missing" if value is None else value[:200], requirement, figure)
+            rejected_rows.append(
+                RejectedRow(
+                    unit, table, row, column.name, "missing" if value is None else value[:200], requirement, figure
+                )
             )
         if rows:
             con.execute(f"delete from arriving where {where}")
-    return refusals
+    return rejected_rows
 
 
-def _duplicate_keys(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]:
-    """Refusals of all rows but the first of each key, in the order of the units, including earlier chunks."""
+def _duplicate_keys(con: duckdb.DuckDBPyConnection, table: str) -> list[RejectedRow]:
+    """Rejected rows: all those but the first of each key, in the order of the units, including earlier chunks."""
     keys = key(table)
     quoted = ", ".join(f'"{k}"' for k in keys)
     numbered = f"select _unit, _row, {quoted}, row_number() over (partition by {quoted} order by _unit, _row) as nth"
@@ -195,7 +199,7 @@ def _duplicate_keys(con: duckdb.DuckDBPyConnection, table: str) -> list[Refusal]
     for unit, row, *_ in rows:
         con.execute("delete from arriving where _unit = ? and _row = ?", [unit, row])
     return [
-        Refusal(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in rows
+        RejectedRow(unit, table, row, "+".join(keys), " ".join(map(str, values)), UNIQUE) for unit, row, *values in rows
     ]
 
 
@@ -203,12 +207,12 @@ REMEDY = "This is a fault of the stage that made the row, not of the measurement
 _MAX_LENGTH = 2000  # characters of the column ``found``
 
 
-def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
+def quarantine_of(rejected: RejectedRow, arrival: Arrival) -> dict:
     """Quarantine row that names table, row, column and value, with the whole row in ``found``.
 
     Parameters
     ----------
-    refusal : Refusal
+    rejected : RejectedRow
         The rejected row.
     arrival : Arrival
         Its unit.
@@ -218,12 +222,12 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
     dict
         Row of the table ``quarantine``, without its id.
     """
-    source_row = arrival.tables[refusal.table][refusal.row]
+    source_row = arrival.tables[rejected.table][rejected.row]
     row = source_row if isinstance(source_row, dict) else {}
     recordings = [r for r in arrival.tables.get("recordings", ()) if isinstance(r, dict)] or [{}]
     path = row.get("path") or recordings[0].get("path") or arrival.unit
     record = row.get("record")
-    number = refusal.number
+    number = rejected.number
     whole = json.dumps(source_row, default=str, sort_keys=True)
     return {
         "turnout_id": arrival.turnout,
@@ -234,8 +238,8 @@ def quarantine_of(refusal: Refusal, arrival: Arrival) -> dict:
         "recording_id": _text(row.get("recording_id")),
         "stage": "register",
         "reason_code": "internal_error",
-        "place": f"{refusal.table}, row {refusal.row + 1}, column {refusal.column}",
-        "found": f"{refusal.value}, must be {refusal.requirement}; row: {whole}"[:_MAX_LENGTH],
+        "place": f"{rejected.table}, row {rejected.row + 1}, column {rejected.column}",
+        "found": f"{rejected.value}, must be {rejected.requirement}; row: {whole}"[:_MAX_LENGTH],
         "remedy": REMEDY,
         "measured_value": number if number is not None and math.isfinite(number) else None,
     }

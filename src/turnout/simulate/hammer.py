@@ -53,9 +53,9 @@ class Hammer:
 
 
 class ImpactTruth(NamedTuple):
-    """True values of one impact: its ``place`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
+    """True values of one impact: its ``position`` [m], the hammer's ``speed`` [m/s], the ``peak_force`` [N]."""
 
-    place: float
+    position: float
     speed: float
     peak_force: float
 

@@ -304,7 +304,7 @@ def identify_accepted(
         elif second and all((i.source, i.record) in second for i in used):
             options = {"second": [second[i.source, i.record].decay for i in used]}
         model = identify([i.decay for i in used], used[0].rate, identify_settings, receptance, **options)
-        rejected = {id(used[k]): rejection for k, rejection in model.diagnostics.get("dropped_impacts", ())}
+        rejected = {id(used[k]): rejection for k, rejection in model.diagnostics.get("rejected_impacts", ())}
         if not rejected:
             return impacts, receptance, model
         impacts = [replace(i, rejections=(rejected[id(i)],)) if id(i) in rejected else i for i in impacts]

@@ -76,7 +76,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     Parameters
     ----------
     request : mapping of str to any
-        Options of `turnout simulate hammer`: track, section, tests, blows, turnout, config, raw, out, format, at,
+        Options of `turnout simulate hammer`: track, section, tests, impacts, turnout, config, raw, out, format, at,
         temperature, truth, seed.
 
     Yields
@@ -124,7 +124,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
         name = f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}"
         path = _write(request, turnout, name, recordings, description)
         _write_truth(
-            request, path, track, route, recordings[0], {"blows": [_impact_truth(impact) for impact in impacts]}
+            request, path, track, route, recordings[0], {"impacts": [_impact_truth(impact) for impact in impacts]}
         )
         peak = max(float(r.samples[0].max()) for r in recordings)
         yield path, f"{len(recordings)} impacts at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
@@ -280,7 +280,7 @@ def _write(
 
 def _impact_truth(impact: ImpactTruth) -> dict[str, float]:
     return {
-        "place_m": round(impact.place, 4),
+        "position_m": round(impact.position, 4),
         "speed_m_s": round(impact.speed, 4),
         "peak_force_n": round(impact.peak_force, 1),
     }

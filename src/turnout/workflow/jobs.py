@@ -136,7 +136,7 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     os.utime(generation)
     for batch, fault in result.faults.items():
         logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
-    _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_refused} rejected")
+    _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_rejected} rejected")
 
 
 @contextmanager

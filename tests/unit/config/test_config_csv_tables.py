@@ -61,14 +61,14 @@ def test_what_a_spreadsheet_leaves_behind_is_no_error(tmp_path):
     assert events(tmp_path, text) == ([("t1", ("ballast",), "a\u2028b")], [])
 
 
-def test_a_silence_without_its_end_does_not_count(tmp_path):
+def test_a_suppression_without_its_end_does_not_count(tmp_path):
     path = tmp_path / "acknowledgements.csv"
     path.write_text("turnout,section,band,action,by,at,untill,reason\nt1,,,suppress,me,2026-01-01,2026-02-01,x\n")
     rows, errors = read_acknowledgements(path)
     assert rows == [] and "unknown column 'untill'. Did you mean 'until'?" in str(errors[0])
 
 
-def test_a_silence_needs_the_day_on_which_it_ends(tmp_path):
+def test_a_suppression_needs_the_day_on_which_it_ends(tmp_path):
     """Left empty by hand, it would hide every alarm of the place for ever."""
     path = tmp_path / "acknowledgements.csv"
     seen = "t1,,,acknowledge,me,2026-01-01,,seen"
@@ -160,7 +160,7 @@ def test_a_command_says_what_is_wrong_with_a_table_and_leaves_it_alone(config, c
     assert (config / table).read_bytes() == content
 
 
-def test_a_refused_first_event_leaves_no_file(config):
+def test_a_rejected_first_event_leaves_no_file(config):
     (config / "events.csv").unlink()
     assert main(["events", "nowhere", "tamping", "2026-04-02"]) == 2 and not (config / "events.csv").exists()
 

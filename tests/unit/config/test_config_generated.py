@@ -67,7 +67,7 @@ def test_the_schemas_accept_what_the_program_accepts(repository):
 
 
 @pytest.mark.parametrize("change", [{"secions": {}}, {"hammer": {"rate": -1}}, {"hammer": {"sections": 3}}])
-def test_the_schemas_refuse_what_the_program_refuses(repository, change):
+def test_the_schemas_reject_what_the_program_rejects(repository, change):
     schema = json.loads((repository / "config/schema/override.json").read_text())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(change, schema)

@@ -53,10 +53,10 @@ def test_a_row_is_not_entered_elsewhere_and_one_sentence_says_why(config, capsys
 
 
 def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeypatch):
-    def refuse(path, content):
+    def reject(path, content):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("turnout.config.table_edits.write_atomic", refuse)  # we may be root
+    monkeypatch.setattr("turnout.config.table_edits.write_atomic", reject)  # we may be root
     assert main(COMMANDS["events.csv"]) == 2
     said = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
     assert capsys.readouterr().err.startswith(said)
@@ -86,13 +86,13 @@ def test_axle_patterns_that_the_settings_name_and_that_are_not_there_are_said(tm
         known_patterns("config/vehicles/axels.yaml")
 
 
-def test_trains_of_a_folder_that_is_not_there_are_refused(tmp_path, capsys):
+def test_trains_of_a_folder_that_is_not_there_are_rejected(tmp_path, capsys):
     assert main(["trains", "--raw", str(tmp_path / "rawe")]) == 2
     assert "there is no folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["report", "--cores", "0"], ["query", "from modes", "--rows", "-5"]])
-def test_a_count_of_nothing_is_refused(command, capsys):
+def test_a_count_of_nothing_is_rejected(command, capsys):
     with pytest.raises(SystemExit):
         main(command)
     assert "is not a whole number of 1 or more" in capsys.readouterr().err

@@ -261,7 +261,7 @@ def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
 HEADER = "turnout,section,date,kind\n"
 
 
-def test_a_small_hammer_may_clip_below_the_softest_blow_of_a_large_one(tmp_path):
+def test_a_small_hammer_may_clip_below_the_softest_impact_of_a_large_one(tmp_path):
     small = LAYOUT.replace("source: force, ", "source: force, limit: 22, ")
     assert configuration(tmp_path, layout=small, settings="receptance: {softest_blow: 0}").ids == ("t1", "t2")
 

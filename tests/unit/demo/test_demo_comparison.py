@@ -24,7 +24,7 @@ TRUTH = {
 
 @pytest.fixture
 def truth(tmp_path):
-    (tmp_path / "blows").mkdir()
+    (tmp_path / "impacts").mkdir()
     (tmp_path / "W1.json").write_text(json.dumps(TRUTH))
     (tmp_path / "W1_passages.json").write_text("[]")
     faults = [
@@ -32,7 +32,7 @@ def truth(tmp_path):
         {"test": 1, "record": 5, "fault": "double_hit", "file_fault": ""},
         {"test": 2, "record": 4, "fault": "double_hit", "file_fault": "cut_off"},
     ]
-    (tmp_path / "blows/W1_2025-01-01_SP.json").write_text(json.dumps(faults))
+    (tmp_path / "impacts/W1_2025-01-01_SP.json").write_text(json.dumps(faults))
     return tmp_path
 
 

@@ -16,10 +16,10 @@ from turnout.simulate.turnout_track import stretch_of_track
 @pytest.mark.parametrize("section", ["A8", "SP"])
 def test_receptance_of_the_recordings_is_that_of_the_track(section):
     """Below the resonances too, where a response that was cut at the impact would show a falling mass."""
-    blows, truth = hammer_test(
+    impacts, truth = hammer_test(
         simulated_response(section, 1.0, 1.0), 10.0, datetime.date(2025, 1, 1), 1, np.random.default_rng(1), 60
     )
-    sound = [b.samples for b, t in zip(blows, truth) if not t.fault]
+    sound = [b.samples for b, t in zip(impacts, truth) if not t.fault]
     frequency = np.fft.rfftfreq(sound[0].shape[1], 1 / RATE)
     lines = (frequency > 30) & (frequency < 700)
     force, rail = np.fft.rfft(np.array(sound), axis=2).transpose(1, 0, 2)[:, :, lines]

@@ -90,7 +90,7 @@ def test_a_band_without_coherence_fails_alone(hammer):
     assert gate_rejections(result, ballast=(400.0, 800.0))[0].reason == "low_coherence"
 
 
-def test_unequal_records_are_padded_and_unequal_rates_refused(hammer):
+def test_unequal_records_are_padded_and_unequal_rates_rejected(hammer):
     impacts = list(find_impacts(hammer.recordings(4, (0.0, 0.0)), "hammer", "rail"))
     from dataclasses import replace
 

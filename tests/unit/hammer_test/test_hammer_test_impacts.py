@@ -27,7 +27,7 @@ def test_measurements_of_a_half_sine_are_those_of_its_formula(hammer):
     assert impact.accepted and not impact.notes
 
 
-def test_a_continuous_record_is_cut_into_its_blows(hammer):
+def test_a_continuous_record_is_cut_into_its_impacts(hammer):
     starts = (0.4, 1.3, 2.9)
     force = sum(hammer.force(peak=p, start=s, n=70_000) for s, p in zip(starts, (4000.0, 6000.0, 5000.0)))
     force += hammer.force(peak=60.0, start=2.1, n=70_000)  # the hammer is put down and taken up again
@@ -39,7 +39,7 @@ def test_a_continuous_record_is_cut_into_its_blows(hammer):
     assert all(i.onset == pytest.approx(0.05 * RATE, abs=1) for i in impacts)
 
 
-def test_blows_are_numbered_within_their_file(hammer):
+def test_impacts_are_numbered_within_their_file(hammer):
     two = hammer.force(start=0.1, n=20_000) + hammer.force(start=0.6, n=20_000)
     one = hammer.force(start=0.1, n=20_000)
     recordings = [
@@ -52,14 +52,14 @@ def test_blows_are_numbered_within_their_file(hammer):
     ]  # fmt: skip
 
 
-def test_a_reversed_hammer_is_named_on_every_blow(hammer):
+def test_a_reversed_hammer_is_named_on_every_impact(hammer):
     recordings = [replace(r, samples=r.samples * [[-1], [1]]) for r in hammer.recordings(4)]
     for impact in hammer.impacts(recordings):
         assert reasons(impact) == ["sign_reversed"] and impact.peak < 0
         assert impact.rejections[0].detail.endswith("its sign is reversed, or it is another channel")
 
 
-def test_records_without_a_usable_blow_say_why(hammer):
+def test_records_without_a_usable_impact_say_why(hammer):
     sound = hammer.recordings(4)
     broken = sound[0].samples.copy()
     broken[1, 700:705] = np.nan
@@ -78,7 +78,7 @@ def test_records_without_a_usable_blow_say_why(hammer):
     assert impacts[4].rejections[0].time == pytest.approx(700 / RATE)
 
 
-def test_a_gap_in_a_continuous_record_costs_one_blow(hammer):
+def test_a_gap_in_a_continuous_record_costs_one_impact(hammer):
     samples = hammer.samples(hammer.force(start=0.1, n=40_000) + hammer.force(start=1.2, n=40_000))
     samples[1, 26_000:26_010] = np.nan
     assert [reasons(i) for i in hammer.impacts([hammer.recording(samples)])] == [[], ["not_finite"]]
@@ -102,7 +102,7 @@ def test_a_force_far_above_the_median_whose_response_did_not_grow_with_it_left_i
     assert "the test's median is" in impacts[6].rejections[0].detail
 
 
-def test_a_noisy_blow_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
+def test_a_noisy_impact_is_rejected_and_an_evenly_noisy_test_is_not(hammer):
     quiet = hammer.recordings(5, noise=(1e-4, 1e-2))
     noisy = hammer.recording(hammer.samples(hammer.force(), noise=(1e-4, 0.08)), 5)
     assert [reasons(i) for i in hammer.impacts([*quiet, noisy])] == [[]] * 5 + [["noisy"]]
@@ -125,7 +125,7 @@ def test_late_and_cut_off_records_are_rejected(hammer):
 
 
 @pytest.mark.parametrize("begun", [2, 6, 14, 20])
-def test_a_blow_that_had_begun_before_its_record_is_rejected(hammer, begun):
+def test_an_impact_that_had_begun_before_its_record_is_rejected(hammer, begun):
     """The response to the force that is missing is there; at 14 of 30 samples H1 would be wrong by four fifths."""
     sound = hammer.recordings(4, noise=(1e-5, 1e-5))
     cut_short = hammer.samples(hammer.force(start=5e-3), (1e-5, 1e-5))[:, 100 + begun :]
@@ -137,7 +137,7 @@ def test_a_blow_that_had_begun_before_its_record_is_rejected(hammer, begun):
     assert late.detail == f"the record starts with {late.value:.4g} N: the impact began before it"
 
 
-def test_a_blow_at_the_very_start_of_its_record_is_whole(hammer):
+def test_an_impact_at_the_very_start_of_its_record_is_whole(hammer):
     recordings = [hammer.recording(r.samples[:, 100:], k) for k, r in enumerate(hammer.recordings(5))]
     assert [i.accepted for i in hammer.impacts(recordings)] == [True] * 5
 
@@ -165,14 +165,14 @@ def test_the_same_test_exported_twice_counts_once(hammer, digits):
     assert receptance_of(both).n == 5
 
 
-def test_blows_alike_are_no_repeats(hammer):
+def test_impacts_alike_are_no_repeats(hammer):
     """Equal forces and 80 dB between peak and noise: what tells them apart is their noise."""
     force = hammer.force()
     recordings = [hammer.recording(hammer.samples(force, (1e-4, 1e-4)), k) for k in range(6)]
     assert [i.accepted for i in hammer.impacts(recordings)] == [True] * 6
 
 
-def test_one_blow_alone_is_measured_and_not_compared(hammer):
+def test_one_impact_alone_is_measured_and_not_compared(hammer):
     (impact,) = hammer.impacts(hammer.recordings(1))
     assert impact.accepted and impact.peak > 3900
 

@@ -36,7 +36,7 @@ def test_a_second_hit_of_five_percent_is_found_and_measured(hammer, contact, del
     assert impacts[3].contact < 1.2 * contact + 1e-4
 
 
-def test_a_light_touch_ahead_of_the_blow_is_a_double_hit_too(hammer):
+def test_a_light_touch_ahead_of_the_impact_is_a_double_hit_too(hammer):
     both = hammer.force(start=15e-3) + hammer.force(peak=800.0, start=5e-3)
     (impact,) = hammer.impacts([hammer.recording(hammer.samples(both))])
     assert findings(impact) == ["double_hit"] and "-10.0 ms" in (*impact.rejections, *impact.notes)[0].detail
@@ -50,13 +50,13 @@ def test_policy_of_double_hits(hammer):
     assert moved.decay_start / RATE > 16.5e-3
     assert not rejected.accepted and rejected.rejections[0].reason == "double_hit"
     # A second contact in the middle of a damped decay leaves nothing worth using.
-    (dropped,) = hammer.impacts(
+    (too_late,) = hammer.impacts(
         [hammer.recording(hammer.samples(hammer.force() + hammer.force(peak=300.0, start=25e-3)))]
     )
-    assert not dropped.accepted and "of the decay is left" in dropped.rejections[0].detail
+    assert not too_late.accepted and "of the decay is left" in too_late.rejections[0].detail
 
 
-def test_quick_blows_of_a_machine_are_said_to_be_separable(hammer):
+def test_quick_impacts_of_a_machine_are_said_to_be_separable(hammer):
     """Six even impacts 150 ms apart: one with further contacts, unless impacts may follow each other so soon."""
     many = sum(hammer.force(start=5e-3 + 0.15 * k, n=round(0.9 * RATE)) for k in range(6))
     recording = [hammer.recording(hammer.samples(many))]
@@ -176,7 +176,7 @@ def test_top_share_has_its_closed_form(family, share):
     assert top_share(pulse, About) == pytest.approx(share, abs=2e-3)
 
 
-def test_the_odd_blow_is_named_with_both_coherences(hammer):
+def test_the_odd_impact_is_named_with_both_coherences(hammer):
     recordings = hammer.recordings(6)
     other = hammer.samples(hammer.force())
     other[1] = np.convolve(other[1], [0.2, -0.5, 0.9, 0.4, -0.8], mode="same")[::1] + 0.3 * np.roll(other[1], 55)
@@ -193,7 +193,7 @@ def test_a_response_of_opposite_sign_is_named_even_if_a_third_of_the_test_has_it
     assert all("opposite sign" in impacts[k].rejections[0].detail for k in (0, 3, 6))
 
 
-def test_of_two_blows_none_is_odd(hammer):
+def test_of_two_impacts_none_is_odd(hammer):
     recordings = hammer.recordings(2)
     recordings[1] = replace(recordings[1], samples=recordings[1].samples * [[1], [-1]])
     assert [i.accepted for i in hammer.impacts(recordings)] == [True] * 2

@@ -84,7 +84,7 @@ def test_an_impact_with_which_the_estimator_fails_is_left_out(monkeypatch):
 
     monkeypatch.setitem(identification.METHODS, "joint", fails_with_third)
     model = identify(decays, test.rate, SETTINGS)
-    ((impact, rejection),) = model.diagnostics["dropped_impacts"]
+    ((impact, rejection),) = model.diagnostics["rejected_impacts"]
     assert (impact, rejection.reason) == (2, "odd_one_out")
     assert "Singular matrix" in rejection.detail
     assert model.status == "accepted"

@@ -70,7 +70,7 @@ def test_the_fit_reaches_the_cramer_rao_bound():
     assert np.all(ratio > 0.7)
 
 
-def test_the_bound_falls_with_the_root_of_the_number_of_blows_and_with_the_noise():
+def test_the_bound_falls_with_the_root_of_the_number_of_impacts_and_with_the_noise():
     test, decays = decays_of(n=4, snr_db=200.0)
     one = np.repeat(decays[:1], 9, axis=0)
     theta = np.repeat(theta_of(test.frequency, test.damping)[:1], 9, axis=0)
@@ -79,7 +79,7 @@ def test_the_bound_falls_with_the_root_of_the_number_of_blows_and_with_the_noise
     np.testing.assert_allclose(cramer_rao_bound(theta[:1], one[:1], test.rate, 8.0), 2.0 * single, rtol=1e-9)
 
 
-def test_the_spread_between_blows_is_recovered_and_does_not_become_damping():
+def test_the_spread_between_impacts_is_recovered_and_does_not_become_damping():
     """Thirty impacts of 2 % spread: the standard deviation is known to 1/sqrt(58) = 13 %, three of that allowed."""
     test, decays = decays_of(n=30, seed=5, spread=0.02)
     model = published_model("CP A7")
@@ -112,7 +112,7 @@ def test_equal_errors_give_the_t_interval():
     assert (s.mean, s.n) == (5.0, 4)
 
 
-def test_a_weak_blow_weighs_less_in_the_mean():
+def test_a_weak_impact_weighs_less_in_the_mean():
     assert summarise([0.0, 0.1, 9.0], [0.1, 0.1, 90.0]).mean < 0.06
 
 
@@ -139,7 +139,7 @@ def test_the_fit_with_shared_poles_sees_all_decays_through_their_principal_ones(
     assert np.sqrt(step @ information @ step / sigma2) < 0.3
 
 
-def test_a_single_blow_keeps_its_own_error():
+def test_a_single_impact_keeps_its_own_error():
     s = summarise([2.0], [0.5])
     assert (s.se, s.n) == (0.5, 1)
     assert s.high == pytest.approx(2.0 + 1.96 * 0.5, abs=1e-3)
@@ -165,7 +165,7 @@ def test_whitening_keeps_the_poles():
     np.testing.assert_allclose(white[2:], 2 * z.real * white[1:-1] - abs(z) ** 2 * white[:-2], atol=1e-12)
 
 
-def test_the_held_out_fit_of_a_blow_does_not_use_its_own_modes():
+def test_the_held_out_fit_of_an_impact_does_not_use_its_own_modes():
     """Three impacts of one mode and a fourth of another: by the others' modes the fourth is not described at all."""
     k = np.arange(300)
     poles = [discrete_pole(f, 0.05, 20e3) for f in (200.0, 200.0, 200.0, 600.0)]

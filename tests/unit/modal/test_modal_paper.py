@@ -88,7 +88,7 @@ def test_at_a_low_rate_the_upper_band_ends_below_half_of_it(rate, bands):
     assert len(split_bands([records], rate, SETTINGS)) == bands
 
 
-def test_one_blow_has_no_standard_error():
+def test_one_impact_has_no_standard_error():
     test = hammer_test("CP A7", 1, 4, pre_trigger=0.01)
     leads = [y[:k] for y, k in zip(test.acceleration, test.decay_start, strict=True)]
     model = identify(test.decays(), test.rate, SETTINGS, method="paper", leads=leads)
@@ -98,7 +98,7 @@ def test_one_blow_has_no_standard_error():
     assert all(row["frequency_se"] is None and row["damping_se"] is None for row in model.per_impact)
 
 
-def test_the_spread_of_blows_is_theirs_and_no_blow_has_an_error_of_its_own():
+def test_the_spread_of_impacts_is_theirs_and_no_impact_has_an_error_of_its_own():
     """The procedure states no error: what impacts differ by is all spread, never none."""
     _, model = paper("CP A7", spread=0.02)
     for mode in model.modes:

@@ -39,7 +39,7 @@ def exact(modes):
 
 
 @pytest.mark.parametrize("seed", [300, 301, 302])
-def test_a_weak_mode_beside_modes_that_move_between_blows_does_not_become_a_twin(seed):
+def test_a_weak_mode_beside_modes_that_move_between_impacts_does_not_become_a_twin(seed):
     """A hundredth of the peak at 330 Hz; an impact knows its own frequency to 0.1 %, so the mean is that of the
     impacts."""
     decays, moved = test([BALLAST, RAILPAD, (330.0, 0.05, 0.05)], seed, spread=0.02)

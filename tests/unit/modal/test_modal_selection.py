@@ -46,7 +46,7 @@ def test_unmodelled_modes_and_drift_do_not_disturb(location, snr):
 
 
 @pytest.mark.parametrize("location", ["CP A9", "AS main"])
-def test_a_mode_that_moves_between_blows_is_not_taken_for_two(location):
+def test_a_mode_that_moves_between_impacts_is_not_taken_for_two(location):
     _, model = identified(location, 1, spread=0.03)
     assert len(model.diagnostics["modes_in_fit"]) == 2
     # Ten impacts of 3 %: the spread is known to 1/sqrt(18) = 24 %.
@@ -95,7 +95,7 @@ def test_coloured_noise_is_modelled():
 
 
 @pytest.mark.parametrize("damage", ["noise", "second impact"])
-def test_an_odd_blow_is_left_out_and_reported(damage):
+def test_an_odd_impact_is_left_out_and_reported(damage):
     test = hammer_test("SP", 10, 8)
     decays = test.decays()
     size = np.abs(decays[3]).max()
@@ -104,7 +104,7 @@ def test_an_odd_blow_is_left_out_and_reported(damage):
     else:
         decays[3] = decays[3] + np.concatenate([np.zeros(250), 0.8 * decays[3][:350]])
     model = identify(decays, test.rate, SETTINGS)
-    ((impact, rejection),) = model.diagnostics["dropped_impacts"]
+    ((impact, rejection),) = model.diagnostics["rejected_impacts"]
     assert (impact, rejection.reason) == (3, "odd_one_out")
     assert 3 not in {row["impact"] for row in model.per_impact}
     assert {m.n for m in model.modes} == {9}
@@ -140,13 +140,13 @@ def test_one_impact_gives_modes_with_the_error_of_its_noise():
     assert model.fit is None
 
 
-def test_the_held_out_fit_beats_its_null_and_nears_its_ceiling():
+def test_the_held_out_fit_beats_its_null_and_nears_its_limit():
     test, model = identified("CP A7", 12)
     decays = np.array(test.decays())
     noise_share = test.noise[:, None] * np.sqrt(600) / np.linalg.norm(decays - decays.mean(1, keepdims=True), axis=1)
-    ceiling = 100.0 * (1.0 - np.median(noise_share.diagonal()))
+    limit = 100.0 * (1.0 - np.median(noise_share.diagonal()))
     assert model.diagnostics["fit_null"] < 70.0
-    assert model.fit == pytest.approx(ceiling, abs=1.0)
+    assert model.fit == pytest.approx(limit, abs=1.0)
 
 
 def test_stabilisation_lists_the_poles_of_every_order():
@@ -171,7 +171,7 @@ def test_unusable_decays_give_a_rejected_model_that_says_why(case):
     model = identify(decays, 20e3, SETTINGS)
     assert model.status == "rejected"
     assert words in model.rejections[0].detail
-    assert len(model.diagnostics["dropped_impacts"]) == len(decays)
+    assert len(model.diagnostics["rejected_impacts"]) == len(decays)
 
 
 def test_one_bad_decay_costs_only_itself():
@@ -180,9 +180,9 @@ def test_one_bad_decay_costs_only_itself():
     decays[1] = decays[1][:150]
     decays[4] = np.where(np.arange(600) == 77, np.inf, decays[4])
     model = identify(decays, test.rate, SETTINGS)
-    dropped = {impact: rejection for impact, rejection in model.diagnostics["dropped_impacts"]}
-    assert {i: r.reason for i, r in dropped.items()} == {1: "late", 4: "not_finite"}
-    assert dropped[4].value == 77
+    rejected = {impact: rejection for impact, rejection in model.diagnostics["rejected_impacts"]}
+    assert {i: r.reason for i, r in rejected.items()} == {1: "late", 4: "not_finite"}
+    assert rejected[4].value == 77
     assert {row["impact"] for row in model.per_impact} == {0, 2, 3}
 
 

@@ -16,7 +16,7 @@ SETTINGS = IdentifySettings(null_draws=10)
 START = 100
 
 
-def test_of_ten_blows(section, seed, ballast=1.0, railpad=1.0):
+def test_of_ten_impacts(section, seed, ballast=1.0, railpad=1.0):
     """Decays of ten impacts with noise of 1 % of the peak, from the end of contact on."""
     rng = np.random.default_rng(seed)
     response = simulated_response(section, ballast, railpad)
@@ -31,7 +31,7 @@ def test_of_ten_blows(section, seed, ballast=1.0, railpad=1.0):
     return decays
 
 
-test_of_ten_blows.__test__ = False
+test_of_ten_impacts.__test__ = False
 
 
 def highest_peak(section, low, high):
@@ -53,7 +53,7 @@ class _Still:
 @pytest.mark.parametrize("section", ["CLP", "A7", "A9"])
 def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
     """Neither drift nor weak modes take the place of the ballast mode in one test and not in the next."""
-    models = [identify(test_of_ten_blows(section, [3, k]), RATE, SETTINGS) for k in range(3)]
+    models = [identify(test_of_ten_impacts(section, [3, k]), RATE, SETTINGS) for k in range(3)]
     for band in ("ballast", "railpad"):
         found = [m.mode(band) for m in models if m.mode(band) is not None]
         frequency = np.array([mode.frequency for mode in found])
@@ -67,7 +67,7 @@ def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
 
 def test_an_interval_holds_the_choice_among_explanations():
     """More than one was made, and the interval is wider than the scatter of the impacts alone asks for."""
-    model = identify(test_of_ten_blows("A9", 5), RATE, SETTINGS)
+    model = identify(test_of_ten_impacts("A9", 5), RATE, SETTINGS)
     mode = model.mode("ballast")
     impacts = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])
     assert model.diagnostics["explanations"] > 1
@@ -77,14 +77,14 @@ def test_an_interval_holds_the_choice_among_explanations():
 @pytest.mark.parametrize("section", ["A9"])
 def test_the_railpad_mode_is_the_highest_peak_of_its_band(section):
     """Damping of 5 % moves a peak off its resonance by less than 1 %, the flank of a neighbour by about as much."""
-    mode = identify(test_of_ten_blows(section, 5), RATE, SETTINGS).mode("railpad")
+    mode = identify(test_of_ten_impacts(section, 5), RATE, SETTINGS).mode("railpad")
     assert mode.frequency == pytest.approx(highest_peak(section, 300.0, 800.0), rel=0.02)
 
 
 def test_a_stiffer_ballast_moves_the_ballast_mode_and_not_the_railpad_mode():
     """A factor of 1.3 on one of two springs in parallel with the rail: at most the root of it, and not nothing."""
-    before = identify(test_of_ten_blows("A8", 7), RATE, SETTINGS)
-    after = identify(test_of_ten_blows("A8", 8, ballast=1.3), RATE, SETTINGS)
+    before = identify(test_of_ten_impacts("A8", 7), RATE, SETTINGS)
+    after = identify(test_of_ten_impacts("A8", 8, ballast=1.3), RATE, SETTINGS)
     ratio = after.mode("ballast").frequency / before.mode("ballast").frequency
     assert 1.04 < ratio < np.sqrt(1.3) + 0.01
     assert after.mode("railpad").frequency == pytest.approx(before.mode("railpad").frequency, rel=0.02)

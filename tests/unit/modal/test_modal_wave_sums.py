@@ -77,7 +77,7 @@ def test_a_linearisation_is_that_of_the_matrices_it_does_not_form(degree, shared
 
 
 @pytest.mark.parametrize("damping", [1.0, -1.0, 1.2])
-def test_a_wave_that_does_not_oscillate_is_refused(damping):
+def test_a_wave_that_does_not_oscillate_is_rejected(damping):
     """The derivative of its pole is infinite: the sums were nan or a ZeroDivisionError."""
     theta = np.array([[[np.log(100.0), 0.1], [np.log(300.0), damping]]])
     with pytest.raises(ValueError, match="damping ratios below 1"):

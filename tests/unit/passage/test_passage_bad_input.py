@@ -15,7 +15,7 @@ def findings(passage, reason):
     return [f for f in passage.findings if f.reason == reason]
 
 
-def blows(rng, recording, place, speed, rows, strength=3.0):
+def impacts(rng, recording, place, speed, rows, strength=3.0):
     """The recording with a burst at the channels ``rows`` whenever a wheel is at ``place``: a nose, a joint."""
     samples = recording.samples.copy()
     time = np.arange(recording.n_sample) / RATE
@@ -39,10 +39,10 @@ def test_a_sensor_may_record_an_irregularity_beside_it_instead_of_the_wheel_abov
     assert passage.speed.speed == pytest.approx(40.0, rel=3e-3)
 
 
-def test_a_blow_at_one_place_is_not_a_second_train(settings):
+def test_an_impact_at_one_place_is_not_a_second_train(settings):
     """Two of five sensors hear every wheel a second time, when it is at the nose."""
     rng = np.random.default_rng(22)
-    recording = blows(rng, rolling_noise(rng, IC3, 15.0, PLACES), 19.0, 15.0, [3, 4])
+    recording = impacts(rng, rolling_noise(rng, IC3, 15.0, PLACES), 19.0, 15.0, [3, 4])
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.n_axle == 8 and not findings(passage, "two_trains")
 

@@ -1,4 +1,4 @@
-"""Combs with a free tooth: what they explain, which row of vehicles they find, and what they refuse to name."""
+"""Combs with a free tooth: what they explain, which row of vehicles they find, and what they do not name."""
 
 import warnings
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Trains over a crossing's nose: each wheel bangs there, louder to every sensor than the wheels beside it."""
+"""Trains over a crossing's nose: each wheel causes an impact there, louder to all sensors than the wheels beside it."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def banging(rng, offsets, speed, direction, loud=6.0):
 
 
 @pytest.mark.parametrize(("direction", "speed"), [(1, 26.0), (-1, 26.0), (1, 44.0), (-1, 52.0)])
-def test_a_known_train_that_bangs_at_a_nose_is_found_with_its_speed_and_direction(direction, speed):
+def test_a_known_train_with_nose_impacts_is_found_with_its_speed_and_direction(direction, speed):
     recording, times = banging(np.random.default_rng(round(speed) + direction), IC3, speed, direction)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert (passage.type.type, passage.n_axle, passage.status) == ("IC3", 8, "accepted")
@@ -39,7 +39,7 @@ def test_a_known_train_that_bangs_at_a_nose_is_found_with_its_speed_and_directio
     assert np.abs(heard - times).max() * speed < 0.8
 
 
-def test_a_train_without_template_that_bangs_is_counted_with_a_doubt():
+def test_a_train_without_template_with_nose_impacts_is_counted_with_a_doubt():
     recording, _ = banging(np.random.default_rng(3), STRANGER, 33.0, 1)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert passage.type.type == UNKNOWN
@@ -56,7 +56,7 @@ def test_a_known_train_that_leaves_a_higher_peak_than_its_weakest_axle_is_doubte
     assert "axles_uncertain" in {f.reason for f in passage.findings}
 
 
-def test_the_same_train_without_bangs_is_not_doubted():
+def test_the_same_train_without_nose_impacts_is_not_doubted():
     recording = rolling_noise(np.random.default_rng(3), STRANGER, 33.0, PLACES)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert (passage.type.type, passage.n_axle, passage.status) == (UNKNOWN, 8, "accepted")

@@ -24,7 +24,7 @@ def train():
     return replace(recording, channels=tuple(Channel(name, "acceleration", x) for name, x in PLACES.items()))
 
 
-def struck(recording, times, size, last=3, delays=(0.0,) * 5):
+def with_pulses(recording, times, size, last=3, delays=(0.0,) * 5):
     """Pulses of ``last`` samples, ``size`` times the channel's peak, behind the recorder's filter."""
     pulses = np.zeros_like(recording.samples)
     for row, (sample, delay) in enumerate(zip(recording.samples, delays)):
@@ -37,7 +37,7 @@ def struck(recording, times, size, last=3, delays=(0.0,) * 5):
 
 def test_a_train_under_pulses_is_the_train_without(train, settings):
     clean = analyse(train, SENSORS, PATTERNS, settings)
-    found = analyse(struck(train, AT, 100.0), SENSORS, PATTERNS, settings)
+    found = analyse(with_pulses(train, AT, 100.0), SENSORS, PATTERNS, settings)
     assert clean.status == "accepted" and clean.type.type == "IC3"
     assert found.status == "partly" and [f.reason for f in found.findings] == ["interference"]
     assert found.findings[0].value == 3 and "first at 0.30" in found.findings[0].detail
@@ -51,9 +51,11 @@ def test_a_train_under_pulses_is_the_train_without(train, settings):
     "touched",
     [
         lambda r: r,
-        lambda r: struck(r, AT, 1.0),  # no larger than the wheels
-        lambda r: struck(r, AT, 100.0, delays=np.array(list(PLACES.values())) / 5200.0),  # as fast as steel carries it
-        lambda r: struck(r, AT[:1], 100.0, last=600),  # 30 ms
+        lambda r: with_pulses(r, AT, 1.0),  # no larger than the wheels
+        lambda r: with_pulses(
+            r, AT, 100.0, delays=np.array(list(PLACES.values())) / 5200.0
+        ),  # as fast as steel carries it
+        lambda r: with_pulses(r, AT[:1], 100.0, last=600),  # 30 ms
     ],
 )
 def test_what_travels_lasts_or_is_small_is_left_alone(train, touched):
@@ -61,19 +63,19 @@ def test_what_travels_lasts_or_is_small_is_left_alone(train, touched):
     assert without_pulses(recording, SENSORS) == (recording, ())
 
 
-def test_a_bang_at_one_sensor_is_left_alone(train):
-    samples = struck(train, AT, 100.0).samples
+def test_an_impact_at_one_sensor_is_left_alone(train):
+    samples = with_pulses(train, AT, 100.0).samples
     samples[1:] = train.samples[1:]
     assert without_pulses(replace(train, samples=samples), SENSORS)[1] == ()
 
 
 def test_sensors_at_one_place_cannot_tell(train):
     near = tuple(replace(s, position=0.01 * k) for k, s in enumerate(SENSORS))
-    assert without_pulses(struck(train, AT, 100.0), near)[1] == ()
+    assert without_pulses(with_pulses(train, AT, 100.0), near)[1] == ()
 
 
 def test_a_dead_channel_has_no_say(train):
-    recording = struck(train, AT, 100.0)
+    recording = with_pulses(train, AT, 100.0)
     recording.samples[2] = 0.0
     recording.samples[3, 7] = np.nan
     found, pulses = without_pulses(recording, SENSORS)

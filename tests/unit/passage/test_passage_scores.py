@@ -35,7 +35,7 @@ def test_the_mean_scores_zero_and_silence_has_no_score():
 
 @pytest.mark.parametrize("location", ["OT", "SP", "CLP", "CP A7", "CP A9", "AS main", "AS diverging"])
 def test_the_true_model_reaches_what_the_noise_allows(location, settings):
-    """40 dB: the residual is the noise in the band, so the fit is the ceiling, known to 0.1 points from 1 s of quiet.
+    """40 dB: the residual is the noise in the band, so the fit is the limit, known to 0.1 points from 1 s of quiet.
 
     A time on the wrong side of a sample costs a wheel its first sample, up to a point of fit with eight wheels.
     """

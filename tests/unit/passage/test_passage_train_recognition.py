@@ -43,7 +43,7 @@ def test_rolling_train_on_three_sensors(direction, name, speed, acceleration, to
     assert passage.status == "accepted"
 
 
-def test_struck_train_is_timed_to_microseconds_after_blind_detection(settings):
+def test_a_train_of_impulses_is_timed_to_microseconds_after_blind_detection(settings):
     """From the raw recording to impact times: 40 dB, the bound is 0.7 us and twice it holds for the rms of 8 wheels."""
     from benchmarks.passage_truth import paper_model
 

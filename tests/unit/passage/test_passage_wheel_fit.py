@@ -30,7 +30,7 @@ def test_a_model_of_another_rate_keeps_its_poles():
     assert np.allclose(wheel_basis(model, None, RATE).response(0.0)[: 2 * 200 : 2], half[:200], atol=1e-12)
 
 
-def test_an_unstable_model_is_refused_in_words():
+def test_an_unstable_model_is_rejected_in_words():
     with pytest.raises(ValueError, match=r"unstable: \|eigenvalue\| 1\.2"):
         wheel_basis(ModalModel(np.diag([1.2]), np.ones(1), np.ones(1), RATE, ()), None, RATE)
 
@@ -154,8 +154,8 @@ def test_the_jump_test_keeps_its_level_and_finds_another_direction():
         if k < 5:
             first, phi = onsets(passage.times)
             aside = basis.coefficients(phi, np.array([0.3, 0.0, 0.0, 0.0]) * np.abs(model.b).max())
-            struck_aside = passage.samples + predict(passage.samples.size, first, aside, basis)
-            other.append(direction_test(struck_aside, passage.times, basis, passage.noise).failed_share)
+            beside_b = passage.samples + predict(passage.samples.size, first, aside, basis)
+            other.append(direction_test(beside_b, passage.times, basis, passage.noise).failed_share)
     share = np.mean(np.array(p_values) < 0.01)
     low, high = stats.binom.ppf([0.001, 0.999], 800, 0.01) / 800
     assert low <= share <= high

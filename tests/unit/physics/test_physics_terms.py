@@ -61,7 +61,7 @@ def test_a_zener_pad_has_the_dynamic_stiffness_of_its_equation():
     assert term.dynamic_stiffness(track, 1e6).real == pytest.approx(1.8 * 300e6, rel=1e-3)
 
 
-def test_parameters_outside_their_bounds_are_refused():
+def test_parameters_outside_their_bounds_are_rejected():
     prepared = prepare(TRACK, 1e-4, terms=(HangingSleeper(20, -1e-3),))
     with pytest.raises(SimulationError, match=r"gap = -0.001 m is outside 0.0 to 0.005 m"):
         run(prepared, 1e-3, [], car(), Drive(20.0, 1.0, entry=0.0))

@@ -31,7 +31,7 @@ J = 12
 HANGS = HangingSleeper(J, 3e-4)
 
 
-def blow(t):
+def impact(t):
     """An impact of 5 kN and 1.2 ms."""
     return np.where(t < 1.2e-3, 5e3 * np.sin(np.pi * t / 1.2e-3) ** 2, 0.0)
 
@@ -45,7 +45,7 @@ def form(band, x):
 
 def energy(prepared, duration):
     """Of rail, supports and the terms' laws after an impact at the middle [J]."""
-    motion = run(prepared, duration, pulses=[(7.2, blow)]).motion
+    motion = run(prepared, duration, pulses=[(7.2, impact)]).motion
     inside = slice(prepared.arrays.pad, prepared.arrays.pad + prepared.arrays.n)
     u, v, m = motion.u[inside], motion.v[inside], prepared.matrices
     total = 0.5 * form(m.mass, v) + 0.5 * form(m.stiffness, u)
@@ -70,7 +70,7 @@ def energy(prepared, duration):
         (THREE, (LiftingSleepers(10, 14, 1.0, 400.0), BallastHardening(11, 13, 3.0))),
     ],
 )
-def test_after_a_blow_the_energy_only_falls_until_all_is_at_rest(track, terms):
+def test_after_an_impact_the_energy_only_falls_until_all_is_at_rest(track, terms):
     """Springs give back what they take, dampers take: a track at rest before an impact is at rest long after it.
 
     A thousandth at 0.25 s: the slowest mode of these tracks decays with more than 1/e in 40 ms."""
@@ -131,7 +131,7 @@ def test_a_term_alone_adds_what_it_says_of_itself():
     assert ports_of((HANGS,), TWO) == list(HANGS.ports(TWO))
 
 
-def test_two_effects_that_take_the_same_ballast_are_refused():
+def test_two_effects_that_take_the_same_ballast_are_rejected():
     lifts = LiftingSleepers(J, J, 1.0)
     with pytest.raises(SimulationError, match="keep one of them"):
         ports_of((HANGS, HANGS), TWO)

@@ -15,7 +15,7 @@ from turnout.records import RawChannel
 COPY = "Copy the file again from the logger."
 
 
-def refusal(path, root, description):
+def rejection(path, root, description):
     with pytest.raises(ReadError) as caught:
         read(path, root, description)
     return caught.value
@@ -38,14 +38,14 @@ def saw(n=100):
     return np.arange(n) % 7 - 3.0
 
 
-def test_a_path_outside_the_root_is_refused(tmp_path, in_si, hammer_test):
+def test_a_path_outside_the_root_is_rejected(tmp_path, in_si, hammer_test):
     write(hammer_test, tmp_path / "secret.npz", "npz")
     root = tmp_path / "raw"
     root.mkdir()
     os.symlink(tmp_path / "secret.npz", root / "link.npz")
     os.symlink(tmp_path, root / "folder")
     for path in ("../secret.npz", "link.npz", "folder/secret.npz", str(tmp_path / "secret.npz")):
-        error = refusal(path, root, in_si)
+        error = rejection(path, root, in_si)
         assert error.reason == "outside_root"
         remedy = "Put the file under the raw root or correct the turnout's pattern."
         assert str(error) == f"{path}, the path: it leads outside the raw root. {remedy}"
@@ -60,14 +60,14 @@ def test_a_link_within_the_root_and_a_linked_root_are_fine(tmp_path, in_si, hamm
     assert read(tmp_path / "raw" / "a.npz", tmp_path / "raw", in_si).recordings[0].source == "a.npz"
 
 
-def test_a_link_in_a_circle_is_refused(tmp_path, in_si):
+def test_a_link_in_a_circle_is_rejected(tmp_path, in_si):
     os.symlink(tmp_path / "b", tmp_path / "a")
     os.symlink(tmp_path / "a", tmp_path / "b")
-    assert refusal("a", tmp_path, in_si).reason in ("outside_root", "unreadable")
+    assert rejection("a", tmp_path, in_si).reason in ("outside_root", "unreadable")
 
 
 def test_a_vanished_file(tmp_path, in_si):
-    error = refusal("A7_1.uff", tmp_path, in_si)
+    error = rejection("A7_1.uff", tmp_path, in_si)
     assert error.reason == "vanished"
     found = "there is no such file. Correct the path, or wait until the disk that holds the file is mounted again."
     assert str(error) == f"A7_1.uff, the path: {found}"
@@ -75,31 +75,31 @@ def test_a_vanished_file(tmp_path, in_si):
 
 def test_a_folder_is_no_file(tmp_path, in_si):
     (tmp_path / "A7_1.uff").mkdir()
-    error = refusal("A7_1.uff", tmp_path, in_si)
+    error = rejection("A7_1.uff", tmp_path, in_si)
     assert error.reason == "no_file"
     assert "it is a folder" in str(error)
 
 
 def test_an_empty_file(tmp_path, in_si):
     (tmp_path / "A7_1.uff").write_bytes(b"")
-    error = refusal("A7_1.uff", tmp_path, in_si)
+    error = rejection("A7_1.uff", tmp_path, in_si)
     assert error.reason == "empty"
     assert str(error) == f"A7_1.uff, byte 0: the file has no bytes. {COPY}"
 
 
 def test_an_unknown_format(tmp_path, in_si):
     (tmp_path / "a.xyz").write_bytes(b"hello world")
-    error = refusal("a.xyz", tmp_path, in_si)
+    error = rejection("a.xyz", tmp_path, in_si)
     assert "neither its first bytes (b'hello wo') nor its extension '.xyz' belong to a known format" in str(error)
     assert "Export the recording in one of the formats uff58, " in str(error)
-    error = refusal("a.xyz", tmp_path, replace(in_si, format="xls"))
+    error = rejection("a.xyz", tmp_path, replace(in_si, format="xls"))
     assert "the layout: the format 'xls' is not known. Use one of uff58, " in str(error)
 
 
 def test_a_file_of_another_format_than_configured(tmp_path, in_si, hammer_test):
     write(hammer_test, tmp_path / "a.npz", "npz")
     for format in ("uff58", "tdms", "hdf5", "mat", "rcmdx", "wav", "lvm", "parquet"):
-        assert refusal("a.npz", tmp_path, replace(in_si, format=format)).reason in ("unreadable", "truncated"), format
+        assert rejection("a.npz", tmp_path, replace(in_si, format=format)).reason in ("unreadable", "truncated"), format
 
 
 def test_a_missing_channel_names_those_there_are(tmp_path, in_si):
@@ -361,7 +361,7 @@ def test_one_stamp_of_the_future_costs_its_record_and_not_those_behind_it(odd, n
 
 
 @pytest.mark.parametrize(
-    ("minutes", "refused"),
+    ("minutes", "rejected"),
     [
         ((0, 3, 2, 5), [2]),  # nobody knows which of two is wrong: the first stays, as ever
         ((9, 1), [1]),
@@ -370,12 +370,12 @@ def test_one_stamp_of_the_future_costs_its_record_and_not_those_behind_it(odd, n
         ((4, 4, 4, 0, 4), [3]),  # equal stamps are in order
     ],
 )
-def test_the_records_that_stay_are_the_most_that_are_in_order(minutes, refused, tmp_path, in_si, hammer_test):
+def test_the_records_that_stay_are_the_most_that_are_in_order(minutes, rejected, tmp_path, in_si, hammer_test):
     start = hammer_test[0].started_at
     records = [replace(hammer_test[k % 4], started_at=start.replace(minute=m)) for k, m in enumerate(minutes)]
     path = write(records, tmp_path / "a.npz", "npz")
     result = read(path.name, tmp_path, in_si)
-    assert [int(e.where.split()[-1]) - 1 for e in result.errors] == refused
+    assert [int(e.where.split()[-1]) - 1 for e in result.errors] == rejected
     assert {e.reason for e in result.errors} == {"clock_backwards"}
 
 

@@ -99,12 +99,12 @@ def test_hdf5_with_datasets_at_the_root(by_name, tmp_path):
     both(read("a.h5", tmp_path, by_name).recordings[0])
 
 
-def test_hdf5_with_a_group_per_blow_and_a_time_vector(by_name, tmp_path):
+def test_hdf5_with_a_group_per_impact_and_a_time_vector(by_name, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        for blow in ("Impact 10", "Impact 9"):  # 9 comes before 10
-            group = file.create_group(blow)
+        for impact in ("Impact 10", "Impact 9"):  # 9 comes before 10
+            group = file.create_group(impact)
             group["time"] = np.arange(300) / RATE
-            group["Force"], group["Acc"] = FORCE * (1 if blow.endswith("9") else 3), RAIL
+            group["Force"], group["Acc"] = FORCE * (1 if impact.endswith("9") else 3), RAIL
             group["Force"].attrs["unit"], group["Acc"].attrs["unit"] = "N", "m/s²"
     first, second = read("a.h5", tmp_path, by_name).recordings
     both(first)
@@ -115,9 +115,9 @@ def named_by_a_list(folder, **lists):
     """Groups of datasets, which HDF5 keeps by the alphabet, below lists in the order in which the logger counts."""
     with h5py.File(folder / "a.h5", "w") as file:
         file.attrs.update({"rate": RATE, **lists})
-        for blow in (1, 2):
-            group = file.create_group(f"hit_{blow}")
-            group["Sleeper"], group["Force"], group["Acc"] = RAIL[::-1] * blow, FORCE, RAIL
+        for impact in (1, 2):
+            group = file.create_group(f"hit_{impact}")
+            group["Sleeper"], group["Force"], group["Acc"] = RAIL[::-1] * impact, FORCE, RAIL
     return "a.h5"
 
 
@@ -132,10 +132,10 @@ def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_nam
     units = [{"SLEEPER": "g", "FORCE": "kN", "ACC": "m/s²"}.get(name.upper(), "V") for name in names]
     result = read(named_by_a_list(tmp_path, channels=names, units=units), tmp_path, by_three_names)
     assert result.errors == ()
-    for blow, recording in enumerate(result.recordings, start=1):
+    for impact, recording in enumerate(result.recordings, start=1):
         np.testing.assert_allclose(recording.signal("force"), 1000 * FORCE, rtol=1e-14)
         np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
-        np.testing.assert_allclose(recording.signal("sleeper"), 9.80665 * blow * RAIL[::-1], rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("sleeper"), 9.80665 * impact * RAIL[::-1], rtol=1e-14)
 
 
 @pytest.mark.parametrize("lists", [{}, {"channels": ["a", "b", "c"]}])
@@ -356,7 +356,7 @@ def test_wav_of_16_bit_and_flac(by_index, tmp_path):
         assert np.abs(recording.signal("rail") * 87.9e-3 / 9.80665 - samples[:, 1]).max() <= half_step
 
 
-def test_the_real_hammer_test_of_five_blows(shared_data):
+def test_the_real_hammer_test_of_five_impacts(shared_data):
     """Truths printed in the file's own header, and its numbers as they stand there."""
     channels = (
         RawChannel("force", "Force (Trigger)", "force"),

@@ -158,7 +158,7 @@ def test_samples_in_an_object_reject_the_file_and_the_message_states_how_to_stor
     )
 
 
-def test_a_unit_of_a_channel_that_is_an_object_is_not_dropped(tmp_path):
+def test_a_unit_of_a_channel_that_is_an_object_is_not_lost(tmp_path):
     """Each channel is a structure with its samples and its unit."""
     path = tmp_path / "A7_1.mat"
     with h5py.File(path, "w", userblock_size=512) as file:

@@ -100,7 +100,7 @@ def test_a_24_bit_wav_is_a_part_of_full_scale(hammer_test, in_volts, tmp_path):
         assert 0.1 * step < error.max() <= 0.501 * step  # it was rounded, and no more than that
 
 
-def test_a_wav_file_refuses_a_second_record(hammer_test, tmp_path):
+def test_a_wav_file_rejects_a_second_record(hammer_test, tmp_path):
     with pytest.raises(ValueError, match="a WAV file holds one record, not 4"):
         write(hammer_test, tmp_path / "a.wav", "wav")
 

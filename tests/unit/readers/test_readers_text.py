@@ -322,7 +322,7 @@ def test_a_spreadsheet_is_named_whatever_it_is_called(kind, name, format, tmp_pa
     assert str(caught.value) == f"{name}, byte 0: {said}." and caught.value.reason == "unreadable"
 
 
-def test_a_time_column_in_another_unit_is_refused(tmp_path):
+def test_a_time_column_in_another_unit_is_rejected(tmp_path):
     rows = "".join(f"{k / 72e6:.12g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text("time [h];force;acc\n" + rows)
     with pytest.raises(ReadError) as caught:

@@ -171,7 +171,7 @@ def test_big_endian_and_crlf(hammer_test, in_si, tmp_path):
     np.testing.assert_array_equal(read("a.uff", tmp_path, one).recordings[0].samples[0], hammer_test[0].samples[0])
 
 
-def test_another_floating_point_format_is_refused(hammer_test, in_si, tmp_path):
+def test_another_floating_point_format_is_rejected(hammer_test, in_si, tmp_path):
     head, numbers, tail = _first_set(write(hammer_test[:1], tmp_path / "a.uff", "uff58b").read_bytes())
     (tmp_path / "a.uff").write_bytes(head.replace(b"     1     2", b"     1     1", 1) + numbers + tail)
     (error,) = read("a.uff", tmp_path, replace(in_si, channels=in_si.channels[:1])).errors

@@ -46,7 +46,7 @@ def test_nan_is_no_null():
     ],
     ids=str,
 )
-def test_a_value_that_does_not_fit_is_refused(values, type_):
+def test_a_value_that_does_not_fit_is_rejected(values, type_):
     with pytest.raises((pa.ArrowException, TypeError, ValueError, OverflowError)):
         arrow_array(values, type_)
 

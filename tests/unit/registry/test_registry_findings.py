@@ -81,7 +81,7 @@ def fleet(tmp_path_factory):
     assert (
         bench.register(
             *results, tables={"events": [EVENT, EVENT | {"event_id": "e2", "turnout_id": "t11", "section_id": None}]}
-        ).n_refused
+        ).n_rejected
         == 0
     )
     with open_registry(bench.registry) as connection:
@@ -163,11 +163,11 @@ def test_the_newest_visit_of_each_group_counts(fleet):
     assert fleet.execute("select verdict from findings_newest where turnout_id = 't8'").fetchall() == [("none",)]
 
 
-def test_a_refused_finding_takes_its_parameters_and_curves_with_it(tmp_path):
+def test_a_rejected_finding_takes_its_parameters_and_curves_with_it(tmp_path):
     bad = gap("t1", 0, 0.4e-3, 0.1e-3)
     bad.tables["mismatch_findings"][0]["verdict"] = "perhaps"
     bench = Bench(tmp_path)
-    assert bench.register(bad).n_refused == 1
+    assert bench.register(bad).n_rejected == 1
     for table in ("mismatch_findings", "mismatch_parameters", "mismatch_curves"):
         assert bench.ask(f"select count(*) from {table}") == [(0,)]
 

@@ -36,7 +36,7 @@ def test_a_registry_holds_its_own_rows_though_its_name_as_a_pattern_matches_a_co
 
 
 @pytest.mark.parametrize("name", ["what?", "a\\b"])
-def test_a_folder_in_which_no_database_can_be_made_is_refused_before_anything_is_written(name, tmp_path):
+def test_a_folder_in_which_no_database_can_be_made_is_rejected_before_anything_is_written(name, tmp_path):
     bench = bench_in(tmp_path / name)
     with pytest.raises(RegistryError, match="Rename that folder, or put the registry elsewhere"):
         bench.register(hammer_result())

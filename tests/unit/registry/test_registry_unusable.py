@@ -39,7 +39,7 @@ def passage(k, day, status):
     return UnitResult(unit, "t1", "passage", "k", "1", "ok", {"passages": [row]})
 
 
-def test_a_section_all_of_whose_blows_were_rejected_is_on_the_list(bench):
+def test_a_section_all_of_whose_impacts_were_rejected_is_on_the_list(bench):
     bench.register(rejected_result(day="2026-01-05"), hammer_result(section="A2", day="2026-01-05"))
     said = "no hammer test could be used yet (1 tried); 2026-01-05: 6 of 6 impacts rejected (sign_reversed)"
     assert bench.ask(LIST) == [("t1", "A1", "hammer", "cannot tell", said)]

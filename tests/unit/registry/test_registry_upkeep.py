@@ -206,7 +206,7 @@ def strip_column(bench, table, file, column):
     path.write_text(json.dumps(generation))
 
 
-def test_a_column_that_changed_its_type_is_refused_before_anything_is_written(bench, hammer):
+def test_a_column_that_changed_its_type_is_rejected_before_anything_is_written(bench, hammer):
     bench.register(hammer())
     path = bench.registry / GENERATION_FILE
     generation = json.loads(path.read_text())
@@ -237,7 +237,7 @@ def test_no_registry_is_said(tmp_path):
         ({"a": "-- needs: b", "b": "-- needs: a"}, "need each other in a circle"),
     ],
 )
-def test_views_that_cannot_be_ordered_are_refused(texts, said):
+def test_views_that_cannot_be_ordered_are_rejected(texts, said):
     with pytest.raises(RegistryError, match=said):
         sort_by_needs(texts)
 

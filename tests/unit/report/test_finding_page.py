@@ -301,8 +301,8 @@ def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
     assert said in headline(named() | {"term_json": json.dumps([term])})
 
 
-def test_a_refused_name_is_not_offered_as_what_was_left_out():
-    """An unknown may hold the term that was tried: it is said to be refused, and nobody is told to accept it."""
+def test_a_rejected_name_is_not_offered_as_what_was_left_out():
+    """An unknown may hold the term that was tried: it is said to be rejected, and nobody is told to accept it."""
     shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
     assert "what was rejected" in shown and "what was left out" not in shown and "--accept" not in shown
     assert "what was left out" in page(named()) and "--accept" in page(named())

@@ -26,7 +26,7 @@ def test_causal_filter_is_silent_before_the_onset_and_zero_phase_is_symmetric():
 
 
 @pytest.mark.parametrize("edges", [(None, None), (800.0, 80.0), (-5.0, 80.0), (10.0, 10_000.0)])
-def test_impossible_edges_are_refused(edges):
+def test_impossible_edges_are_rejected(edges):
     with pytest.raises(ValueError, match="cannot pass"):
         butterworth_sections(*edges, RATE)
 
@@ -52,7 +52,7 @@ def test_exponential_window_shifts_a_pole_and_correction_brings_it_back():
         exponential_window(3, 0, -1.0, RATE)
 
 
-def test_exponential_window_makes_nothing_ahead_of_the_blow_larger():
+def test_exponential_window_makes_nothing_ahead_of_the_impact_larger():
     window = exponential_window(2000, 1000, 100.0, RATE)
     assert (window[:1001] == 1.0).all()
     assert window[-1] == pytest.approx(np.exp(-100.0 * 999 / RATE))

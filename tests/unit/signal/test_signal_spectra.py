@@ -45,7 +45,7 @@ def test_interval_in_decibel_uses_log10():
     assert 10 * np.log10(density_interval(10)) == pytest.approx([-2.3, 3.2], abs=0.05)
 
 
-def test_unequal_shapes_and_too_short_transforms_are_refused():
+def test_unequal_shapes_and_too_short_transforms_are_rejected():
     with pytest.raises(ValueError, match="one shape"):
         cross_spectra(np.zeros((2, 8)), np.zeros((3, 8)), RATE)
     with pytest.raises(ValueError, match="would cut"):

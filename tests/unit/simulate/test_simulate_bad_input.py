@@ -41,7 +41,7 @@ def test_a_wheel_that_starts_off_the_track_is_named_at_time_zero():
 
 
 @pytest.mark.parametrize("speed", [0.0, -3.0, np.nan, np.inf])
-def test_a_speed_that_is_none_is_refused(speed):
+def test_a_speed_that_is_none_is_rejected(speed):
     with pytest.raises(SimulationError, match="speed must be above 0 m/s"):
         simulate_passage(TRACK, car(), speed, SENSOR)
 
@@ -58,7 +58,7 @@ def test_negative_stiffness_says_support_place_and_value():
         TRACK.with_(ballast_stiffness=stiffness)
 
 
-def test_a_value_that_is_no_number_is_refused():
+def test_a_value_that_is_no_number_is_rejected():
     with pytest.raises(SimulationError, match="pad_damping holds"):
         TRACK.with_(pad_damping=np.nan)
 
@@ -90,12 +90,12 @@ def test_newton_that_does_not_converge_says_time_port_and_residual():
         run(prepare(TRACK, 1e-4), 0.05, [], wheel, drive)
 
 
-def test_a_track_that_carries_nothing_is_refused():
+def test_a_track_that_carries_nothing_is_rejected():
     with pytest.raises(SimulationError, match="carries no load"):
         prepare(TRACK.with_(ballast_stiffness=0.0), 1e-4)
 
 
-def test_a_body_on_nothing_is_refused():
+def test_a_body_on_nothing_is_rejected():
     floating = Vehicle("v", (Body("box", 1e3, 1e3, 1.0), Body("wheel", 700.0, None, 0.0)), (), (1,))
     with pytest.raises(SimulationError, match="rests on nothing"):
         simulate_passage(TRACK, floating, 30.0, SENSOR)
@@ -143,7 +143,7 @@ def test_other_bad_input_says_what_was_found(build, said):
         ("name: [1, 2", "line"),
     ],
 )
-def test_a_parameter_file_is_refused_with_file_and_place(tmp_path, text, said):
+def test_a_parameter_file_is_rejected_with_file_and_place(tmp_path, text, said):
     path = tmp_path / "wrong.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=said) as caught:
@@ -153,7 +153,7 @@ def test_a_parameter_file_is_refused_with_file_and_place(tmp_path, text, said):
 
 @pytest.mark.parametrize(("direction", "place"), [("facing", 8.9), ("trailing", 15.1)])
 @pytest.mark.parametrize("mounting", ["rail web", "sleeper"])
-def test_a_sensor_where_wheels_are_not_yet_on_the_track_is_refused_with_both_limits(direction, place, mounting):
+def test_a_sensor_where_wheels_are_not_yet_on_the_track_is_rejected_with_both_limits(direction, place, mounting):
     sensors = [*SENSOR, Sensor("B", place, mounting)]
     with pytest.raises(SimulationError, match=rf"'B' at {place:.3f} m.* only between 9\.000 m and 15\.000 m"):
         simulate_passage(TRACK, car(), 30.0, sensors, direction)

@@ -86,12 +86,12 @@ def test_a_simulated_hammer_test_keeps_its_truth_apart(tmp_path, monkeypatch):
     assert main([*command, "--truth", "truth"]) == 0
     told = [json.loads((tmp_path / f"truth/A7_{k}.json").read_text()) for k in (1, 2)]
     assert all(t["effects"] == [{"term": "local_ballast", "sleeper": 24.6, "factor": 0.3}] for t in told)
-    places = [blow["place_m"] for t in told for blow in t["blows"]]
+    places = [impact["position_m"] for t in told for impact in t["impacts"]]
     assert len(set(places)) == 4 and np.max(np.abs(np.array(places) - 24.6)) <= 0.0201
     folder = next(tmp_path.rglob("A7_1.h5")).parent
     recordings = read("A7_1.h5", folder, RawDescription(CHANNELS)).recordings
-    for recording, blow in zip(recordings, told[0]["blows"], strict=True):
-        assert recording.samples[0].max() == pytest.approx(blow["peak_force_n"], rel=3e-3)
+    for recording, impact in zip(recordings, told[0]["impacts"], strict=True):
+        assert recording.samples[0].max() == pytest.approx(impact["peak_force_n"], rel=3e-3)
 
 
 HAMMER = ["simulate", "hammer", "--section", "A7"]

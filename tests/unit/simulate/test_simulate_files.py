@@ -17,7 +17,7 @@ LEVEL = '  level: {value: 3, unit: dB, source: "estimate: a main line some years
 STRETCH = "stretches:\n  - {from: {value: %s, unit: m, source: x}, to: {value: %s, unit: m, source: x}, rail: *rail}\n"
 
 
-def refused(load, path, text, said):
+def rejected(load, path, text, said):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=said) as caught:
         load(str(path))
@@ -58,9 +58,9 @@ def refused(load, path, text, said):
          r"routes\.main\[2\]\.places\[0\]: 1.0 has no unit and source"),
     ],
 )  # fmt: skip
-def test_a_track_file_is_refused_with_its_place_and_what_to_write(tmp_path, old, new, said):
+def test_a_track_file_is_rejected_with_its_place_and_what_to_write(tmp_path, old, new, said):
     assert old in TRACK
-    refused(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
+    rejected(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_a_track_file_is_refused_with_its_place_and_what_to_write(tmp_path, old,
         ("rests_on: [b1, b2]", "rests_on: 3", r"cars\[0\]\.rests_on: 3 instead of a list"),
     ],
 )
-def test_a_vehicle_file_is_refused_with_its_place(tmp_path, old, new, said):
+def test_a_vehicle_file_is_rejected_with_its_place(tmp_path, old, new, said):
     assert old in VEHICLE
-    refused(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
+    rejected(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_vehicle_file_is_refused_with_its_place(tmp_path, old, new, said):
 def test_an_error_of_a_track_file_names_its_line(tmp_path, old, new, line):
     text = TRACK.replace(old, new, 1)
     number = 1 + next(k for k, said in enumerate(text.split("\n")) if said.startswith(line))
-    refused(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
+    rejected(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
 
 
 def test_an_error_of_what_another_track_says_names_the_line_of_that_file(tmp_path):
@@ -172,7 +172,7 @@ def spoilt(content):
 @pytest.mark.parametrize(
     ("load", "content"), [(load_track, SMALL_TRACK), (load_vehicle, SMALL_VEHICLE)], ids=["track", "vehicle"]
 )
-def test_whatever_stands_in_a_file_loads_or_is_refused_in_words(tmp_path, monkeypatch, load, content):
+def test_whatever_stands_in_a_file_loads_or_is_rejected_in_words(tmp_path, monkeypatch, load, content):
     """Never with a traceback: a YAML reader makes numbers, text, lists, mappings and nothing of what people write."""
     path, parsed = tmp_path / "file.yaml", [content]
     path.write_text("", encoding="utf-8")

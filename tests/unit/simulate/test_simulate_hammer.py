@@ -15,14 +15,14 @@ HAMMER = Hammer(
 SHORT = {"n_impacts": 1, "duration": 0.05, "pretrigger": 0.005}
 
 
-def blow(**options):
+def impact(**options):
     return simulate_hammer(TRACK, 15.0, HAMMER, **SHORT, **options)[0].samples
 
 
 def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_roll_on():
     """It bounces off a track at rest with at most the speed it came with; 1 % for the anti-alias filter."""
     paths = tuple(term.example() for term in TERMS if term.effect_type == "path")
-    found, bare = blow(terms=(SurfaceDip(15.0, -1e-3, 0.6), *paths)), blow()
+    found, bare = impact(terms=(SurfaceDip(15.0, -1e-3, 0.6), *paths)), impact()
     assert len(paths) >= 5
     assert 1.0 < found[0].sum() / 20e3 / (MASS * VELOCITY) < 2.02
     assert np.array_equal(found, bare)
@@ -33,11 +33,11 @@ def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
     quiet = [Sensor("A", 15.0), Sensor("B", 15.6)]
     terms = (LocalBallast(25, 0.3), SensorPosition("B", 0.15))
     by_gain = [
-        blow(sensors=quiet, prepared=prepare_hammer(TRACK, 15.0, (*terms, SensorGain("A", gain))))
+        impact(sensors=quiet, prepared=prepare_hammer(TRACK, 15.0, (*terms, SensorGain("A", gain))))
         for gain in (1.0, 3.0)
     ]
     assert np.allclose(by_gain[1][1], 3.0 * by_gain[0][1], rtol=1e-9, atol=1e-9)
-    assert np.array_equal(blow(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
+    assert np.array_equal(impact(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
 
 
 def test_a_term_counts_the_supports_of_the_whole_track_however_much_of_it_is_marched():
@@ -66,11 +66,11 @@ def test_of_a_run_of_supports_a_stretch_keeps_what_lies_in_it():
 
 
 @pytest.mark.parametrize(("rate", "substeps"), [(10e3, 1), (20e3, 2), (19.2e3, 1)])
-def test_a_track_prepared_for_another_step_is_refused(rate, substeps):
+def test_a_track_prepared_for_another_step_is_rejected(rate, substeps):
     prepared = prepare_hammer(TRACK, 15.0, rate=rate, substeps=substeps)
     with pytest.raises(SimulationError, match=r"prepared for steps of \S+ s, but 20000\.0 Hz .* ask for 5e-05 s"):
-        blow(prepared=prepared)
-    assert blow(prepared=prepared, rate=rate, substeps=substeps).shape[1] == round(0.05 * rate)
+        impact(prepared=prepared)
+    assert impact(prepared=prepared, rate=rate, substeps=substeps).shape[1] == round(0.05 * rate)
 
 
 def test_the_former_name_of_the_number_of_impacts_still_counts_and_warns():

@@ -62,7 +62,7 @@ def test_a_pad_changes_the_receptance_by_its_width_and_not_by_the_mesh():
     assert np.max(np.abs(found[0] - found[1])) < 0.15 * np.max(np.abs(expected))
 
 
-def test_a_pad_wider_than_three_nodes_is_refused():
+def test_a_pad_wider_than_three_nodes_is_rejected():
     with pytest.raises(
         SimulationError, match=r"pad_width 0\.25 m is not between 0 and 0\.200 m.* 0\.075 m apart; fewer"
     ):

@@ -65,7 +65,7 @@ def test_velocity_and_acceleration_between_nodes_add_up_to_the_motion():
 
 
 @pytest.mark.parametrize("offset", [0.04, 0.075])
-def test_a_blow_between_nodes_has_the_receptance_of_the_infinite_track(offset):
+def test_an_impact_between_nodes_has_the_receptance_of_the_infinite_track(offset):
     """Floquet's closed form, 60 to 350 Hz, to 1 %: four elements per bay cost 0.6 %, its own element gives 6 %."""
     track = uniform_track(60.0, end_length=12.0, end_damping=400.0)
     prepared, place = prepare(track, 5e-5), 30.0 + offset

@@ -1,4 +1,4 @@
-"""The rail's element: exact statics, local compliance, refusals."""
+"""The rail's element: exact statics, local compliance, rejections."""
 
 import numpy as np
 import pytest
@@ -69,6 +69,6 @@ def test_shape_functions_meet_the_nodes_and_rotate_with_the_section():
 
 
 @pytest.mark.parametrize("change", [{"bending_stiffness": -1.0}, {"mass": 0.0}, {"damping": -1.0}, {"beam": "wire"}])
-def test_a_rail_that_cannot_be_is_refused_with_its_value(change):
+def test_a_rail_that_cannot_be_is_rejected_with_its_value(change):
     with pytest.raises(SimulationError, match=str(next(iter(change.values()))).replace(".", r"\.")):
         Rail(**(UIC60 | change))

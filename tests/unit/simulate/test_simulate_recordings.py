@@ -58,12 +58,12 @@ def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
     assert runs[0][1].samples.tobytes() == runs[1][1].samples.tobytes() != runs[2][1].samples.tobytes()
 
 
-def test_force_and_acceleration_of_a_blow_are_those_of_a_measured_one():
-    blow = simulate_hammer(uniform_track(36.0), 18.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
-    assert [c.quantity for c in blow.channels] == ["force", "acceleration", "acceleration"]
-    force, acceleration = blow.signal("hammer"), blow.signal("acc_1")
+def test_force_and_acceleration_of_an_impact_are_those_of_a_measured_one():
+    impact = simulate_hammer(uniform_track(36.0), 18.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
+    assert [c.quantity for c in impact.channels] == ["force", "acceleration", "acceleration"]
+    force, acceleration = impact.signal("hammer"), impact.signal("acc_1")
     contact = np.flatnonzero(force > 0.05 * force.max())
-    assert contact[0] > 0.05 * blow.rate - 30 and 0.8e-3 < np.ptp(contact) / blow.rate < 2.5e-3
+    assert contact[0] > 0.05 * impact.rate - 30 and 0.8e-3 < np.ptp(contact) / impact.rate < 2.5e-3
     assert acceleration[contact[0] : contact[0] + 10].mean() > 0.0  # pushed down, positive down
     assert abs(force[: contact[0] - 40].mean()) < 2.0
 
@@ -213,7 +213,7 @@ def test_own_error_falls_with_the_step_and_is_small_where_it_should_be():
     assert end_error(case).max() < 0.2
 
 
-def test_friction_that_a_blow_cannot_overcome_is_a_dashpot():
+def test_friction_that_an_impact_cannot_overcome_is_a_dashpot():
     """Below slip F0 tanh(v/v0) is a damper of F0/v0: 20 kN over 2 mm/s, to the 1 % of (v/v0)²/3 at a sixth of v0."""
     track, sensors = uniform_track(24.0), [Sensor("A", 12.0), Sensor("B", 12.9)]
     stuck = np.array(track.pad_damping)

@@ -88,7 +88,7 @@ def soft_pad(track):
     return (physics.LocalPad(track.nearest_support(SLEEPER), SOFT),)
 
 
-def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1, turnout="t1"):
+def write_hammer_tests(folder, terms=None, labels=("A", "B"), day=DAY, impacts=3, seed=1, turnout="t1"):
     """Hammer tests of a campaign."""
     config, raw = Path(folder) / "config", Path(folder) / "raw" / turnout
     track = load_track("small", folder=config / "tracks")
@@ -98,7 +98,7 @@ def strike(folder, terms=None, labels=("A", "B"), day=DAY, blows=3, seed=1, turn
         sensors = (Sensor("rail", place, "rail head at sleeper", noise=0.02),)
         hammer = Hammer(force=Sensor("force", place, "hammer", "force", noise=1.0), position_spread=0.0)
         recordings = simulate_hammer(
-            track, place, hammer, sensors, blows, made, seed + k, 5000.0, 0.4, started_at=day,
+            track, place, hammer, sensors, impacts, made, seed + k, 5000.0, 0.4, started_at=day,
         )  # fmt: skip
         path = raw / "hammer" / f"{day:%Y-%m-%d}" / f"{label}_1.h5"
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A finding written into a track file: readable, refused where it is not sure, replaced and not doubled."""
+"""A finding written into a track file: readable, rejected where it is not sure, replaced and not doubled."""
 
 import json
 import shutil
@@ -132,7 +132,7 @@ def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypa
 
 
 @pytest.mark.parametrize("more", [{"verdict": "unknown", "grade": None}, {"verdict": "a_or_b"}, {"grade": None}])
-def test_what_is_not_named_is_refused_unless_asked_for(config, more):
+def test_what_is_not_named_is_rejected_unless_asked_for(config, more):
     with pytest.raises(SimulationError, match="--anyway"):
         accept(finding(**more), config, "t1")
     assert not (config / "tracks/t1.yaml").exists()
@@ -140,7 +140,7 @@ def test_what_is_not_named_is_refused_unless_asked_for(config, more):
     assert len(own(config).terms) == 1
 
 
-def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_refused(config):
+def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_rejected(config):
     with pytest.raises(SimulationError, match="no effect that could be accepted"):
         accept(finding(term_json=None, verdict="none"), config, "t1", anyway=True)
     flat = {"term": "wheel_flat", "fixed": {"wheel": 1}, "parameters": {"length": GAP}}
@@ -171,7 +171,7 @@ def test_an_entry_by_hand_that_makes_no_sense_is_named(config):
             accepted_of(own(config).terms)
 
 
-def test_a_track_that_extends_itself_is_refused(config):
+def test_a_track_that_extends_itself_is_rejected(config):
     (config / "tracks/a.yaml").write_text("extends: b\n")
     (config / "tracks/b.yaml").write_text("extends: a\n")
     with pytest.raises(SimulationError, match="extends itself"):
@@ -240,7 +240,7 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
         assert j[:, -1] == pytest.approx((a - b) / 1e-3, abs=0.02 * np.abs((a - b) / 1e-3).max())
 
 
-def test_a_term_that_cannot_be_told_from_no_effect_is_refused(config):
+def test_a_term_that_cannot_be_told_from_no_effect_is_rejected(config):
     nothing = HANGS | {"parameters": {"gap": GAP | {"value": 1e-6}}}
     with pytest.raises(SimulationError, match="no parameter differs"):
         accept(finding(nothing), config, "t1")

@@ -190,7 +190,7 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     monkeypatch.chdir(tmp_path)
     for k, day in enumerate(DAYS):
         soft = (lambda track: (physics.LocalBallast(track.nearest_support(small.SLEEPER), 0.4),)) if k > 1 else None
-        small.strike(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
+        small.write_hammer_tests(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
     before, model = row_of_night(), calibrate_turnout("t1")
     assert (before["verdict"], before["term"], before["position_m"]) == ("named", "local_ballast", 18.0)
     either = {"verdict": "a_or_b", "rival_term": "hanging_sleeper"}  # which is accepted with --anyway alone

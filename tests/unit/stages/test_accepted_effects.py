@@ -40,7 +40,7 @@ def test_one_sleeper_beyond_the_end_is_left_out():
         (56.4, SimulationError, "lifting_sleepers from 56.4 m back to 55.8 m"),
     ],
 )
-def test_a_place_that_is_none_is_refused(first, error, said):
+def test_a_place_that_is_none_is_rejected(first, error, said):
     share = Number(1.0, "-", "x")
     entry = {"term": "lifting_sleepers", "first": first, "last": 55.8, "share": share}
     with pytest.raises(error, match=said):

@@ -44,7 +44,7 @@ def year(tmp_path_factory, repository):
     small.lay_out(folder, repository)
     for k, day in enumerate(DAYS):
         terms = small.soft_pad if k == 3 else None
-        small.strike(folder, terms, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
+        small.write_hammer_tests(folder, terms, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
     small.roll(folder, day=datetime.fromisoformat(f"{DAYS[0]}T09:00"))
     return folder
 

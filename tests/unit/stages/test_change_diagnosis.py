@@ -50,7 +50,7 @@ def softened(folder, repository, terms):
     small.lay_out(folder, repository)
     for k, day in enumerate(DAYS):
         at = datetime.fromisoformat(f"{day}T09:00")
-        small.strike(folder, terms if k > 1 else None, day=at, seed=10 * k)
+        small.write_hammer_tests(folder, terms if k > 1 else None, day=at, seed=10 * k)
     small.roll(folder, terms, (80.0, 90.0, 100.0, 110.0, 120.0), at)
     return folder
 
@@ -137,7 +137,7 @@ def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, mon
     monkeypatch.setattr(change_diagnosis, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k)))
     assert night().processed == 1 and fitted == list(DAYS)
     assert night().processed == 0 and fitted == list(DAYS)
-    small.strike(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
+    small.write_hammer_tests(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
     assert night().processed == 1 and fitted == [*DAYS, "2026-06-01"]
     alarms.clear()
     assert night().processed == 0

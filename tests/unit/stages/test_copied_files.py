@@ -55,7 +55,7 @@ def test_a_file_of_the_same_size_or_of_another_kind_or_unreadable_is_no_copy(raw
 
 def test_a_copied_test_counts_once_in_a_diagnosis_and_that_is_said(tmp_path, repository, monkeypatch):
     small.lay_out(tmp_path, repository)
-    small.strike(tmp_path)
+    small.write_hammer_tests(tmp_path)
     monkeypatch.chdir(tmp_path)
     turnout = with_raw(load_configuration("config").turnout("t1"), tmp_path / "raw")
 

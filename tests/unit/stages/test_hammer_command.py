@@ -37,7 +37,7 @@ def record(path, section="A7", test=1, seed=5, change=None, file_format="hdf5", 
     response = paper_response(section, 1.0, 1.0)
     for k in range(99):
         recordings, truth = hammer_test(response, 12.0, DAY, test, np.random.default_rng([seed, test, k]))
-        if not any(blow.fault for blow in truth):
+        if not any(impact.fault for impact in truth):
             break
     recordings = recordings if dated else [replace(r, started_at=None) for r in recordings]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -106,7 +106,7 @@ def test_the_dynamic_stiffness_is_that_of_the_closed_form_within_its_interval(tm
 
 def test_what_is_said_is_what_the_registry_will_hold(tmp_path, capsys):
     def two_faults(recordings):
-        clipped, twice = scenario.overload(recordings[1]), _struck_twice(recordings[7])
+        clipped, twice = scenario.overload(recordings[1]), _with_double_impact(recordings[7])
         return [recordings[0], clipped, *recordings[2:7], twice, *recordings[8:]]
 
     files = [*filed(tmp_path, "A9", (1,)), *filed(tmp_path, "A9", (2,), change=two_faults)]
@@ -125,9 +125,9 @@ def test_what_is_said_is_what_the_registry_will_hold(tmp_path, capsys):
         assert f_half == pytest.approx(2.1098 * mode["frequency_se_hz"], abs=0.06)
         assert zeta == pytest.approx(mode["damping_ratio"], abs=6e-5)
         assert zeta_half == pytest.approx(2.1098 * mode["damping_se"], abs=6e-5)
-    refused = re.findall(r"A9_(\d)\.h5 +(\d+) +([\d.]+) kN +([\d.]+) ms  rejected, (\w+): (.*)", text)
+    rejected = re.findall(r"A9_(\d)\.h5 +(\d+) +([\d.]+) kN +([\d.]+) ms  rejected, (\w+): (.*)", text)
     wanted = [i for i in held["impacts"] if i["status"] == "rejected"]
-    assert [(int(t), int(b) - 1, w, d) for t, b, _, _, w, d in refused] == [
+    assert [(int(t), int(b) - 1, w, d) for t, b, _, _, w, d in rejected] == [
         (i["test"], i["record"], i["reason"], i["detail"]) for i in wanted
     ]
     assert [(i["test"], i["record"], i["reason"]) for i in wanted] == [(2, 1, "overload"), (2, 7, "double_hit")]
@@ -136,13 +136,13 @@ def test_what_is_said_is_what_the_registry_will_hold(tmp_path, capsys):
     assert 0.0 <= held["models"][0]["coherence_minimum"] - lowest <= 0.0011  # cut to three digits
 
 
-def _struck_twice(recording):
+def _with_double_impact(recording):
     """A second contact of a third of the first, 25 ms behind it: little of the decay is left."""
     force = recording.samples[0] + 0.3 * np.roll(recording.samples[0], round(0.025 * recording.rate))
     return replace(recording, samples=np.stack([force, recording.samples[1]]))
 
 
-def test_nothing_is_shown_as_sound_that_the_chain_refuses(tmp_path, capsys):
+def test_nothing_is_shown_as_sound_that_the_chain_rejects(tmp_path, capsys):
     files = filed(tmp_path, "SP", (1,), change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, text, _ = say(capsys, tmp_path, *files)
     assert code == 1 and "no resonance" in text and "0 of 10 accepted" in text
@@ -308,7 +308,7 @@ def test_the_figure_holds_what_was_found_and_nothing_else_is_written(tmp_path, c
     assert f"{ballast:g} ± {half:g} Hz" in drawing and f"ballast {ballast:.0f} Hz" in drawing
 
 
-def test_the_figure_of_a_refused_test_shows_its_blows_and_no_resonance(tmp_path, capsys):
+def test_the_figure_of_a_rejected_test_shows_its_impacts_and_no_resonance(tmp_path, capsys):
     files = filed(tmp_path, "SP", change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, _, _ = say(capsys, tmp_path, *files, more=["--figure", str(tmp_path / "sp.svg")])
     drawing = (tmp_path / "sp.svg").read_text()
@@ -316,7 +316,7 @@ def test_the_figure_of_a_refused_test_shows_its_blows_and_no_resonance(tmp_path,
     assert "0 used, 10 rejected" in drawing and "Receptance" not in drawing
 
 
-def test_a_figure_that_cannot_be_made_is_refused_before_anything_is_computed(tmp_path, capsys):
+def test_a_figure_that_cannot_be_made_is_rejected_before_anything_is_computed(tmp_path, capsys):
     (path,) = filed(tmp_path)
     (tmp_path / "folder.svg").mkdir()
     for name in ("a7.png", "none/a7.svg", "folder.svg"):

@@ -32,11 +32,11 @@ def lay_out(raw, section="A7", file_format="hdf5", n_test=3, ballast=1.0, railpa
     folder.mkdir(parents=True)
     rng, truth = np.random.default_rng(seed), []
     for test in range(1, n_test + 1):
-        recordings, blows = hammer_test(paper_response(section, ballast, railpad), 12.0, DAY, test, rng)
+        recordings, impacts = hammer_test(paper_response(section, ballast, railpad), 12.0, DAY, test, rng)
         if change is not None:
             recordings = change(test, recordings)
         write(recordings, folder / f"{section}_{test}.{EXTENSIONS[file_format]}", file_format)
-        truth += blows
+        truth += impacts
     notes = (
         "campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n2024-05-13,2024-05-13T09:00:00,12.0,,,\n"
     )
@@ -66,7 +66,7 @@ def test_modes_lie_within_five_standard_errors_of_the_truth(tmp_path, file_forma
         assert mode["rail_temperature_c"] == 12.0
 
 
-def test_every_mishap_of_a_blow_is_named_and_no_sound_blow_is_lost(tmp_path):
+def test_every_fault_of_an_impact_is_named_and_no_sound_impact_is_lost(tmp_path):
     unit, turnout, truth = lay_out(tmp_path, "OT", seed=11)
     fault = {(b.test, b.record): b.fault for b in truth}
     assert sum(bool(f) for f in fault.values()) >= 1, "the seed must bring at least one mishap"
@@ -93,8 +93,8 @@ def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
     assert rows["models"][0]["status"] == "accepted" and len(rows["impacts"]) == 20
 
 
-def test_a_blow_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
-    """A resonance of 1350 Hz at half of the peak rings in one impact of ten alone: it was struck elsewhere, or
+def test_an_impact_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
+    """A resonance of 1350 Hz at half of the peak rings in one impact of ten alone: it was hit elsewhere, or
     loose."""
 
     def change(_, recordings):
@@ -170,7 +170,7 @@ def test_a_small_hammer_is_believed_where_the_configuration_says_so(tmp_path):
     assert rows["models"][0]["status"] == "accepted"
 
 
-def test_a_test_called_by_the_time_of_its_recording_loses_no_blow_on_the_way_into_the_registry(tmp_path):
+def test_a_test_called_by_the_time_of_its_recording_loses_no_impact_on_the_way_into_the_registry(tmp_path):
     """Fourteen digits are no number of a test; the largest that a column of 32 bits holds is."""
     unit, turnout, _ = lay_out(tmp_path, "A7")
     folder = tmp_path / "tommerup_s1/hammer" / DAY.isoformat()
@@ -179,8 +179,8 @@ def test_a_test_called_by_the_time_of_its_recording_loses_no_blow_on_the_way_int
     (unit,) = scan(turnout, tmp_path).units
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     arrival = Arrival(0, "tommerup_s1/hammer/A7/2024-05-13", "tommerup_s1", "hammer", "key", "1", rows)
-    gathered, refusals = gather("impacts", [arrival])
-    assert refusals == [] and gathered.num_rows == len(rows["impacts"]) == 30
+    gathered, rejected_rows = gather("impacts", [arrival])
+    assert rejected_rows == [] and gathered.num_rows == len(rows["impacts"]) == 30
     assert Counter(row["test"] for row in rows["impacts"]) == {0: 20, 2**31 - 1: 10}
 
 
@@ -256,7 +256,7 @@ def test_the_decay_of_an_exponential_window_and_the_level_of_the_gate_stand_besi
         assert row["window_decay_per_s"] == decay and row["gate_required"] == 0.7
 
 
-def test_a_corrected_temperature_makes_another_model_of_the_same_blows(tmp_path):
+def test_a_corrected_temperature_makes_another_model_of_the_same_impacts(tmp_path):
     unit, turnout, _ = lay_out(tmp_path)
     warm = replace(turnout.campaigns[unit.campaign], rail_temperature=22.0)
     other = replace(turnout, campaigns={**turnout.campaigns, unit.campaign: warm})

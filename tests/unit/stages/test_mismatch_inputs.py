@@ -48,7 +48,7 @@ def folder(tmp_path, repository, monkeypatch):
     small.lay_out(tmp_path, repository)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=("local_ballast", "sensor_gain")))
-    small.strike(tmp_path)
+    small.write_hammer_tests(tmp_path)
     return tmp_path
 
 
@@ -76,7 +76,7 @@ def test_a_direction_in_other_letters_is_that_direction_and_one_unheard_is_said(
     assert unheard.direction == "facing" and any("direction not known" in doubt for doubt in unheard.doubts)
 
 
-def test_bangs_between_the_axles_do_not_tell_the_speed(repository):
+def test_impacts_between_the_axles_do_not_tell_the_speed(repository):
     """A long flat is heard as six axles of eight, and 74 km/h: the notes' 90 is believed. Four of four are heard."""
     said = {"speed": 25.0, "train_type": "ic3"}
     for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
@@ -136,14 +136,14 @@ def test_the_train_data_give_the_number_of_axles_that_the_file_does_not_note(kno
     assert mismatch_inputs._train_notes(later, recording, turnout) == known
 
 
-def test_bangs_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository):
+def test_impacts_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository):
     """A deep dip is crossed with a bang behind every axle: sixteen, over the length of one unit. Sixteen over that of
     two are two units, also where they do not stand as the file has them. The notes' speed is believed, not 81 km/h."""
     folder = repository / "config/vehicles"
     said = {"speed": 25.0, "train_type": "ic3"}
     one, two = (load_vehicle("ic3", 0.0, folder, units).wheel_positions for units in (1, 2))
-    bangs, stretched = np.sort(np.concatenate([one, one + 1.3])), two + 1.0 * np.sin(two)
-    for places, axles, doubt in ((bangs, 8, True), (stretched, 16, False)):
+    impacts, stretched = np.sort(np.concatenate([one, one + 1.3])), two + 1.0 * np.sin(two)
+    for places, axles, doubt in ((impacts, 8, True), (stretched, 16, False)):
         row = {"train_type": "ic3", "n_axles": 16, "speed_kmh": 81.0, "axle_times_s": places / 25.0}
         found = train(row, said, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 25.0
@@ -200,7 +200,7 @@ def test_another_content_of_the_same_size_is_another_finding(folder):
     """A file put right and copied over the old one: name, size and notes are the same."""
     (file, _) = sorted((folder / "raw/t1/hammer").rglob("*.h5"))
     first, size = diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"], file.stat().st_size
-    small.strike(folder, seed=7)
+    small.write_hammer_tests(folder, seed=7)
     assert file.stat().st_size == size
     assert diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"] != first
 
@@ -221,7 +221,7 @@ def test_a_track_that_is_extended_counts(folder):
 
 
 def test_a_route_that_the_track_has_not_is_said(folder):
-    """What was struck on the diverging track is not simulated on the rails of the main one."""
+    """A hammer test on the diverging track is not simulated on the rails of the main one."""
     layout = folder / "config/layouts/small.yaml"
     layout.write_text(layout.read_text().replace("B: {panel: CP, track: main", "B: {panel: AS, track: diverging"))
     turnout = turnout_in(folder)
@@ -309,7 +309,7 @@ def test_slow_loggers_are_read_true(rate):
     assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
 
-def test_a_train_outside_its_recording_is_noted_and_the_blows_are_used(monkeypatch):
+def test_a_train_outside_its_recording_is_noted_and_the_impacts_are_used(monkeypatch):
     def nowhere(*_):
         raise SimulationError("the train lies outside the recording")
 
@@ -319,7 +319,7 @@ def test_a_train_outside_its_recording_is_noted_and_the_blows_are_used(monkeypat
     assert any("outside the recording" in note for note in case.notes)
 
 
-def test_loggers_too_slow_for_the_band_are_refused():
+def test_loggers_too_slow_for_the_band_are_rejected():
     with pytest.raises(SimulationError, match="200 samples per second are too few for 107 Hz"):
         _tones_at(200.0)
 
@@ -480,7 +480,7 @@ def test_results_of_an_earlier_version_without_the_codes_of_all_reasons_are_anal
 
 
 @pytest.mark.parametrize(("softest", "used"), [(50.0, True), (50_000.0, False)])
-def test_blows_are_judged_as_the_hammer_stage_judges_them(folder, softest, used):
+def test_impacts_are_judged_as_the_hammer_stage_judges_them(folder, softest, used):
     """Its settings are the turnout's: impacts too soft for the one are too soft for the other."""
     file = folder / "config/config.yaml"
     file.write_text(file.read_text() + f"receptance: {{softest_blow: {softest:g}}}\n")
@@ -494,7 +494,7 @@ def test_blows_are_judged_as_the_hammer_stage_judges_them(folder, softest, used)
     assert tests
 
 
-def test_a_calibration_judges_blows_by_the_turnouts_settings(folder):
+def test_a_calibration_judges_impacts_by_the_turnouts_settings(folder):
     file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
     file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))

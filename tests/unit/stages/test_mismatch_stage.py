@@ -34,19 +34,19 @@ def folder(tmp_path, repository, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def blows(tmp_path_factory, repository):
+def impacts(tmp_path_factory, repository):
     """Impacts on a turnout with one soft pad; tests copy them."""
-    made = tmp_path_factory.mktemp("blows")
+    made = tmp_path_factory.mktemp("impacts")
     small.lay_out(made, repository)
-    small.strike(made, small.soft_pad)
+    small.write_hammer_tests(made, small.soft_pad)
     return made / "raw"
 
 
 @pytest.fixture
-def soft(folder, blows):
+def soft(folder, impacts):
     import shutil
 
-    shutil.copytree(blows, folder / "raw")
+    shutil.copytree(impacts, folder / "raw")
     return folder
 
 
@@ -62,13 +62,13 @@ def test_a_rail_far_softer_than_its_file_is_stated_though_no_name_is_given(folde
     def soft_in_shear(track):
         return (physics.RailShear(1e9 / track.rail.shear_stiffness),)
 
-    small.strike(folder, soft_in_shear)
+    small.write_hammer_tests(folder, soft_in_shear)
     (row,) = diagnose_turnout("t1")["mismatch_findings"]
     stated = re.search(r"The shear stiffness of the rail is ([\d.]+) times that of the file", row["sentence"])
     assert row["term"] is None and float(stated[1]) == pytest.approx(0.5, abs=0.05)
 
 
-def test_blows_alone_name_the_soft_pad_at_its_sleeper(soft):
+def test_impacts_alone_name_the_soft_pad_at_its_sleeper(soft):
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
     assert (row["verdict"], row["term"], row["position_m"]) == ("named", "local_pad", 18.0)
@@ -319,7 +319,7 @@ def test_the_rows_fit_the_registry(soft, tmp_path):
         tmp_path / "b", [UnitResult("t1/mismatch/2026-07-25", "t1", "mismatch", "k", "1", "ok", tables)]
     )
     done = register([batch], tmp_path / "registry", read=read_results)
-    assert done.n_refused == 0
+    assert done.n_rejected == 0
     with open_registry(tmp_path / "registry") as connection:
         (found,) = connection.execute("select verdict, term, term_json from findings_newest").fetchall()
         assert found[:2] == ("named", "local_pad") and json.loads(found[2])[0]["fixed"] == {"sleeper": 18.0}

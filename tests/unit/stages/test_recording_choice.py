@@ -87,5 +87,5 @@ def test_a_train_that_runs_the_other_way_round_is_simulated_so(turned, repositor
     [("clipped", 5e-4, False), ("clipped", 0.01, True), ("clipped", None, True), ("dead_channel", 0.0, True),
      ("no_train", None, False)],
 )  # fmt: skip
-def test_a_channel_that_cut_off_the_top_of_some_blows_is_used(reason, share, spoils):
+def test_a_channel_that_cut_off_the_top_of_some_impacts_is_used(reason, share, spoils):
     assert _is_unusable({"reason_code": reason, "measured_value": share}) == spoils

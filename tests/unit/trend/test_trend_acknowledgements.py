@@ -1,4 +1,4 @@
-"""config/acknowledgements.csv: entered by command or by hand, refused with place and remedy."""
+"""config/acknowledgements.csv: entered by command or by hand, rejected with place and remedy."""
 
 import shutil
 from datetime import UTC, datetime, time
@@ -65,7 +65,7 @@ def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys)
         assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
-def test_a_silence_may_be_planned_and_an_alarm_is_not_seen_before_its_day(configuration, capsys):
+def test_a_suppression_may_be_planned_and_an_alarm_is_not_seen_before_its_day(configuration, capsys):
     turnout, label = place_of(configuration)
     said = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
     assert main(["acknowledge", f"{turnout}/{label}", *said]) == 2
@@ -151,7 +151,7 @@ def test_no_file_means_that_nobody_has_said_anything(tmp_path):
         ('"T1",T1/Z,,suppress,me,2026-03-01,2026-04-01,a', "column 6: turnout 'T1' has no section 'Z'"),
     ],
 )
-def test_a_bad_line_is_refused_with_its_place(tmp_path, line, complaint):
+def test_a_bad_line_is_rejected_with_its_place(tmp_path, line, complaint):
     path = tmp_path / "acknowledgements.csv"
     path.write_text(HEADER + "T1,A,ballast,acknowledge,me,2026-01-01,,seen\n" + line + "\n", encoding="utf-8")
     rows, errors = read_acknowledgements(path, turnout_ids=("T1",), variants=SECTIONS)
@@ -189,7 +189,7 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     assert "acknowledgements.csv, line 3, column 1: turnout 'nowhere' has no row" in capsys.readouterr().out
 
 
-def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_path):
+def test_a_suppression_ends_on_its_day_though_no_file_has_come(configuration, tmp_path):
     """The same registry, asked on the day before and on the day that a silence ends; work that is planned begins."""
     import numpy as np
     from benchmarks.trend_fleet import Fleet, drift, modes
@@ -225,7 +225,7 @@ def test_a_silence_ends_on_its_day_though_no_file_has_come(configuration, tmp_pa
     assert listed["2018-05-02"] == listed["2018-05-03"] == ["inspect this week"]
 
 
-def test_a_silence_that_is_over_is_not_written(configuration, capsys):
+def test_a_suppression_that_is_over_is_not_written(configuration, capsys):
     turnout, _ = place_of(configuration)
     said = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]
     assert main(["acknowledge", turnout, "--suppress-until", "2020-01-01", *said]) == 2

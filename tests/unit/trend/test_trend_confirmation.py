@@ -99,7 +99,7 @@ def test_the_day_of_the_campaign_is_remembered(settings):
         assert sorted(then.fetchall()) == [(f"T{i:05d}", "S0") for i in range(3)]
 
 
-def test_work_after_the_campaign_and_silence_take_it_off(settings):
+def test_work_after_the_campaign_and_a_suppression_take_it_off(settings):
     rows = with_loss(Fleet(turnouts=2, weeks=60), 5, 20.0, [-1])
     newest = rows["measured_at_utc"].max()
     work = {"event_id": ["e"], "turnout_id": ["T00000"], "section_id": [None], "kind": ["tamping"]}

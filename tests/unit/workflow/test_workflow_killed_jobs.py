@@ -51,7 +51,7 @@ def test_a_unit_that_kills_its_process_is_in_quarantine_after_two_nights_and_the
     assert row["found"] == "the process died that computed it, and again where it was computed alone"
     assert {p.name for p in fleet.state.with_suffix("").glob("b*")} == set(load_state(fleet.state).batches)
     assert fleet.run(threads=threads).processed == 0
-    fleet.put("t1/2024-05-13/A_1.txt", "mended")
+    fleet.put("t1/2024-05-13/A_1.txt", "fixed")
     assert fleet.run(threads=threads).processed == 1
     assert statuses(fleet) == dict.fromkeys(UNITS, "ok")
 

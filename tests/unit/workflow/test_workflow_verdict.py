@@ -117,13 +117,13 @@ def test_newer_units_that_are_bad_are_said_by_themselves(nights):
     assert nights.night(*["good"] * 4) == ""
 
 
-def test_what_was_found_wrong_is_sound_once_it_is_mended(nights):
+def test_what_was_found_wrong_is_sound_once_it_is_fixed(nights):
     nights.night("damaged", "damaged", "good", "good", "good")
     nights.put("t0/2024-06-01/A_1.txt", "repaired")
     assert nights.night() == ""
 
 
-def test_an_internal_error_is_said_until_it_is_mended_or_newer_units_are_sound(nights):
+def test_an_internal_error_is_said_until_it_is_fixed_or_newer_units_are_sound(nights):
     assert "1 internal errors, first in t0/hammer/A/2024-06-01" in nights.night("bug")
     assert "1 internal errors" in nights.night("good", "good", "good", "good")
     assert nights.night("good") == ""

@@ -53,7 +53,7 @@ failed as (
     group by part
     having any_value(source) = 'hammer' or any_value(used_at_utc) is null or count(distinct what) >= 10
 ),
-blows as (
+test_impacts as (
     select
         section_id, campaign_id, count(*) as n, count(*) filter (status = 'rejected') as n_rejected,
         mode(reason order by reason) filter (status = 'rejected') as reason
@@ -81,7 +81,7 @@ select
                 f.reason)
         end as why
 from failed f
-left join blows b on b.section_id = f.section_id and b.campaign_id = f.what
+left join test_impacts b on b.section_id = f.section_id and b.campaign_id = f.what
 left join files d on d.section_id = f.section_id and d.campaign_id = f.what
 union all by name
 select

@@ -76,7 +76,7 @@ def all_bad_at_once(tmp_path_factory):
     (root / "raw").write_text("raw")
     HELD["raw"] = sorted([*bad, *sound], key=lambda r: r.unit)
     done = register([root / "raw"], root / "registry", read=results_as_given)
-    assert done.n_refused == len(BAD_MODES)
+    assert done.n_rejected == len(BAD_MODES)
     with open_registry(root / "registry") as connection:
         rows = connection.execute(
             "select section_id, place, found, stage, reason_code, path from quarantine_open"
@@ -91,7 +91,7 @@ def test_bad_rows_stop_no_sound_one(all_bad_at_once):
 
 
 @pytest.mark.parametrize("i", range(len(BAD_MODES)), ids=[f"{c}={v}" for c, v, *_ in BAD_MODES])
-def test_a_bad_value_is_refused_by_name(all_bad_at_once, i):
+def test_a_bad_value_is_rejected_by_name(all_bad_at_once, i):
     column, _, said, asked = BAD_MODES[i]
     place, found, stage, reason, path = all_bad_at_once[0][f"t1/B{i:02d}"]
     assert place == f"modes, row 1, column {column}"
@@ -100,7 +100,7 @@ def test_a_bad_value_is_refused_by_name(all_bad_at_once, i):
     assert (stage, reason, path) == ("register", "internal_error", f"t1/hammer/2026-01-05/B{i:02d}_1.uff")
 
 
-def test_nothing_of_a_refused_row_is_lost(bench, register_raw, hammer):
+def test_nothing_of_a_rejected_row_is_lost(bench, register_raw, hammer):
     register_raw(hammer(frequency=-1.0, damping_se=0.0123))
     found = bench.ask("select found, measured_value from quarantine_open")[0]
     row = json.loads(found[0].split("; row: ")[1])
@@ -109,7 +109,7 @@ def test_nothing_of_a_refused_row_is_lost(bench, register_raw, hammer):
 
 
 @pytest.mark.parametrize("matrix", [[0.5, NAN], [INF, 0.5], [0.5, None], "0.5 0.5", [["a"]]], ids=str)
-def test_a_list_with_one_bad_element_is_refused_and_its_modes_with_it(bench, register_raw, hammer, matrix):
+def test_a_list_with_one_bad_element_is_rejected_and_its_modes_with_it(bench, register_raw, hammer, matrix):
     bad = hammer(section="A1")
     bad.tables["models"][0]["a_matrix"] = matrix
     register_raw(bad, hammer(section="A2"))
@@ -117,7 +117,7 @@ def test_a_list_with_one_bad_element_is_refused_and_its_modes_with_it(bench, reg
     assert bench.ask("select place from quarantine_open") == [("models, row 1, column a_matrix",)]
 
 
-def test_the_second_row_of_a_key_is_refused(bench, register_raw, hammer):
+def test_the_second_row_of_a_key_is_rejected(bench, register_raw, hammer):
     twice = hammer(section="A1")
     twice.tables["modes"].append(dict(twice.tables["modes"][0], frequency_hz=99.0))
     copied = hammer(section="A2")
@@ -125,7 +125,7 @@ def test_the_second_row_of_a_key_is_refused(bench, register_raw, hammer):
         "model_id"
     ]
     done = register_raw(twice, copied)
-    assert done.n_refused == 2  # the mode of the copied model goes with it and is no row of its own
+    assert done.n_rejected == 2  # the mode of the copied model goes with it and is no row of its own
     assert bench.ask("select section_id, frequency_hz from modes") == [("t1/A1", 150.0)]
     assert bench.ask("select section_id from models") == [("t1/A1",)]
     places = bench.ask("select turnout_id, place from quarantine_open order by place, section_id")
@@ -164,11 +164,11 @@ def test_keys_checked_at_the_end_give_the_bytes_of_an_index(tmp_path, monkeypatc
     monkeypatch.setattr("turnout.registry.job.Registration", lambda *a, **_: Registration(*a, is_indexed=True))
     HELD["raw"] = list(make(hammer))
     at_once = register([tmp_path / "raw"], tmp_path / "at_once", read=results_as_given)
-    assert late.n_refused == at_once.n_refused > 0
+    assert late.n_rejected == at_once.n_rejected > 0
     assert parquet_hashes(tmp_path / "late") == parquet_hashes(tmp_path / "at_once")
 
 
-def test_a_table_or_a_row_of_no_kind_is_refused(bench, register_raw, hammer):
+def test_a_table_or_a_row_of_no_kind_is_rejected(bench, register_raw, hammer):
     strange = hammer(section="A1")
     strange.tables["weather"] = [{"rain": 1}]
     strange.tables["impacts"] = ["not a row"]
@@ -188,7 +188,7 @@ def test_a_quarantine_row_that_is_itself_wrong_still_becomes_one(bench, register
     assert rows == [("internal_error", "register", "quarantine, row 1, column kind")]
 
 
-def test_a_refusal_leaves_quarantine_when_the_code_is_mended(bench, register_raw, hammer):
+def test_a_rejection_leaves_quarantine_when_the_code_is_fixed(bench, register_raw, hammer):
     register_raw(hammer(frequency=NAN, algo="1"))
     register_raw(hammer(frequency=150.0, algo="2"))
     assert bench.ask("select count(*) from quarantine_open") == [(0,)]
@@ -217,7 +217,7 @@ def test_a_batch_that_is_gone_does_not_stop_the_others(bench, hammer):
     assert bench.ask("select section_id from modes_current") == [("t1/A2",)]
 
 
-def test_every_double_of_every_table_refuses_nan_and_infinity():
+def test_every_double_of_every_table_rejects_nan_and_infinity():
     connection, tried = connect(), 0
     for table, columns in tables().items():
         connection.execute(create_table(table, f"t_{table}").replace("not null", "").split(", primary key")[0] + ")")
@@ -241,7 +241,7 @@ def test_every_double_of_every_table_refuses_nan_and_infinity():
         ({"zz": [0.0, 1.0]}, "column zz: columns.csv does not know it"),
     ],
 )
-def test_a_derived_table_with_a_bad_row_is_refused_whole(tmp_path, rows, said):
+def test_a_derived_table_with_a_bad_row_is_rejected_whole(tmp_path, rows, said):
     days = pa.array(["2026-01-01", "2026-01-08"]).cast(pa.timestamp("us"))
     good = {
         "turnout_id": ["t1"] * 2, "section_id": ["t1/A1"] * 2, "band": ["ballast"] * 2, "source": ["hammer"] * 2,
@@ -269,7 +269,7 @@ def test_an_id_that_two_units_give_is_one_passage_and_a_quarantine_row(bench, mo
         for name in ("20260105T100000Z", "20260105T100001Z")
     ]  # fmt: skip
     done = bench.register(*units)
-    assert done.n_refused == 1 and bench.ask("select count(*) from passages") == [(1,)]
+    assert done.n_rejected == 1 and bench.ask("select count(*) from passages") == [(1,)]
     assert bench.ask("select count(*) from passage_fits") == [(1,)]
     said = bench.ask("select reason_code, place, remedy from quarantine_open")
     assert [(code, place) for code, place, _ in said] == [("internal_error", "passages, row 1, column passage_id")]
