@@ -204,9 +204,15 @@ def _records(
             undecided=undecided,
             time_label="" if time is None else names[time],
             is_time_in_seconds=time is not None and bool(units[time].strip()),
-            clocks=tuple((f"column {names[i] or i + 1!r}", seconds[a:b]) for i, seconds in clocks.items()),
+            clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
+
+
+def _label(names: Sequence[str], units: Sequence[str], i: int) -> str:
+    """Name of a column, or its number, with its unit if it has one."""
+    name = names[i] or str(i + 1)
+    return f"{name} [{units[i]}]" if units[i].strip() else name
 
 
 def _counts_rows(column: Column) -> bool:

@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from mmap import mmap
 
 import numpy as np
@@ -217,12 +218,45 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
 MIN_WHOLE_SHARE = 0.05  # of numbers printed with decimals, one in a thousand is whole by chance; three decimals
 
 
+@dataclass
+class MarkStatistics:
+    """Numbers of a column, and those with digits behind the mark: how many, and their least and largest size.
+
+    With marks for thousands every number below 1000 is whole, and every other one has three digits behind its mark.
+    """
+
+    n: int = 0
+    n_broken: int = 0
+    smallest: float = np.inf
+    largest: float = 0.0
+
+    def add(self, column: np.ndarray) -> None:
+        """Count further numbers.
+
+        Parameters
+        ----------
+        column : (n,) array
+            Numbers of the column, with the mark read as decimal mark.
+        """
+        self.n += column.size
+        if column.dtype.kind != "f":
+            return
+        sizes = np.abs(column[(column != np.rint(column)) & np.isfinite(column)])
+        if sizes.size:
+            self.n_broken += sizes.size
+            self.smallest, self.largest = min(self.smallest, sizes.min()), max(self.largest, sizes.max())
+
+    @property
+    def may_be_for_thousands(self) -> bool:
+        """Whether the sizes of the numbers allow marks for thousands."""
+        is_share_whole = self.n - self.n_broken >= MIN_WHOLE_SHARE * self.n
+        return bool(self.n_broken and is_share_whole and self.smallest >= 1.0 and self.largest < 1000.0)
+
+
 def check_thousands(
     column: np.ndarray, i: int, name: str, data: bytes | mmap, offset: int, separator: str, source: Source
 ) -> None:
     """Check that the marks in a column are decimal marks, and not marks for thousands.
-
-    With marks for thousands every number below 1000 is whole, and every other one has three digits behind its mark.
 
     Parameters
     ----------
@@ -246,15 +280,11 @@ def check_thousands(
     ReadError
         If the column has marks for thousands.
     """
-    if column.dtype.kind != "f":
+    statistics = MarkStatistics()
+    statistics.add(column)
+    if not statistics.may_be_for_thousands:
         return
     broken = (column != np.rint(column)) & np.isfinite(column)
-    n_broken = int(np.count_nonzero(broken))
-    if not n_broken or column.size - n_broken < MIN_WHOLE_SHARE * column.size:
-        return
-    sizes = np.abs(column[broken])
-    if sizes.min() < 1.0 or sizes.max() >= 1000.0:
-        return
     rows = data[offset:].splitlines()
     cells = [
         row[i].strip()
@@ -264,6 +294,8 @@ def check_thousands(
     if all(THOUSANDS.fullmatch(cell) for cell in cells):
         first = int(np.argmax(broken))
         line = data[:offset].count(b"\n") + first + 1
-        problem = f"{cells[0]!r} has a mark for thousands, as {n_broken} of {column.size} numbers of this column"
+        problem = (
+            f"{cells[0]!r} has a mark for thousands, as {statistics.n_broken} of {column.size} numbers of this column"
+        )
         remedy = "Export all numbers with one decimal mark and without marks for thousands"
         raise source.error(f"line {line}, column {name or str(i + 1)!r}", problem, remedy)

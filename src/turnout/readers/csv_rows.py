@@ -12,7 +12,15 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.readers.clock_texts import is_clock_or_date, with_durations
-from turnout.readers.csv_cells import MISSING_VALUES, cell_errors, cells_of, check_thousands, decode_line, first_cells
+from turnout.readers.csv_cells import (
+    MISSING_VALUES,
+    MarkStatistics,
+    cell_errors,
+    cells_of,
+    check_thousands,
+    decode_line,
+    first_cells,
+)
 from turnout.readers.csv_header import entries_of_lines
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
@@ -162,6 +170,9 @@ def lazy_columns(
         times = rows.scan(time)
     _check_one_block(data, offset, len(data), source)
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
+    for i, statistics in enumerate(rows.marks):
+        if statistics.may_be_for_thousands:
+            check_thousands(columns[i][:], i, names[i], data, offset, separator, source)
     if time is not None and times is not None:
         columns[time] = times
     return columns, ()
@@ -187,11 +198,12 @@ class RowReader:
     def __init__(self, path: Path, offset: int, options: dict[str, Any]):
         self.path, self.offset, self.options = path, offset, options
         self.n_row, self.begin = 0, 0
+        self.marks: list[MarkStatistics] = []
         self.batches: list[pa.RecordBatch] = []
         self.reader: csv.CSVStreamingReader | None = None
 
     def scan(self, time: int | None) -> np.ndarray | None:
-        """Count the rows and read the time column.
+        """Count the rows, collect the statistics of the marks in each column, and read the time column.
 
         Parameters
         ----------
@@ -206,6 +218,9 @@ class RowReader:
         values = []
         for batch in self._open():
             self.n_row += batch.num_rows
+            self.marks = self.marks or [MarkStatistics() for _ in batch.columns]
+            for statistics, column in zip(self.marks, batch.columns):
+                statistics.add(column.to_numpy(zero_copy_only=False))
             if time is not None:
                 values.append(batch.column(time).to_numpy(zero_copy_only=False))
         return None if time is None else np.concatenate(values)

@@ -86,7 +86,7 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     """
     if record.unread_start:
         return record
-    stated = dict(item for entry in record.entries if is_start_name(entry.name) for item in _times_of_entry(entry))
+    stated = dict(item for entry in record.entries if is_start_name(entry.name) for item in times_of_entry(entry))
     times = [time for time in stated.values() if time]
     if not stated:
         return record
@@ -98,8 +98,19 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     return replace(record, started_at=times[0])
 
 
-def _times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
-    """Text and time of an entry under the name of a start, if its value looks like a time."""
+def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
+    """Text and time of an entry under the name of a start, if its value looks like a time.
+
+    Parameters
+    ----------
+    entry : Entry
+        Entry of the metadata.
+
+    Yields
+    ------
+    tuple of (str, datetime or None)
+        None for a time that cannot be read.
+    """
     value, declared = entry.value, entry.name
     if isinstance(value, (datetime, np.datetime64)):
         yield str(value), parse_time(value)

@@ -1,4 +1,4 @@
-"""Time zone that the metadata of a file state beside a start time without one: "UTC", "+02:00", "Europe/Zurich"."""
+"""Time zone of a start time without one: in its name, "Start (UTC)", or in an entry "time zone" of the metadata."""
 
 import re
 from collections.abc import Iterator
@@ -12,11 +12,16 @@ import numpy as np
 from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
+from turnout.readers.stated_starts import is_start_name, times_of_entry
 
 ZONE_NAME = re.compile(r"timezone|zeitzone|tidszone|tijdzone|fuseauhoraire|fusoorario|zonahoraria|tz|(?:utc|gmt)offset")
 NO_ZONE = frozenset(("", "-", "none", "n/a", "?", "unknown", "null", "local", "naive"))
 OFFSET = re.compile(r"(?:UTC|GMT)? ?([+-])(\d{1,2})(?::?(\d{2}))?")
 SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST"}
+# Abbreviations that a name may hold; which offset they mean depends on the day and on the country.
+ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC)\b")
+UTC_OFFSET = re.compile(r"(?:UTC|GMT) ?[+-]\d{1,2}(?::?\d{2})?(?!\d)", re.IGNORECASE)
+IN_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
 LARGEST_OFFSET = 14  # h
 QUARTER = 15  # min: offsets of zones are its multiples
 
@@ -36,13 +41,53 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
     """
     if record.started_at is None or record.started_at.tzinfo is not None:
         return record
-    texts = list(dict.fromkeys(_zone_texts(record.entries)))
+    in_names = [text for name in _names_of_start(record) if (text := zone_in_name(name))]
+    texts = list(dict.fromkeys(in_names or _zone_texts(record.entries)))
     zones = {zone for text in texts if (zone := zone_of(text))}
     if not texts:
         return record
     if len(zones) != 1 or len(texts) > 1:
         return replace(record, unread_zone=" or ".join(texts)[:60])
     return replace(record, started_at=record.started_at.replace(tzinfo=zones.pop()))
+
+
+def _names_of_start(record: RawRecord) -> list[str]:
+    """Names of the entries that state the start of a record; without any, those of its time axes."""
+    names = [
+        entry.name
+        for entry in record.entries
+        if is_start_name(entry.name) and any(time == record.started_at for _, time in times_of_entry(entry))
+    ]
+    return names or [record.time_label, *(place for place, _ in record.clocks), *record.names]
+
+
+@lru_cache(maxsize=4096)
+def zone_in_name(name: str) -> str:
+    """Time zone in the name of a start time or a time column, as ``zone_of`` reads it.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry or a column, with its unit.
+
+    Returns
+    -------
+    str
+        "" if the name holds none.
+
+    Examples
+    --------
+    >>> [zone_in_name(n) for n in ("start_time_utc", "Start (UTC+2)", "Time [Europe/Zurich]", "Zeit (MEZ)", "t [s]")]
+    ['UTC', 'UTC+2', 'Europe/Zurich', 'MEZ', '']
+    """
+    if match := UTC_OFFSET.search(name):
+        return match[0]
+    if {"utc", "gmt"} & set(words_of(name)):
+        return "UTC"
+    texts = [text.strip() for text in IN_BRACKETS.findall(name)]
+    abbreviation = ABBREVIATION.search(name.replace("_", " "))
+    of_brackets = (text for text in texts if not text.isdigit() and zone_of(text))
+    return next(of_brackets, abbreviation[0] if abbreviation else "")
 
 
 def _zone_texts(entries: tuple[Entry, ...]) -> Iterator[str]:

@@ -22,6 +22,7 @@ DATE_ALONE = re.compile(
 )
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
+WITH_UTC = re.compile(r"(.*\d) ?\(?(?:UTC|GMT)\)?")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
 
@@ -175,6 +176,9 @@ def _time_of_stamp(value: Any) -> datetime | None:
         return stamp if isinstance(stamp, datetime) else None
     if not isinstance(value, str):
         return None
+    if match := WITH_UTC.fullmatch(value.strip()):
+        time = _time_of_stamp(match[1])
+        return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
     if match := DOTTED_DATE.fullmatch(value.strip()):
         value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
     if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:

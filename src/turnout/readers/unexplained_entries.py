@@ -257,6 +257,7 @@ class EntryCheck:
         unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
         for entry, candidate in unexplained:
             if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
+                self._seen.difference_update(_key_of(e) for e in new_entries if _is_plain(e))  # for the next records
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
         of_converter = list(self._converter_errors(where, record))
         overloads = list(self._overload_errors(where, new_entries))
@@ -322,11 +323,10 @@ class EntryCheck:
 
     def _is_new(self, entry: Entry) -> bool:
         """Whether an equal entry has not been checked; arrays are always new."""
-        if type(entry.value) not in PLAIN_TYPES:
+        if not _is_plain(entry):
             return True
-        key = entry.place, entry.name, entry.value
-        is_new = key not in self._seen
-        self._seen.add(key)
+        is_new = _key_of(entry) not in self._seen
+        self._seen.add(_key_of(entry))
         return is_new
 
     def _error(self, where: str, unexplained: Sequence[tuple[Entry, Candidate]], reason: str) -> ReadError:
@@ -343,6 +343,14 @@ class EntryCheck:
             f"'checked_entries: {names}'"
         )
         return self.source.error(where, problem, remedy, reason=reason)
+
+
+def _is_plain(entry: Entry) -> bool:
+    return type(entry.value) in PLAIN_TYPES
+
+
+def _key_of(entry: Entry) -> tuple[str, str, Any]:
+    return entry.place, entry.name, entry.value
 
 
 def shown_text(entry: Entry, candidate: Candidate) -> str:

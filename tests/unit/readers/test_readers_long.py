@@ -135,3 +135,14 @@ def test_a_hammer_test_is_never_long(logged, in_another_order, tmp_path):
     hammer = RawDescription(in_another_order.channels, kind="hammer", rate=RATE)
     result = read(path.name, tmp_path, hammer, max_duration=1.0, max_whole_file_size=0)
     assert isinstance(result.recordings[0], Recording) and not isinstance(result.recordings[0], LongRecording)
+
+
+def test_marks_for_thousands_are_found_in_a_long_file_too(tmp_path):
+    """Whole numbers in mm/s² with commas between thousands, as a spreadsheet writes them behind tabs."""
+    numbers = np.round(np.random.default_rng(3).normal(size=2000) * 900.0).astype(int)
+    (tmp_path / "x.txt").write_text("nr\tleft [mm/s²]\n" + "".join(f"{i}\t{n:,d}\n" for i, n in enumerate(numbers)))
+    channels = RawChannel("left", "left", "acceleration"), RawChannel("nr", "nr", "ignored")
+    description = RawDescription(channels, kind="passage", rate=RATE)
+    for max_whole_file_size in (0, 2**20):
+        with pytest.raises(ReadError, match=r"column 'left': '-?1,\d{3}' has a mark for thousands"):
+            read("x.txt", tmp_path, description, max_duration=0.01, max_whole_file_size=max_whole_file_size)

@@ -81,3 +81,9 @@ def test_the_head_comes_first_and_another_day_is_reported(tmp_path):
 def test_the_date_of_another_event_is_no_start(tmp_path):
     raw = record(tmp_path, ["Exported;force [N];rail [m/s2]"], [f"13.05.2026 {c}" for c in CLOCKS])
     assert raw.started_at is None
+
+
+@pytest.mark.parametrize("name", ["Time (UTC)", "UTC", "Timestamp UTC", "Zeit [UTC]"])
+def test_a_zone_in_the_name_of_the_column_is_that_of_the_start(tmp_path, name):
+    raw = record(tmp_path, [f"{name};force [N];rail [m/s2]"], [f"2026-05-13 {clock}" for clock in CLOCKS])
+    assert raw.started_at == START.replace(tzinfo=UTC)

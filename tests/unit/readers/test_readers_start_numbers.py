@@ -222,3 +222,45 @@ def test_a_zone_that_cannot_be_read_is_reported_unless_it_is_that_of_the_layout(
         if is_that_of_the_layout
         else [f"its time zone {zone!r} cannot be read: that of the layout is used, Europe/Zurich"]
     )
+
+
+NAMES_WITH_ZONE = {"start time utc": 10, "start_time_utc": 10, "StartTimeUTC": 10, "utc_start_time": 10}
+NAMES_IN_BRACKETS = {
+    "Start time (UTC)": 10, "Start time [GMT]": 10, "Start time (UTC+1)": 9, "Start time [+02:00]": 8,
+    "Start time (Europe/Zurich)": 8, "Start time (local)": None, "Start time (1)": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
+def test_a_zone_in_the_name_of_the_start_is_its_zone(tmp_path, form):
+    for name, hour in (NAMES_WITH_ZONE if form is mat else NAMES_WITH_ZONE | NAMES_IN_BRACKETS).items():
+        if form is mat and " " in name:
+            continue
+        (record,) = read_unconverted(form(tmp_path, {name: "2026-05-13T10:00:00", "rate": RATE}, {}), tmp_path)[
+            2
+        ].records
+        expected = START if hour is None else datetime(2026, 5, 13, hour, tzinfo=UTC)
+        assert (record.started_at, record.unread_zone) == (expected, ""), name
+
+
+def test_a_zone_in_the_name_counts_more_than_one_beside_it_and_an_abbreviation_is_reported(tmp_path):
+    for name, started_at in (("Start time (UTC)", START), ("Start time (CET)", START - timedelta(hours=2))):
+        path = text(tmp_path, {name: "2026-05-13 10:00:00", "rate": RATE}, {})
+        result = read(path, tmp_path, RawDescription(SENSORS, rate=RATE, time_zone="Europe/Zurich"))
+        assert result.recordings[0].started_at == started_at
+        assert ["'CET' cannot be read" in error.problem for error in result.errors] == ["CET" in name] * ("CET" in name)
+    entries = {"Start time (UTC)": "2026-05-13 10:00:00", "time zone": "Europe/Zurich", "rate": RATE}
+    assert read_unconverted(text(tmp_path, entries, {}), tmp_path)[2].records[0].started_at == IN_UTC
+
+
+@pytest.mark.parametrize("name", ["time_utc", "Timestamp (UTC)"])
+@pytest.mark.parametrize("form", [parquet, tdms], ids=lambda form: form.__name__)
+def test_a_zone_in_the_name_of_a_time_axis_is_that_of_its_start(tmp_path, form, name):
+    (record,) = read_unconverted(form(tmp_path, {}, {name: STAMPS}), tmp_path)[2].records
+    assert record.started_at == IN_UTC
+
+
+@pytest.mark.parametrize("stamp", ["2026-05-13 10:00:00 UTC", "13.05.2026 10:00:00 (UTC)", "2026-05-13T10:00 GMT"])
+def test_a_zone_behind_a_time_is_its_zone(tmp_path, stamp):
+    (record,) = read_unconverted(text(tmp_path, {"started_at": stamp, "rate": RATE}, {}), tmp_path)[2].records
+    assert record.started_at == IN_UTC

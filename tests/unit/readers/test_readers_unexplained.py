@@ -3,6 +3,7 @@
 The layout states 25.6 kHz, newtons and m/s²; the file holds no statement in known words.
 """
 
+import h5py
 import numpy as np
 import pytest
 from tests.unit.readers.test_readers_other_subjects import can_hold, outcome
@@ -99,3 +100,16 @@ def test_a_condition_is_explained_for_one_record_or_each(tmp_path):
         result = read("a.npz", tmp_path, RawDescription(SENSORS, rate=TRUE))
         assert result.recordings[0].conditions["speed"] == pytest.approx(37.871)
         assert "entry_unknown" not in [e.reason for e in result.errors]
+
+
+@pytest.mark.parametrize(("name", "value"), [("Profile", "20 kS/s"), ("Values in", "kN"), ("Reading", "raw*0.01")])
+def test_a_plain_contradiction_rejects_every_record_that_it_is_about(name, value, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs[name] = value
+        for k in range(3):
+            for sensor in SENSORS:
+                samples = np.random.default_rng(k).normal(size=64)
+                file.create_dataset(f"record_{k:03d}/{sensor.source}", data=samples)
+    result = read("a.h5", tmp_path, described(TRUE))
+    assert result.recordings == () and len(result.errors) == 3
+    assert all(value in error.problem for error in result.errors)
