@@ -14,7 +14,15 @@ from turnout.readers.metadata_names import (
     CONDITION_NAMES,
     UNIT_NAMES,
 )
-from turnout.readers.sample_variables import Attributes, holds_samples, is_slow, matrices, size_of_longest, vectors
+from turnout.readers.sample_variables import (
+    Attributes,
+    holds_samples,
+    is_slow,
+    matrices,
+    plain_name,
+    size_of_longest,
+    vectors,
+)
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
@@ -41,7 +49,7 @@ class Metadata:
     """
 
     def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None, place: str = ""):
-        self.lower = {(k if k == "t" else k.lower()): v for k, v in variables.items() if k != "T"}
+        self.lower = {plain_name(k): v for k, v in variables.items()}
         self.variables, self.parent, self.source, self.place = variables, parent, source, place
 
     @cached_property

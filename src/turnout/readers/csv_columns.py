@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.source import MEANINGLESS_UNITS, Source
@@ -129,7 +130,18 @@ def _are_names(cells: Sequence[str]) -> bool:
     return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
 
 
-def names_and_units(lines: list[list[str]], cells: list[str]) -> tuple[list[str], list[str]]:
+COMMENT = re.compile(r"comm?ent|komment|remar[kq]|bemerk|notes?$|anmerk|osserv|opmerk|event|ereign|mark", re.IGNORECASE)
+
+
+class Columns(NamedTuple):
+    """Names and units of the columns, and the ``further`` names beside them for which the rows have no cells."""
+
+    names: list[str]
+    units: list[str]
+    further: list[str]
+
+
+def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     """Names and units of the columns. A separator after the last number, as in "1;2;", makes a column without a name.
 
     Parameters
@@ -141,18 +153,20 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> tuple[list[str]
 
     Returns
     -------
-    tuple of (list of str, list of str)
-        Names, "0", "1" ... if no line has them, and units, "" if not stated.
+    Columns
+        Names, "0", "1" ... if no line has them, and units, "" if not stated; further names that are none of a comment.
     """
     count, open_end = len(cells), not cells[-1]
-    lines = [(line + [""] * open_end)[:count] for line in lines if any(line) and len(line) >= count - open_end]
+    whole_lines = [line for line in lines if any(line) and len(line) >= count - open_end]
+    lines = [(line + [""] * open_end)[:count] for line in whole_lines]
     if not lines:
         names = [str(i) for i in range(count)]
-        return [*names[:-1], ""] if open_end and count > 1 else names, [""] * count
+        return Columns([*names[:-1], ""] if open_end and count > 1 else names, [""] * count, [])
     name_line, unit_line = names_among(lines)
     names = lines[name_line]
+    further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     for i, name in enumerate(names):
         if match := NAME_WITH_UNIT.match(name):
             names[i], units[i] = match[1], match[2]
-    return names, units
+    return Columns(names, units, further)

@@ -117,7 +117,11 @@ def _complete_head(
         texts = [words for words in texts if len(words) == len(cells)]
     texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
-    names, units = names_and_units(texts, cells)
+    names, units, further = names_and_units(texts, cells)
+    if further:
+        problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
+        where = f"line {len(head_lines) + 1}"
+        raise source.error(where, f"{problem}: nothing says which name is of which cell", NAMES_REMEDY)
     scales = {
         _plain(a): b
         for a, b, *rest in (t for t in texts if len(t) > 1)
@@ -156,6 +160,7 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 
+NAMES_REMEDY = "Export the file again with one cell in each row for each name"
 NO_TEXT_REMEDY = (
     f"{COPY_AGAIN}; if the logger writes binary numbers, export them as text or in another format that is read"
 )

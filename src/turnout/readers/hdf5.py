@@ -2,8 +2,8 @@
 
 ``turnout.readers.writing`` writes the attributes ``rate``, ``n_records`` and conditions at the root, and a group
 ``record_000`` ... with ``started_at`` per record. It holds one dataset per channel with its ``unit`` and a Fletcher-32
-checksum, so that damage is limited to one record. ``scale_factor``, ``add_offset`` and ``_FillValue`` of netCDF files
-are applied; a dataset with another gain or offset is rejected unless the layout decides.
+checksum, so that damage is limited to one record. ``scale_factor``, ``add_offset``, ``_FillValue`` and ``valid_range``
+of netCDF files are applied; a dataset with another gain or offset is rejected unless the layout decides.
 """
 
 import math
@@ -133,6 +133,7 @@ def _check_written(dataset: h5py.Dataset, attributes: Mapping[str, Any], source:
 
 PACKING_ATTRIBUTES = ("scale_factor", "add_offset")  # of the climate and forecast (CF) conventions of netCDF
 FILL_ATTRIBUTES = ("_FillValue", "missing_value")
+RANGE_ATTRIBUTES = ("valid_min", "valid_max", "valid_range")  # a number outside is a missing sample
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,7 @@ class PackedDataset:
     factor: float
     offset: float
     fills: tuple[float, ...]
+    valid: tuple[float, float] = (-np.inf, np.inf)
     dtype = np.dtype(float)
 
     @property
@@ -151,7 +153,7 @@ class PackedDataset:
         return self.dataset.shape
 
     def __getitem__(self, selection: Any) -> np.ndarray:
-        return apply_packing(self.dataset[selection], self.factor, self.offset, self.fills)
+        return apply_packing(self.dataset[selection], self.factor, self.offset, self.fills, self.valid)
 
 
 def _fill_names(attributes: Mapping[str, Any]) -> list[str]:
@@ -171,12 +173,15 @@ def _with_packing(
         problem = "its whole numbers are unsigned by its attribute _Unsigned, and stored as signed ones"
         raise source.error(f"dataset {dataset.name!r}", problem, "Export the numbers unpacked", reason="scale_unknown")
     fill_names = _fill_names(all_attributes)
-    attributes = {k: all_attributes[k] for k in (*PACKING_ATTRIBUTES, *fill_names) if k in all_attributes}
+    names = (*PACKING_ATTRIBUTES, *RANGE_ATTRIBUTES, *fill_names)
+    attributes = {k: all_attributes[k] for k in names if k in all_attributes}
     if not attributes or dataset.dtype.kind not in "fiu":
         return dataset
     try:
         factor, offset = (float(attributes.get(k, d)) for k, d in zip(PACKING_ATTRIBUTES, (1.0, 0.0)))
         fills = tuple(float(x) for k in fill_names for x in np.ravel(attributes[k]))
+        low, high = (float(x) for x in attributes.get("valid_range", (-np.inf, np.inf)))
+        valid = max(low, float(attributes.get("valid_min", low))), min(high, float(attributes.get("valid_max", high)))
     except (TypeError, ValueError) as error:
         problem = f"its attributes {attributes} are no numbers"
         remedy = "Write one number each, or export the numbers unpacked"
@@ -184,14 +189,18 @@ def _with_packing(
     if not (np.isfinite(factor) and np.isfinite(offset) and factor):
         problem = f"its scale_factor {factor:g} and add_offset {offset:g} give no numbers"
         raise source.error(f"dataset {dataset.name!r}", problem, "Export the numbers unpacked", reason="scale_unknown")
-    return PackedDataset(dataset, factor, offset, fills)
+    is_unpacked = any(np.asarray(attributes.get(k, 0)).dtype.kind == "f" for k in RANGE_ATTRIBUTES)
+    if is_unpacked and dataset.dtype.kind in "iu":  # by the netCDF user's guide the type tells which numbers are meant
+        low, high = sorted((x - offset) / factor for x in valid)
+        valid = low, high
+    return PackedDataset(dataset, factor, offset, fills, valid)
 
 
 def _values(dataset: h5py.Dataset | PackedDataset) -> Any:
     if isinstance(dataset, PackedDataset):
         packed = dataset.dataset[()]
         fills = (*dataset.fills, *unstated_fills(packed))
-        return apply_packing(packed, dataset.factor, dataset.offset, fills)
+        return apply_packing(packed, dataset.factor, dataset.offset, fills, dataset.valid)
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return _texts(dataset[()])
     return dataset[()]

@@ -17,6 +17,8 @@ from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.entries import Entry, entries_of, step_entry
 from turnout.readers.lost_entries import control_character_errors
+from turnout.readers.rate_units import rate_unit
+from turnout.readers.rate_words import is_time_name
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
@@ -113,6 +115,7 @@ class _Segment:
     """Header of a segment: cells of its lines, and of each channel its name, samples, step and offset of X.
 
     ``n_x_columns`` is 0, 1, or 2 for one X column per channel; ``first`` is the offset of the first row in the file.
+    ``steps`` and ``offsets`` are in ``x_unit``, a unit of time.
     """
 
     where: str
@@ -124,6 +127,7 @@ class _Segment:
     decimal_mark: str
     n_x_columns: int
     first: int
+    x_unit: str
 
 
 def _records(
@@ -148,17 +152,18 @@ def _records(
     started_text = _date_and_time(
         *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
-    entries = (*_entries(fields), *entries_of(head, "the file's header"))
+    entries = (*_entries(fields, segment.x_unit), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
     undecided = _undecided_scales(fields, head, count)
+    seconds = x * _seconds_per_x(segment.x_unit) if has_x and x is not None else None
     return [
         RawRecord(
             names=tuple(segment.names),
             samples=[column[i * n_sample : (i + 1) * n_sample] for column in columns],
             entries=entries,
             is_time_in_seconds=True,
-            time=x[i * n_sample : (i + 1) * n_sample] if has_x and x is not None else None,
+            time=None if seconds is None else seconds[i * n_sample : (i + 1) * n_sample],
             units=tuple(units[:count]) if len(units) >= count else ("",) * count,
             **start_fields(started_text if i == 0 else None),  # of later writes no time is stated
             conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
@@ -190,7 +195,23 @@ def _segment(source: Source, start: int, stop: int, head: Mapping[str, str], sep
         offsets = [float(x.replace(mark, ".") or 0.0) for x in _per_channel(fields, "X0", count)]
     if len(names) != count:
         raise source.error(where, f"it names {len(names)} of {count} channels", COPY_AGAIN, reason="truncated")
-    return _Segment(where, fields, names, samples, steps, offsets, mark, n_x_columns, first)
+    x_unit = _x_unit(fields, where, source)
+    return _Segment(where, fields, names, samples, steps, offsets, mark, n_x_columns, first, x_unit)
+
+
+def _x_unit(fields: Mapping[str, list[str]], where: str, source: Source) -> str:
+    """Unit of time of the X axis, "s" if none is stated; ReadError for an axis of another quantity."""
+    unit, quantity = (next((c for c in fields.get(name, []) if c), "") for name in ("X_Unit_Label", "X_Dimension"))
+    known = rate_unit(unit) if unit else None
+    if (unit and (known is None or not known.is_step)) or (quantity and not is_time_name(quantity)):
+        problem = f"its X axis is {quantity or 'no time'}{f' in {unit!r}' if unit else ''}, and not the time"
+        raise source.error(where, problem, "Export the samples of force and acceleration over the time")
+    return unit or "s"
+
+
+def _seconds_per_x(x_unit: str) -> float:
+    unit = rate_unit(x_unit)
+    return float(unit.scale) if unit else 1.0
 
 
 def _writes(source: Source, segment: _Segment, n_row: int, x: np.ndarray | None) -> tuple[int, list[int]]:
@@ -224,8 +245,9 @@ def _check_starts(source: Source, segment: _Segment) -> None:
     count = len(segment.names)
     dates, clocks = (_per_channel(segment.fields, name, count) for name in ("Date", "Time"))
     stamps = [_parse_date_and_time(*cells) for cells in zip(dates, clocks)]
-    starts = [a + b for a, b in zip(start_offsets(stamps), segment.offsets)]
-    check_simultaneous(segment.names, segment.steps, starts, segment.where, source)
+    scale = _seconds_per_x(segment.x_unit)
+    starts = [a + b * scale for a, b in zip(start_offsets(stamps), segment.offsets)]
+    check_simultaneous(segment.names, [step * scale for step in segment.steps], starts, segment.where, source)
 
 
 def _undecided_scales(fields: Mapping[str, list[str]], head: Mapping[str, str], count: int) -> dict[int, str]:
@@ -255,12 +277,12 @@ def _per_channel(fields: Mapping[str, list[str]], name: str, count: int) -> list
     return [*fields.get(name, []), *[""] * count][:count]
 
 
-def _entries(fields: Mapping[str, list[str]]) -> Iterator[Entry]:
+def _entries(fields: Mapping[str, list[str]], x_unit: str) -> Iterator[Entry]:
     """Entries of a segment's header, one per channel where the channels differ."""
     for name, values in fields.items():
         if name == "Delta_X":
             step = next((value for value in values if value and value.casefold() != "nan"), "0")
-            yield step_entry("header of the segment: Delta_X", step)
+            yield step_entry("header of the segment: Delta_X", step, x_unit)
             continue
         for value in dict.fromkeys(value for value in values if value):
             yield Entry(f"header of the segment: {name}", name, value)

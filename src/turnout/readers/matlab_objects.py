@@ -22,7 +22,7 @@ from turnout.readers.metadata_names import (
     UNIT_NAMES,
 )
 from turnout.readers.rate_words import is_rate_name
-from turnout.readers.sample_variables import holds_samples
+from turnout.readers.sample_variables import holds_samples, plain_name
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.source import Source
 
@@ -217,4 +217,4 @@ def _with_errors(variables: Mapping[str, Any], path: str, source: Source) -> dic
 
 def _is_needed(name: str) -> bool:
     """Whether a variable of this name decides how the samples are read."""
-    return (name if name == "T" else name.lower()) in NEEDED_NAMES or is_rate_name(name) or is_scale_name(name)
+    return plain_name(name) in NEEDED_NAMES or is_rate_name(name) or is_scale_name(name)

@@ -48,10 +48,17 @@ def fill_values(entries: Iterable[Entry], names: Sequence[str]) -> tuple[tuple[f
     return tuple(map(tuple, fills))
 
 
-def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, fills: Sequence[float]) -> np.ndarray:
-    r"""Unpack numbers by the climate and forecast (CF) conventions of netCDF, section 8.1.
+def apply_packing(
+    numbers: Sequence | np.ndarray,
+    factor: float,
+    offset: float,
+    fills: Sequence[float],
+    valid: tuple[float, float] = (-np.inf, np.inf),
+) -> np.ndarray:
+    r"""Unpack numbers by the climate and forecast (CF) conventions of netCDF, sections 2.5.1 and 8.1.
 
-    .. math:: x = s p + o, \qquad x = \mathrm{nan} \quad \mathrm{where}\ p\ \mathrm{is\ a\ fill\ value}
+    .. math:: x = s p + o, \qquad x = \mathrm{nan} \quad
+       \mathrm{where}\ p\ \mathrm{is\ a\ fill\ value\ or\ outside\ the\ valid\ range}
 
     Parameters
     ----------
@@ -61,6 +68,8 @@ def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, 
         ``scale_factor`` s and ``add_offset`` o. [unit of the file]
     fills : sequence of float
         Values that stand for a missing sample.
+    valid : tuple of (float, float)
+        Least and largest valid p.
 
     Returns
     -------
@@ -76,6 +85,7 @@ def apply_packing(numbers: Sequence | np.ndarray, factor: float, offset: float, 
     unpacked = packed * float(factor) + float(offset)
     for fill in fills:
         unpacked[packed == fill] = np.nan
+    unpacked[(packed < valid[0]) | (packed > valid[1])] = np.nan
     return unpacked
 
 

@@ -35,6 +35,7 @@ RATE_TOKENS = {
     "rate", "rates", "taux", "tasa", "cadence", "cadenza", "cadencia", "velocidad", "velocita", "vitesse", "hastighed",
     "takt", "clock", "snelheid", "tasso", "hz",
 }  # fmt: skip
+RATE_ENDINGS = ("rate", "takt", "speed", "geschwindigkeit", "hastighed", "hastighet")  # beside a word of sampling
 STEP = re.compile(r"interval|inkr|incr|period|schritt|skridt|xinc|tidstrin|tidssteg|raster")
 # A distance or a resolution is a step only with a word of time or of sampling.
 STEP_BESIDE = re.compile(
@@ -230,7 +231,7 @@ def _meaning(words: list[str]) -> tuple[int, bool | None]:
     counted = words[-3] if len(words) > 2 and words[-2] == "per" and words[-1] in SECONDS else ""
     is_counted = len(counted) > 2 and bool(SAMPLES.fullmatch(counted))
     is_rate = any(word in RATE_TOKENS or RATE.search(word) or RATE_WORD.fullmatch(word) for word in words)
-    is_rate |= any(word.endswith(("rate", "takt", "hastighed")) and SAMPLING.search(word + spaced) for word in words)
+    is_rate |= any(word.endswith(RATE_ENDINGS) and SAMPLING.search(word + spaced) for word in words)
     is_rate |= any(word.endswith(("rate", "takt")) and WEAK_SAMPLING.search(word) for word in words)
     is_rate |= is_counted or (len(counted) > 2 and not NOT_COUNTED.search(counted))
     is_step = bool(STEP.search(joined)) or any(word in STEP_TOKENS for word in words)

@@ -19,6 +19,21 @@ from turnout.readers.rate_words import is_rate_name
 from turnout.readers.source import CONDITIONS
 
 
+def plain_name(name: str) -> str:
+    """A name in lower case, except for "T": it is a temperature or any other quantity, and "t" is the time.
+
+    Parameters
+    ----------
+    name : str
+        Name of a variable.
+
+    Returns
+    -------
+    str
+    """
+    return name if name == "T" else name.lower()
+
+
 class Attributes(dict):
     """Attributes of the variable ``owner``: metadata, never a group of samples.
 
@@ -151,7 +166,7 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.size > 1 and (v.dtype.kind in "fiu" or is_flag_series(v))
-        if name.lower() not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
+        if plain_name(name) not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
     }
     longest = max((v.size for v in candidates.values()), default=0)
     return {name: v for name, v in candidates.items() if 2 * v.size > longest}

@@ -31,8 +31,8 @@ nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers pass
 BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in
 # Kinds of scale that npTDMS applies; of any other it only warns, and returns the raw numbers.
 KNOWN_SCALES = frozenset("Polynomial Linear RTD Strain Table Thermistor Thermocouple Add Subtract AdvancedAPI".split())
+SCALE_TYPE = re.compile(r"NI_Scale\[(\d+)\]_Scale_Type")
 APPLIED_PREFIXES = ("wf_", "NI_")  # properties of the time axis and of the scales that npTDMS applies
-MAX_SCALES = 64
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
 UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
 
@@ -78,13 +78,19 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
     """The channels of each record, in the natural order of the groups' names.
 
     A group with samples is a record. A logger with one group per task writes the channels of one record into several
-    groups, each with names of its own: these are joined if their time axes are equal. A group without a time axis
-    beside groups that have one holds information, such as the voltage of a battery.
+    groups, each with names of its own: these are joined if their time axes are equal, and the numbers in their names or
+    their starts say which belong together. A group without a time axis and of another length beside groups that have
+    one holds information, such as the voltage of a battery.
     """
     filled = sorted((g for g in groups if any(len(c) for c in g.channels())), key=lambda g: natural_sort_key(g.name))
     with_axis = [g for g in filled if any("wf_increment" in c.properties for c in g.channels())]
     axis_names = {c.name for g in with_axis for c in g.channels()}
-    filled = [g for g in filled if g in with_axis or not with_axis or axis_names & {c.name for c in g.channels()}]
+    lengths = {len(c) for g in with_axis for c in g.channels()}
+    filled = [
+        g
+        for g in filled
+        if g in with_axis or not with_axis or any(c.name in axis_names or len(c) in lengths for c in g.channels())
+    ]
     tasks: dict[frozenset[str], list[nptdms.TdmsGroup]] = {}
     for group in filled:
         tasks.setdefault(frozenset(c.name for c in group.channels()), []).append(group)
@@ -96,9 +102,16 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
     problem = f"its channels lie in groups with different names ({names}), and "
     export = "Export all channels of a record into one group"
     if len(counts) > 1:
-        numbers = ", ".join(str(len(of_task)) for of_task in tasks.values())
-        raise source.error("the groups", f"{problem}there are {numbers} of them: they form no records", export)
+        listed = ", ".join(str(len(of_task)) for of_task in tasks.values())
+        raise source.error("the groups", f"{problem}there are {listed} of them: they form no records", export)
     records = list(zip(*tasks.values()))
+    starts = {_time_axis(g.channels()[0], source)[2] for g in next(iter(tasks.values()))}
+    numbers = {_varying_numbers([g.name for g in of_task]) for of_task in tasks.values()}
+    if len(starts) < len(records) and len(numbers) > 1:
+        pair = " and ".join(repr(g.name) for g in records[0])
+        raise source.error(
+            "the groups", f"{problem}their numbers differ ({pair}): nothing says which belong together", export
+        )
     for groups_of_record in records:
         axes = [_time_axis(g.channels()[0], source) for g in groups_of_record]
         if any(axis != axes[0] for axis in axes):
@@ -106,6 +119,17 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
             remedy = f"Start all tasks by one trigger at one rate. {export}"
             raise source.error("the groups", f"{problem}their time axes differ ({listed})", remedy, "clock_drift")
     return [[c for g in groups_of_record for c in g.channels()] for groups_of_record in records]
+
+
+def _varying_numbers(names: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """The numbers in each of several names, without those that all have.
+
+    >>> _varying_numbers(["Mod1 hit 3", "Mod1 hit 4"])
+    ((3,), (4,))
+    """
+    numbers = [[int(digits) for digits in re.findall(r"\d+", name)] for name in names]
+    columns = [column for column in zip(*numbers) if len(set(column)) > 1]
+    return tuple(zip(*columns))
 
 
 def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float, Any]:
@@ -219,11 +243,13 @@ def _complete_record(
 def _scale_text(*levels: Mapping[str, Any]) -> str:
     """What the properties of a channel, its group and the file state of a scale that npTDMS does not apply."""
     for properties in levels:
-        count = properties.get("NI_Number_Of_Scales", properties.get("NI_Number_of_Scales", 0))
-        if not str(count).isdigit() or int(count) == 0 or properties.get("NI_Scaling_Status") == "scaled":
+        kinds = {int(m[1]): str(v) for k, v in properties.items() if (m := SCALE_TYPE.fullmatch(k))}
+        count = properties.get("NI_Number_Of_Scales", len(kinds))
+        if not str(count).isdigit() or not kinds or properties.get("NI_Scaling_Status") == "scaled":
             continue
-        kinds = [properties.get(f"NI_Scale[{i}]_Scale_Type") for i in range(min(int(count), MAX_SCALES))]
-        if unknown := sorted({str(kind) for kind in kinds if kind is not None} - KNOWN_SCALES):
+        if (last := max(kinds)) >= int(count) and "NI_Number_Of_Scales" in properties:
+            return f"the file states the scale {kinds[last]!r} and a number of scales of {count}: it is not applied"
+        if unknown := sorted(set(kinds.values()) - KNOWN_SCALES):
             return f"the file states the scale {', '.join(map(repr, unknown))}, which npTDMS cannot apply"
         break
     shown = [without_drawings(level) for level in levels[:0:-1]] + [levels[0]]
@@ -260,7 +286,7 @@ def _scaled_numbers(channel: nptdms.TdmsChannel, where: str, source: Source) -> 
     except ReadError as error:
         if not any(name.startswith("NI_Scale[") for name in channel.properties):
             raise
-        kinds = {str(v) for n, v in channel.properties.items() if re.fullmatch(r"NI_Scale\[\d+\]_Scale_Type", n)}
+        kinds = {str(v) for n, v in channel.properties.items() if SCALE_TYPE.fullmatch(n)}
         listed = ", ".join(map(repr, sorted(kinds))) or "without a type"
         place = f"{where}, channel {channel.name!r}"
         problem = f"its scale {listed} cannot be applied, npTDMS says {error.problem.partition('(')[2].rstrip(')')}"

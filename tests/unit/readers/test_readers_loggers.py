@@ -390,3 +390,74 @@ def test_columns_of_two_sampling_rates_are_named_with_both_and_with_what_to_do(m
     (error,) = read("two_times.csv", made("15_csv_cells"), RawDescription(channels, rate=rate)).errors
     assert error.reason == "wrong_rate" and "20000 Hz" in str(error) and "25600.0004 Hz" in str(error)
     assert "export all at one rate, or each rate to its own file" in str(error)
+
+
+def write_tasks(path, numbers_of_tasks, seconds=None):
+    """One group per task and impact; each group holds the number of its impact."""
+    with nptdms.TdmsWriter(path) as file:
+        for (task, name), numbers in zip((("Hammer", "force"), ("Accel", "rail")), numbers_of_tasks):
+            for number in numbers:
+                facts = {"wf_increment": 1 / RATE, "wf_start_offset": 0.0}
+                if seconds:
+                    facts["wf_start_time"] = np.datetime64("2026-05-13T08:00:00") + seconds[number]
+                samples = number + np.random.default_rng(number).normal(size=50) / 100.0
+                file.write_segment([nptdms.ChannelObject(f"Mod1 {task} {number}", name, samples, facts)])
+
+
+def test_the_groups_of_two_tasks_belong_together_by_their_numbers_or_their_starts(tmp_path):
+    """The force of one impact beside the acceleration of the next looks intact."""
+    write_tasks(tmp_path / "a.tdms", ((9, 10, 11), (9, 10, 11)))
+    samples = samples_of(tmp_path / "a.tdms", layout("N", "m/s²"))
+    np.testing.assert_allclose(samples.mean(axis=2), [[9, 9], [10, 10], [11, 11]], atol=0.01)
+    write_tasks(tmp_path / "a.tdms", ((9, 10), (10, 11)))
+    (error,) = errors_of(tmp_path / "a.tdms", layout("N", "m/s²"))
+    assert "their numbers differ ('Mod1 Accel 10' and 'Mod1 Hammer 9')" in error
+    seconds = {number: np.timedelta64(10 * (number % 3), "s") for number in (9, 10, 12, 13)}
+    write_tasks(tmp_path / "a.tdms", ((9, 10), (12, 13)), seconds)
+    assert len(samples_of(tmp_path / "a.tdms", layout("N", "m/s²"))) == 2
+
+
+def test_a_group_of_equal_length_without_a_time_axis_is_named(tmp_path):
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        facts = {"wf_increment": 1 / RATE}
+        file.write_segment([nptdms.ChannelObject("Hammer", "force", np.arange(9.0), facts)])
+        file.write_segment([nptdms.ChannelObject("Accel", "rail", np.arange(9.0))])
+    (error,) = errors_of(tmp_path / "a.tdms", layout("N", "m/s²"))
+    assert "'Accel': 9 samples of 0 s from no time" in error
+
+
+def test_a_scale_beyond_the_stated_number_of_scales_is_named(tmp_path):
+    """npTDMS applies as many scales as the file counts: none of a count of 0."""
+    facts = {"wf_increment": 1 / RATE, "NI_Number_Of_Scales": 0, "NI_Scale[0]_Scale_Type": "Linear"}
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        channels = [nptdms.ChannelObject("g", name, np.arange(50.0) ** 2 % 7, facts) for name in ("force", "rail")]
+        file.write_segment(channels)
+    (error,) = errors_of(tmp_path / "a.tdms", layout("N", "m/s²"))
+    assert "states the scale 'Linear' and a number of scales of 0: it is not applied" in error
+
+
+@pytest.mark.parametrize("columns", ["No", "One"])
+def test_the_unit_of_the_x_axis_of_lvm_is_used_and_another_axis_is_no_time(made, impacts, tmp_path, columns):
+    name = "one_header.lvm" if columns == "No" else "one_header_x.lvm"
+    text = (made("04_lvm_one_header") / name).read_text()
+    head, _, body = text.partition("X_Value\t")
+    in_ms = head.replace("Delta_X\t5.000000E-05", "X_Unit_Label\tms\tms\t\nDelta_X\t5.000000E-02").replace(
+        "5.000000E-05", "5.000000E-02"
+    )
+    rows = body.splitlines()
+    if columns == "One":
+        rows[1:] = [f"{float(t) * 1e3:.6f}\t{row}" for t, _, row in (row.partition("\t") for row in rows[1:])]
+    (tmp_path / "a.lvm").write_text(f"{in_ms}X_Value\t" + "\n".join(rows) + "\n")
+    for rate in (RATE, None):
+        np.testing.assert_allclose(samples_of(tmp_path / "a.lvm", layout(rate=rate)), impacts, atol=5.1e-7)
+    for old, new, words in (
+        (
+            "X_Dimension\tTime\tTime",
+            "X_Dimension\tFrequency\tFrequency",
+            "its X axis is Frequency in 'ms', and not the time",
+        ),
+        ("\tms\tms", "\tHz\tHz", "its X axis is Time in 'Hz', and not the time"),
+    ):
+        (tmp_path / "a.lvm").write_text(f"{in_ms.replace(old, new)}X_Value\t" + "\n".join(rows) + "\n")
+        (error,) = errors_of(tmp_path / "a.lvm", layout())
+        assert words in error

@@ -1,5 +1,7 @@
 """A usual code for a missing sample is one in packed numbers, too: unpacked, it looks like a measured value."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -84,3 +86,29 @@ def test_the_unit_of_a_matrix_is_that_of_its_channels(shape, tmp_path):
     (recording,) = read("a.h5", tmp_path, RawDescription(channels, "passage", rate=20000.0)).recordings
     np.testing.assert_allclose(recording.signal("rail"), samples[0] * 9.80665)
     np.testing.assert_allclose(recording.signal("other"), samples[1] * (9.80665 if 2 in shape else 1.0))
+
+
+@pytest.mark.parametrize("is_in_file", [False, True])
+@pytest.mark.parametrize(
+    ("type", "facts"),
+    [
+        ("f4", {"valid_max": 1500.0}),
+        ("f8", {"valid_range": [-1500.0, 1500.0]}),
+        ("i2", {"valid_range": np.array([-1500, 1500], "i2")}),
+        ("i2", {"valid_range": [-750.0, 750.0]}),  # floating-point numbers beside whole ones are unpacked ones
+    ],
+)
+def test_a_sample_outside_the_valid_range_is_missing(type, facts, is_in_file, tmp_path):
+    factor = 0.5 if type == "i2" else 1.0
+    numbers = np.resize(SMOOTH, 80_000).astype(type)
+    for is_outside in (False, True):
+        numbers[100] = 2000 if is_outside else 20
+        name = f"{is_outside}.h5"
+        with h5py.File(tmp_path / name, "w") as file:
+            file.attrs["sampling_rate"] = 1000.0
+            file["force"] = numbers
+            file["force"].attrs.update({"unit": "N", "scale_factor": factor, **facts})
+        size = {"max_duration": 1.0, "max_whole_file_size": 0} if is_in_file else {}
+        result = read(name, tmp_path, replace(DESCRIPTION, kind="passage"), **size)
+        assert [e.reason for e in result.errors] == ["not_finite"] * is_outside
+        assert len(result.recordings) + len(result.long_recordings) == (not is_outside)

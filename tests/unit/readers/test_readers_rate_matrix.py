@@ -533,3 +533,23 @@ def test_a_reduced_rate_beside_the_one_before_decides(tmp_path):
         assert is_true(outcome(tmp_path / "a.csv", described(TRUE))) == (len(entries[0][0]) > 4)
     write_csv(tmp_path / "a.csv", [("Sample rate", 2 * TRUE), ("Decimation", 2)], {"t": np.arange(N_SAMPLE) / TRUE})
     assert is_true(outcome(tmp_path / "a.csv", described(None, "t")))
+
+
+@pytest.mark.parametrize("format", ["mat", "npz"])
+def test_a_variable_that_is_called_t_in_upper_case_is_a_channel_or_an_axis(format, tmp_path):
+    """It vanished: "t" is the time and "T" a temperature, so it was neither samples nor metadata."""
+    n = 500
+    samples = {s.source: np.random.default_rng(i).normal(size=n) for i, s in enumerate(SENSORS)}
+    for values, is_right in (
+        (np.arange(n) / TRUE, True),
+        (np.arange(n) / 20000.0, False),
+        (np.sin(np.arange(n)), True),
+    ):
+        variables = {**samples, "T": values}
+        if format == "mat":
+            scipy.io.savemat(tmp_path / "a.mat", variables)
+        else:
+            np.savez(tmp_path / "a.npz", **variables)
+        result = read(f"a.{format}", tmp_path, described(TRUE, "T"))
+        assert len(result.recordings) == is_right
+        assert all("column 'T', which rises evenly" in error.problem for error in result.errors)

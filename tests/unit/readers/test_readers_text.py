@@ -464,3 +464,17 @@ def test_a_file_of_any_length_is_read_with_any_line_ends(end, separator, tmp_pat
     assert result.errors == ()
     (recording,) = result.recordings
     np.testing.assert_allclose(recording.samples, np.tile(X, (60, 1)).T.round(4), atol=1e-12)
+
+
+def test_names_without_cells_are_an_error_and_a_comment_is_none(tmp_path):
+    """A logger that left out its counter would shift every channel by one."""
+    numbers = np.random.default_rng(1).normal(size=(40, 3))
+    rows = "".join(f"{a:.4f};{b:.4f};{c:.4f}\n" for a, b, c in numbers)
+    channels = (*NAMED.channels, RawChannel("nr", "nr", "ignored"), RawChannel("air", "air", "ignored"))
+    description = RawDescription(channels, rate=20000.0)
+    names = [channel.source for channel in NAMED.channels]
+    (tmp_path / "a.csv").write_text(f"nr;{names[0]};{names[1]};air\n{rows}")
+    with pytest.raises(ReadError, match="line 2: 4 columns have a name and the rows have 3 cells"):
+        read("a.csv", tmp_path, description)
+    (tmp_path / "a.csv").write_text(f"nr;{names[0]};{names[1]};Comment\n{rows}")
+    assert read("a.csv", tmp_path, description).recordings[0].n_sample == 40
