@@ -60,17 +60,24 @@ def _label_errors(sections: Branch) -> Iterator[ConfigError]:
             yield place.error(problem_text, "Give it another label")
 
 
+# Quantity of the channel of each role: the receptance is computed from an acceleration.
+ROLES = {"force": "force", "response": "acceleration", "validation": "acceleration"}
+
+
 def _hammer_errors(tree: Branch, to_si: ToSi | None, min_peak_force: float) -> Iterator[ConfigError]:
     channels = tree["channels"]
-    for role in ("force", "response", "validation"):
+    roles: dict[str, str] = {}
+    for role, quantity in ROLES.items():
         leaf = tree.get(role)
         if leaf is None or leaf.value is None:
             continue
         if leaf.value not in channels:
             yield leaf.place.error(f"{role} is {leaf.value!r}, no channel", suggestion(leaf.value, channels))
-        elif (channels[leaf.value]["quantity"].value == "force") != (role == "force"):
-            detail = channels[leaf.value]["quantity"].value
-            yield leaf.place.error(f"{role} is {leaf.value!r}, which measures {detail}", "Name another channel")
+        elif (measured := channels[leaf.value]["quantity"].value) != quantity:
+            detail = f"{role} is {leaf.value!r}, which measures {measured}"
+            yield leaf.place.error(detail, f"Name a channel of the quantity {quantity}")
+        elif (other := roles.setdefault(leaf.value, role)) != role:
+            yield leaf.place.error(f"{role} is {leaf.value!r}, as {other} is", "Name another channel, or null")
         elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= min_peak_force:
             detail = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {min_peak_force} N"
             remedy = "Write the limit in N, or a lower softest_blow where the hammer is a small one"
@@ -93,6 +100,8 @@ def _channel_errors(tree: Branch, to_si: ToSi | None) -> Iterator[ConfigError]:
                 problem, "Write one step of the converter, in the unit of the limit"
             )
         source = channel["source"]
+        if isinstance(source.value, int) and source.value < 0:
+            yield source.place.error(f"source is {source.value}", "Write a name, or a number counted from 0")
         if source.value in sources:
             problem = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
             yield source.place.error(problem, "Give each channel its own source")

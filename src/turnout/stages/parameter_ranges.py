@@ -68,7 +68,7 @@ def _mappings(value: Any) -> Iterator[ParameterSet]:
 
 def _errors(parameters: ParameterSet, key: str, number: Number) -> Iterator[ConfigError]:
     low, high = RANGES.get((key, number.unit), (None, None))
-    if low is not None and high is not None and number.value and not low <= abs(number.value) <= high:
+    if low is not None and high is not None and number.value and not low <= number.value <= high:
         problem = f"{number.value:g} {number.unit} is outside {low:g} to {high:g} {number.unit}"
         yield parameters.error(key, problem, "Correct the number or its unit")
     if number.prior is not None and number.prior > MAX_PRIOR:

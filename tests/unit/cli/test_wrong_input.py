@@ -322,6 +322,7 @@ VALUES = {
     "tracks/tommerup.yaml: {value: 466.3, unit: MN/m => {value: 466.3, unit: N/m": (
         "improbable: config/tracks/tommerup.yaml, line 43, sections[0].pad_stiffness: 466.3 N/m is outside 1e+06 to"
     ),
+    "tracks/tommerup.yaml: {value: 400, unit: MN/m => {value: -400, unit: MN/m": "pad_stiffness: -4e+08 N/m is outside",
     "tracks/tommerup.yaml: {value: 210, unit: GPa => {value: 210, unit: Pa": "rail.youngs_modulus: 210 Pa is outside",
     "tracks/tommerup.yaml: prior: 0.03} => prior: 30}": "a prior of 30 is a standard deviation of 3000 %. Write it as",
     "vehicles/ic3.yaml: {value: 24.6, unit: t => {value: 24.6, unit: kg": (

@@ -131,6 +131,15 @@ WRONG = {
     "no sensitivity": (layout("sensitivity: 0.23, ", ""), "line 13, column 51: unit 'V' for the force"),
     "response that is no channel": (layout("response: rail", "response: rial"), "Did you mean 'rail'?"),
     "response that is the force": (layout("response: rail", "response: force"), "which measures force"),
+    "response that is no acceleration": (
+        layout("source: rail, quantity: acceleration, unit: m/s²", "source: rail, quantity: displacement, unit: mm"),
+        "response is 'rail', which measures displacement. Name a channel of the quantity acceleration",
+    ),
+    "validation that is the response": (
+        layout("response: rail", "response: rail\n  validation: rail"),
+        "validation is 'rail', as response is. Name another channel, or null",
+    ),
+    "source below 0": (layout("source: rail", "source: -1"), "source is -1. Write a name, or a number counted from 0"),
     "source twice": (layout("source: rail", "source: force"), "reads 'force', as force does"),
     "unknown field": (layout("{section}_", "{sektion}_"), "unknown field {sektion} in the pattern. Did you mean"),
     "pattern without section": (layout("{section}_", ""), "line 8, column 10: files is"),
