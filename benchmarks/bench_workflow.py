@@ -103,7 +103,7 @@ def run_workflow(folder):
     """Run the workflow: (its output, CPU and wall seconds, peak memory of its largest process [MB])."""
     with stopwatch() as watch, open(folder / "said", "w") as out:
         run = subprocess.Popen(
-            toy.command(shards=SHARDS, chain="toy_fleet:nothing"), cwd=folder, env=toy.environment(), stdout=out,
+            toy.command(shards=SHARDS, function="toy_fleet:nothing"), cwd=folder, env=toy.environment(), stdout=out,
             stderr=subprocess.STDOUT,
         )  # fmt: skip
         _, status, usage = os.wait4(run.pid, 0)

@@ -24,7 +24,7 @@ def hammer_same_rows(folder, toy):
     for shards, cores in COMBINATIONS:
         toy.forget(folder)
         with stopwatch() as watch:
-            toy.run(folder, shards=shards, cores=cores, chain="")
+            toy.run(folder, shards=shards, cores=cores, function="")
         registries[shards, cores] = tuple(toy.data_files(folder))
         cpu_texts.append(f"{shards}x{cores} {watch.cpu:.0f} s")
     rows = toy.rows(folder)

@@ -23,7 +23,9 @@ rule change:
         runtime=1440,
     params:
         kind="change",
-        chain=RUN.chains.get("change", "turnout.stages.change_diagnosis:change_unit"),
+        function=RUN.functions.get(
+            "change", "turnout.stages.change_diagnosis:change_unit"
+        ),
         algo=fingerprint("turnout.stages.change_diagnosis"),
         job=RUN.job,
         again=lambda wildcards: read_postponed(Path("work/change/00of01.json"))[0],

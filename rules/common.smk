@@ -22,12 +22,12 @@ wildcard_constraints:
 
 
 def stage_params(stage, own):
-    """The function that computes a stage, and the version of its code; `--config chains=` names another one."""
-    function = RUN.chains.get(stage, own)
+    """The function that computes a stage, and the version of its code; `--config functions=` gives another one."""
+    function = RUN.functions.get(stage, own)
     code = function.partition(":")[0]
     ours = code.partition(".")[0] == "turnout"
     return {
-        "chain": function,
+        "function": function,
         "algo": fingerprint(code) if ours else function,
         "job": RUN.job,
         "plan": plan_content,

@@ -11,7 +11,7 @@ from turnout.workflow.plan import shard_of
 
 pytestmark = pytest.mark.slow
 SHARDS = 3
-CHAIN = '''"""The toy chain, on a machine that has a bad sector or ends a process while a file says so."""
+FUNCTION = '''"""The toy function, on a machine that has a bad sector or ends a process while a file says so."""
 import errno, os
 from pathlib import Path
 import toy_fleet
@@ -31,12 +31,12 @@ def unit(unit, turnout, raw_root, algo=""):
 def fleet(tmp_path_factory):
     folder = toy.make(tmp_path_factory.mktemp("faulty"), n_turnout=6, n_section=1)
     assert len({shard_of(f"T{i:05d}", SHARDS) for i in range(6)}) > 1
-    (folder / "faulty.py").write_text(CHAIN)
+    (folder / "faulty.py").write_text(FUNCTION)
     return folder
 
 
 def run(fleet):
-    return toy.run(fleet, chain="faulty:unit", shards=SHARDS, check=False)
+    return toy.run(fleet, function="faulty:unit", shards=SHARDS, check=False)
 
 
 def measured(fleet):
@@ -79,7 +79,7 @@ def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     assert shard_of("T00000", SHARDS) != shard_of("T00001", SHARDS) == shard_of("T00003", SHARDS)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 1}\n")
     (fleet / "killer").touch()
-    options = toy.command(chain="faulty:unit", shards=SHARDS)[3:]
+    options = toy.command(function="faulty:unit", shards=SHARDS)[3:]
     profile = str(toy.REPOSITORY / "profiles/default")
     night = [sys.executable, "-m", "turnout.cli.main", "nightly", "--profile", profile, "--", *options]
     done = subprocess.run(night, cwd=fleet, env=toy.environment(), text=True, capture_output=True, check=False)

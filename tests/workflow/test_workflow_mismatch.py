@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "stages"))
 import small_turnout as small
 
 pytestmark = pytest.mark.slow
-LIGHT = '''"""The program's own chain with two families, so that a turnout takes a second; one turnout has a fault."""
+LIGHT = '''"""The program's function with two effects, so that a turnout takes a second; one turnout has a fault."""
 from functools import partial
 from turnout.stages import mismatch
 from turnout.mismatch.turnout import TrackCase
@@ -22,7 +22,7 @@ def unit(unit, turnout, raw_root, context=None, algo=""):
         raise ZeroDivisionError("toy fault")
     return mismatch.mismatch_unit(unit, turnout, raw_root, context, algo)
 '''
-CHAIN = "chains={mismatch: 'light:unit'}"
+FUNCTION = "functions={mismatch: 'light:unit'}"
 TERMS = """terms:
   - term: local_pad
     sleeper: {value: 18, unit: m, source: test}
@@ -32,7 +32,7 @@ REGISTRY = "results/registry/_generation.json"
 
 
 def run(folder, *options):
-    return toy.run(folder, CHAIN, *options, chain="", target=REGISTRY, cores=1)
+    return toy.run(folder, FUNCTION, *options, function="", target=REGISTRY, cores=1)
 
 
 def said(done):

@@ -56,7 +56,7 @@ def test_profiles_are_read(tmp_path):
     assert "profiles/default" in said and "hammer" in said
 
 
-def test_the_real_chain_is_the_default(tmp_path):
+def test_the_stage_of_the_program_is_the_default(tmp_path):
     folder = toy.make(tmp_path, n_turnout=1)
-    said = toy.run(folder, "--dry-run", "--printshellcmds", chain=None, target=None).stdout
+    said = toy.run(folder, "--dry-run", "--printshellcmds", function=None, target=None).stdout
     assert "rule hammer" in said

@@ -1,4 +1,4 @@
-"""A fleet of tiny raw files, and a chain that only reads them: real workflow, hardly any computing."""
+"""A fleet of tiny raw files, and a function that only reads them: real workflow, hardly any computing."""
 
 import hashlib
 import json
@@ -36,7 +36,7 @@ hammer:
 
 
 def unit(unit, turnout, raw_root, algo=""):
-    """Toy chain: read every file, one row for it, one row per record."""
+    """Toy function: read every file, one row for it, one row per record."""
     from turnout.stages.raw_files import read_or_quarantine, recording_row
 
     base = {
@@ -59,7 +59,7 @@ def unit(unit, turnout, raw_root, algo=""):
 
 
 def nothing(unit, turnout, raw_root, algo=""):
-    """A chain that gives no row at all: what is left is the workflow's own work."""
+    """A function that gives no row at all: what is left is the workflow's own work."""
     return {}
 
 
@@ -168,12 +168,12 @@ def environment():
     return os.environ | more
 
 
-def command(*options, cores=2, shards=1, chain="toy_fleet:unit", target="work/verdict.json"):
-    """Command line of a run with the toy chain, up to the verdict."""
+def command(*options, cores=2, shards=1, function="toy_fleet:unit", target="work/verdict.json"):
+    """Command line of a run with the toy function, up to the verdict."""
     base = [sys.executable, "-m", "snakemake", "--snakefile", str(REPOSITORY / "Snakefile")]
     base += [target] if target else []
     base += ["--cores", str(cores)] if cores else []
-    setting = [f"shards={shards}"] + ([f"chains={{hammer: '{chain}'}}"] if chain else [])
+    setting = [f"shards={shards}"] + ([f"functions={{hammer: '{function}'}}"] if function else [])
     extra = [o for o in options if "=" in o and not o.startswith("-")]
     return [*base, *[o for o in options if o not in extra], "--config", *setting, *extra]
 

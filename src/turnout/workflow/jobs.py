@@ -37,7 +37,7 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
     log : any
         Log file of the job; Snakemake gives a list with one name.
     params : Params
-        kind, chain, algo, job and, where needed, context and gather.
+        kind, function, algo, job and, where needed, context and gather.
     threads : int
         Processes that may run at a time.
 
@@ -54,7 +54,7 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
         If the configuration or the state of the shard cannot be used.
     """
     _log_to(log)
-    stage = Stage(params.kind, params.chain, params.algo, params.get("context"), params.get("gather"))
+    stage = Stage(params.kind, params.function, params.algo, params.get("context"), params.get("gather"))
     job = params.job
     configuration = load_configuration(job["configuration"])
     try:

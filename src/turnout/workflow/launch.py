@@ -30,7 +30,7 @@ OPTIONS = {
     "diagnose": "true: diagnose every turnout, whatever its settings say; false: none, and no open alarm either",
     "accept_vanished": "true: many known files are gone on purpose",
     "day": "YYYY-MM-DD: the day of list and pages, instead of today",
-    "chains": "for each stage module:function, instead of the program's own",
+    "functions": "for each stage module:function, instead of the program's own",
 }
 PLAN_FOLDER = "work/plan"
 # Start time of the newest run that reached its jobs, UTC. It is no input of a rule, so it causes no rerun.
@@ -57,7 +57,7 @@ class Launch:
     fleet_hash: str
     job: dict = field(default_factory=dict)
     diagnose: str = ""
-    chains: Mapping[str, str] = field(default_factory=dict)
+    functions: Mapping[str, str] = field(default_factory=dict)
     learned: tuple[str, ...] = ()
     day: str = ""
     alarms: bool = True
@@ -137,12 +137,12 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         write_text(Path(LAUNCH_FILE), started.isoformat(timespec="seconds"))
     day = _day(options.get("day"))
     names = shard_names(shards, turnouts)
-    chains = dict(options.get("chains") or {})
+    functions = dict(options.get("functions") or {})
     diagnosis = _diagnosis_scope(options, configuration)
     learned = _learned_files(configuration)
     alarms = "diagnose" not in options or _flag(options, "diagnose")
     return Launch(
-        names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, chains, learned, day, alarms
+        names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, functions, learned, day, alarms
     )
 
 

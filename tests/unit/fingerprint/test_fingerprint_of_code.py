@@ -110,7 +110,7 @@ def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch
     assert fp.fingerprint("turnout.core") == before
 
 
-def test_the_hammer_chain_stands_on_its_parts():
+def test_the_hammer_stage_stands_on_its_parts():
     fp.clear_caches()
     found = fp.closure("turnout.stages.hammer")
     assert {"turnout.hammer_test", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found

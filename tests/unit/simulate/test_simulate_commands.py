@@ -1,4 +1,4 @@
-"""The commands leave raw files that the readers read and the chains use."""
+"""The commands leave raw files that the readers read and the stages use."""
 
 import json
 

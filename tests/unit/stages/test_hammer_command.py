@@ -142,7 +142,7 @@ def _with_double_impact(recording):
     return replace(recording, samples=np.stack([force, recording.samples[1]]))
 
 
-def test_nothing_is_shown_as_sound_that_the_chain_rejects(tmp_path, capsys):
+def test_nothing_is_shown_as_usable_that_the_stage_rejects(tmp_path, capsys):
     files = filed(tmp_path, "SP", (1,), change=lambda rs: [scenario.swapped_sign(r) for r in rs])
     code, text, _ = say(capsys, tmp_path, *files)
     assert code == 1 and "no resonance" in text and "0 of 10 accepted" in text

@@ -1,4 +1,4 @@
-"""The whole hammer chain against a truth that it never sees: files on disk in, rows out."""
+"""The whole hammer stage against a truth that it never sees: files on disk in, rows out."""
 
 import json
 from collections import Counter

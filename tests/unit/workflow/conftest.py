@@ -1,4 +1,4 @@
-"""The fleet of lengths is a module of its own, for its calls and its chain are asked about, too."""
+"""The fleet of lengths is a module of its own, for its calls and its function are asked about, too."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A fleet of tiny text files, and a chain whose rows are the lengths of them."""
+"""A fleet of tiny text files, and a function whose rows are the lengths of them."""
 
 import errno
 import os

@@ -365,7 +365,7 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     module.models = lambda turnout, settings: ("", list(current_results("work", "hammer", turnout)))
     monkeypatch.setitem(sys.modules, "upon_hammer", module)
     job = {"configuration": "config", "raw": "raw", "only": [], "strict": False}
-    params = Params(kind="hammer", chain="x:y", algo="1", job=job, context="upon_hammer:models")
+    params = Params(kind="hammer", function="x:y", algo="1", job=job, context="upon_hammer:models")
     with pytest.raises(DamagedBatch, match="cannot be read"):
         stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
     assert read_postponed(fleet.state) == (1, {})

@@ -127,7 +127,7 @@ def test_notes_that_are_a_pipe_do_not_stop_the_plan(fleet, name):
     assert problems == ["it is a pipe, not a file"]
 
 
-VANISHED_CODES = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR}  # the file is gone: its chain says so
+VANISHED_CODES = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR}  # the file is gone: its stage says so
 CODES = dict(enumerate(sorted(errno.errorcode), 1))  # turnout -> every code of this platform; t0 is intact
 
 
