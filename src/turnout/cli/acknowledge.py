@@ -29,14 +29,14 @@ HELP = "acknowledge an alarm, or suppress a chart until a date"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Place, person, reason and date of an acknowledgement.
+    """Turnout or section, person, reason and date of an acknowledgement.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("place", help="turnout, or turnout/section")
+    parser.add_argument("id", metavar="ID", help="turnout, or turnout/section")
     parser.add_argument("--band", default="", help=f"{', '.join(BANDS)} (under trains); all if not given")
     parser.add_argument("--by", required=True, help="name of the person")
     parser.add_argument("--reason", required=True, help="reason, stored with it")
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.config.table_edits import added_row, one_line, turnout_and_section
     from turnout.errors import ConfigError, ConfigErrors
 
-    turnout, label = turnout_and_section(args.place)
+    turnout, label = turnout_and_section(args.id)
     configuration = load_configuration(args.configuration)
     at = args.at or datetime.now(UTC).replace(tzinfo=None).isoformat(timespec="minutes")
     action = "suppress" if args.suppress_until else "acknowledge"
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         after = load_configuration(args.configuration, tables=tables)
         if acknowledgement_row(cells) not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
-    print(f"{path}: {action} {args.place} {args.band or 'all bands'}. It counts from the next run on.")
+    print(f"{path}: {action} {args.id} {args.band or 'all bands'}. It counts from the next run on.")
     if action == "acknowledge" and _has_no_alarm(args.registry, acknowledgement_row(cells)):
         print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
     return 0

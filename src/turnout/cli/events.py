@@ -24,9 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("place", nargs="?", help="turnout, or turnout/section")
-    parser.add_argument("kind", nargs="?", help="tamping, pad_exchange, sensor_change ...")
-    parser.add_argument("date", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
+    parser.add_argument("id", metavar="ID", nargs="?", help="turnout, or turnout/section")
+    parser.add_argument("kind", metavar="KIND", nargs="?", help="tamping, pad_exchange, sensor_change ...")
+    parser.add_argument("date", metavar="DATE", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
     parser.add_argument("--resets", default="", help="'ballast', 'railpad', 'ballast railpad' or 'none'")
     parser.add_argument("--note", default="", help="free text")
     parser.add_argument("--effect", action="store_true", help="what the entered work did, from the registry")
@@ -54,11 +54,11 @@ def run(args: argparse.Namespace) -> int:
 
     if args.effect:
         return _effect(args.registry)
-    if args.place is None:
+    if args.id is None:
         events = load_configuration(args.configuration).events
         add_result(args, [asdict(e) for e in events])
         if not events:
-            print(f"{args.configuration}/events.csv: no event yet. Enter one: turnout events PLACE KIND DATE")
+            print(f"{args.configuration}/events.csv: no event yet. Enter one: turnout events ID KIND DATE")
         for e in events:
             where = f"{e.turnout}/{e.section}" if e.section else e.turnout
             resets = " and ".join(e.resets) or "nothing"
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if not (args.kind and args.date):
         raise ConfigError(
-            "events", "the command line", "a place without kind and date", "Write: turnout events PLACE KIND DATE"
+            "events", "the command line", "an id without kind and date", "Write: turnout events ID KIND DATE"
         )
     return _enter(args)
 
@@ -81,7 +81,7 @@ def _enter(args: argparse.Namespace) -> int:
     from turnout.errors import ConfigError, ConfigErrors
 
     path = Path(args.configuration) / "events.csv"
-    turnout, label = turnout_and_section(args.place)
+    turnout, label = turnout_and_section(args.id)
     cells = dict(turnout=turnout, section=label, date=args.date, kind=args.kind, resets=args.resets, note=args.note)
     with added_row(path, cells, COLUMNS) as tables:
         after = load_configuration(args.configuration, tables=tables)
@@ -91,10 +91,10 @@ def _enter(args: argparse.Namespace) -> int:
         if problem := date_problem(entered):
             raise ConfigError(path, "date", *problem)
         if entered.work in (event.work for event in read_events(path, str(path), None, {})[0]):
-            repetition = f"{args.kind} at {args.place}, {args.date}, is there already"
+            repetition = f"{args.kind} at {args.id}, {args.date}, is there already"
             raise ConfigError(path, "the work", repetition, "To change its row, edit the file")
     begin = "from its day" if entered.at > now() else "from the next run"
-    print(f"{path}: {args.kind} at {args.place}, {args.date}. It counts {begin} on.")
+    print(f"{path}: {args.kind} at {args.id}, {args.date}. It counts {begin} on.")
     return 0
 
 

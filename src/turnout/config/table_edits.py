@@ -61,12 +61,12 @@ def added_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -
         _write(path.resolve(), content, path)
 
 
-def turnout_and_section(place: str) -> tuple[str, str]:
-    """Turnout and section of a place on the command line, such as "tommerup_s1/A7".
+def turnout_and_section(name: str) -> tuple[str, str]:
+    """Turnout and section of an id on the command line, such as "tommerup_s1/A7".
 
     Parameters
     ----------
-    place : str
+    name : str
         A turnout, or turnout/section.
 
     Returns
@@ -84,10 +84,10 @@ def turnout_and_section(place: str) -> tuple[str, str]:
     >>> turnout_and_section("tommerup_s1/A7"), turnout_and_section("tommerup_s1")
     (('tommerup_s1', 'A7'), ('tommerup_s1', ''))
     """
-    turnout, slash, section = place.strip().partition("/")
+    turnout, slash, section = name.strip().partition("/")
     if not turnout or (slash and not section):
-        problem = f"no {'section after the slash' if turnout else 'turnout'} in {place!r}"
-        raise ConfigError("the command line", "place", problem, "Write TURNOUT or TURNOUT/SECTION")
+        problem = f"no {'section after the slash' if turnout else 'turnout'} in {name!r}"
+        raise ConfigError("the command line", "ID", problem, "Write TURNOUT or TURNOUT/SECTION")
     return turnout, section
 
 
