@@ -92,14 +92,18 @@ def test_generated_python(block):
 
 
 @pytest.mark.parametrize("page", sorted({b.page for b in RUN if b.language == "python"}), ids=lambda p: p.name)
-def test_python(page, folder, monkeypatch):
-    """The blocks of a page run one after the other, with the names of those before."""
+def test_python(page, folder, monkeypatch, capsys):
+    """The blocks of a page run one after the other, with the names of those before, and print the text behind them."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     names: dict = {}
-    for block in (b for b in RUN if b.page == page and b.language == "python"):
-        if not block.body.startswith((">>> ", "turnout.")):
+    of_page = [block for block in BLOCKS if block.page == page]
+    for block, after in zip(of_page, [*of_page[1:], None]):
+        if block in RUN and block.language == "python" and not block.body.startswith((">>> ", "turnout.")):
+            capsys.readouterr()
             exec(compile(block.body, str(block), "exec"), names)
+            if printed := capsys.readouterr().out:
+                assert after is not None and after.language == "text" and after.body == printed, block
 
 
 @of("sql")

@@ -1,0 +1,54 @@
+"""A figure of the demonstration that stands on two pages is the same on both."""
+
+import re
+
+import pytest
+
+# (page, pattern of its figures, page that a run of the demonstration writes, pattern of the same figures there)
+REPEATED = {
+    "spread of a chart": (
+        "measuring.md",
+        r"It is ([\d.]+) % for the ballast of `tommerup_s2/A8`",
+        "trends.md",
+        r"With this chart's spread of ([\d.]+) % a campaign",
+    ),
+    "onset of a dip": (
+        "passages.md",
+        r"dates the change to ([\d-]+) \(([\d-]+) to ([\d-]+), 95 %\)",
+        "demonstration.md",
+        r"tommerup_s2/ASM amplitude: .*, since ([\d-]+) \(([\d-]+) to ([\d-]+)\)",
+    ),
+    "stiffness of a chart": (
+        "trends.md",
+        r"`aarup_n4/ASM` of the demonstration the row states -(\d+) % \(-(\d+) to -(\d+)\)",
+        "demonstration.md",
+        r"aarup_n4/ASM ballast: .* lost (\d+) % of stiffness around the section \((\d+) to (\d+)\)",
+    ),
+    "stiffness of a diagnosis": (
+        "trends.md",
+        r"the diagnosis -(\d+) % \(-(\d+) to -(\d+)\) at one hanging sleeper",
+        "demonstration.md",
+        r"aarup_n4 ASM: named. .* under impacts -(\d+) % \(-(\d+) to -(\d+), 95 %\)",
+    ),
+    "second chart of trains": (
+        "passages.md",
+        r"The chart of A8 raises one too, with \+([\d.]+) % \(([\d.]+) to ([\d.]+)\)",
+        "demonstration.md",
+        r"tommerup_s2/A8 amplitude: .* rose by ([\d.]+) % \(([\d.]+) to ([\d.]+), 95 %\)",
+    ),
+    "size in the list and in the chart": (
+        "demonstration.md",
+        r"tommerup_s2/A8 ballast: .* fell by ([\d.]+) % \([\d.]+ to [\d.]+, 95 %\), since ([\d-]+)",
+        "trends.md",
+        r"called a drift since (?=([\d-]+)).* its size -([\d.]+) %",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REPEATED)
+def test_a_repeated_figure_is_that_of_the_run(what, repository):
+    page, pattern, origin, original = REPEATED[what]
+    found = re.search(pattern, (repository / "docs" / page).read_text(encoding="utf-8"))
+    expected = re.search(original, (repository / "docs" / origin).read_text(encoding="utf-8"))
+    assert found and expected, what
+    assert sorted(found.groups()) == sorted(expected.groups())
