@@ -19,7 +19,7 @@ NAMES = (
     "students_t", "campaign_weight", "epochs", "resonance_drift",
     "passage_values", "chart_values", "recursive_modes", "mode_residuals",
     "cusum", "change_since_event", "maintenance_effect",
-    "chart_status_at", "unusable", "cannot_see", "was_said", "in_service", "time_to_threshold",
+    "chart_status_at", "unusable", "cannot_see", "acknowledgement_counts", "in_service", "time_to_threshold",
     "is_below_target", "stiffness_words", "damping_charts", "chart_states", "worklist",
 )  # fmt: skip
 

@@ -31,8 +31,8 @@ FILES = {
     "files": Key("text", "pattern of the file names below the turnout's raw folder", required=True),
     "format": Key("text", "reader, one of `turnout check --formats`; auto: by the file itself"),
     "rate": HAMMER_RATE,
-    "records": Key("integer", "records in one file; null: not promised", minimum=1, nullable=True),
-    "samples": Key("integer", "samples per record; null: not promised", minimum=1, nullable=True),
+    "records": Key("integer", "records in one file; null: any number", minimum=1, nullable=True),
+    "samples": Key("integer", "samples per record; null: any number", minimum=1, nullable=True),
     "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
     "checked_entries": Key("text", "entries of the files that state neither rate, scale nor unit; separated by ;"),
 }

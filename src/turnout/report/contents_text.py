@@ -211,7 +211,7 @@ def _event_lines(contents: FileContents) -> list[str]:
         span = f"peaks {sizes[0]:.4g} to {sizes[-1]:.4g} {unit or '(no unit)'} in {contents.event_channel!r}"
         return [_line("impacts", f"{len(sizes)}, {span}"), _line("", _event_times(contents, "s"))]
     if contents.kind == "trains":
-        stretches = f"{len(contents.events)}, stretches that are loud for longer than the rest"
+        stretches = f"{len(contents.events)}, parts with strong vibration for longer than elsewhere"
         return [_line("trains", stretches), _line("", _event_times(contents, "s"))]
     return [_line("impacts", "none found; no train found either")]
 

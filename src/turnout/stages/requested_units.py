@@ -149,7 +149,7 @@ class _NightlyScan:
             raise ConfigError(unit.files[0][0], "file name", "is that of a passage, not of a hammer test", command)
         further = [path.rsplit("/", 1)[-1] for path, *_ in unit.files if path not in names]
         selection = replace(unit, files=tuple(file for file in unit.files if file[0] in names))
-        remark = f"the nightly run takes {', '.join(further)} with it; name all of them to see what it will say"
+        remark = f"the nightly run takes {', '.join(further)} with it; name all of them to see its result"
         remarks = self.notes(unit.campaign or "") + ((remark,) if further else ())
         return RequestedUnit(selection, self.turnout, self.raw_root, remarks)
 

@@ -292,9 +292,7 @@ def _last_believable(charts: pd.DataFrame, last: np.ndarray, until: float) -> fl
     if 2 * ahead.sum() > len(ahead):
         return np.inf
     if ahead.any():
-        message = (
-            "campaigns after %s, which has not come, are shown and not used. Correct the dates of %d charts, first %s"
-        )
+        message = "campaigns after %s are in the future: shown, not used. Correct the dates of %d charts, first %s"
         where = " ".join(charts.loc[ahead, ["section_id", "band"]].iloc[0])
         logging.getLogger("turnout.trend").warning(message, timestamps([until])[0].item(), ahead.sum(), where)
     return until

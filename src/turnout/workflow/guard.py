@@ -113,7 +113,7 @@ def death_rows(unit: Unit, *_: Any, **__: Any) -> dict[str, list[dict]]:
     """
     finding = "the process died that computed it, and again where it was computed alone"
     remedy = (
-        "Look in the machine's log whether its memory ended, and whether its files are whole; "
+        "Look in the log of the machine whether the memory was exhausted, and check that the files are complete; "
         "the unit is tried again when one of its files is touched, or the program changes"
     )
     return {

@@ -14,7 +14,7 @@ from turnout.workflow.batches import read_column
 from turnout.workflow.retries import JOB_ENDED, read_postponed, request_rerun, started_units
 from turnout.workflow.state import batch_paths, state_of
 
-REPEATED_COMPLAINT = "said before; it ends when they are fixed, or when enough newer units are sound by themselves"
+REPEATED_COMPLAINT = "stated before; it ends when they are fixed, or when enough newer units are usable"
 IN_QUARANTINE, FAULTS = ("partly", "quarantined"), ("internal_error",)
 
 

@@ -23,7 +23,11 @@ class IdentifySettings:
         0.03, "s", "4 to 6 decay times of the paper's ballast modes; more adds noise", minimum=0.004, maximum=1.0
     )
     shortest_decay: float = setting(
-        0.012, "s", "two decay times of the paper's ballast modes; less cannot hold one", minimum=0.002, maximum=1.0
+        0.012,
+        "s",
+        "two decay times of the paper's ballast modes; less contains no mode",
+        minimum=0.002,
+        maximum=1.0,
     )
     ballast_low: float = setting(50.0, "Hz", "lower end of the ballast resonance in the literature", minimum=1.0)
     ballast_high: float = setting(300.0, "Hz", "upper end of the ballast resonance in the literature", minimum=1.0)

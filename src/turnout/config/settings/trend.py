@@ -17,7 +17,7 @@ class TrendSettings:
     )
     earliest_year: int = setting(1990, "", "an older time stamp comes from a clock that was never set", minimum=1900)
     clock_gap_days: float = setting(
-        400.0, "d", "a lone last campaign this long after every other is taken for a wrong clock", minimum=1.0
+        400.0, "d", "a single last campaign this long after all others counts as one with a wrong clock", minimum=1.0
     )
     baseline_days: float = setting(
         357.0, "d", "52 weekly campaigns: one whole year separates season from drift", minimum=1.0

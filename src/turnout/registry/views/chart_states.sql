@@ -3,7 +3,7 @@
 -- is below the target, or only follows from the other component (is_coupled), whose row is not silenced. plan: an acknowledged or smaller alarm, or a drift among the discoveries of the fleet
 -- (false-discovery rate 10 %), also where the chart is too noisy to see the target within a year. suppressed: somebody
 -- silenced it, with a reason and an end, a day at which it comes back.
--- needs: chart_status_at, was_said, in_service, is_below_target
+-- needs: chart_status_at, acknowledgement_counts, in_service, is_below_target
 create or replace macro chart_states_on("asof") as table
 with open_alarms as (
     select turnout_id, section_id, band, source, max(raised_at_utc) as raised_at_utc
@@ -24,7 +24,7 @@ spoken as (
     left join open_alarms o using (turnout_id, section_id, band, source)
     left join acknowledgements k
         on k.turnout_id = s.turnout_id and coalesce(k.section_id, s.section_id) = s.section_id
-            and coalesce(k.band, s.band) = s.band and was_said(k.at_utc, "asof")
+            and coalesce(k.band, s.band) = s.band and acknowledgement_counts(k.at_utc, "asof")
     group by all
 )
 select

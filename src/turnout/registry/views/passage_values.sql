@@ -1,7 +1,7 @@
--- One row per section, kind of value and week (Monday, UTC): what ordinary trains say, with its own error bars.
+-- One row per section, kind of value and week (Monday, UTC): the values from ordinary trains, with their own errors.
 -- Modes of passages where another program entered any (this one identifies none), weighted by their errors; and
 -- band 'amplitude', the peak acceleration [m/s²] at the usual speed, where at least five passages were measured:
--- every sensor against its own first year, so that one that falls silent does not shift the level.
+-- every sensor against its own first year, so that one that stops recording does not shift the level.
 -- needs: modes_current, passages_current, passage_fits_current
 create or replace view passage_values as
 with weighed as (

@@ -3,7 +3,7 @@
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
 -- An alarm that follows from the other resonance of a section refers to its row, if that one is listed.
--- needs: chart_states, cannot_see, chart_status_at, was_said, in_service, is_below_target, stiffness_words, findings_current
+-- needs: chart_states, cannot_see, chart_status_at, acknowledgement_counts, in_service, is_below_target, stiffness_words, findings_current
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -40,7 +40,7 @@ spoken as (
             select max_by(k.by_whom || ': ' || k.reason, k.at_utc) from acknowledgements k
             where k.turnout_id = r.turnout_id and coalesce(k.section_id, r.section_id) = r.section_id
                 and coalesce(k.band, r.band) = r.band and k.action = 'acknowledge'
-                and k.at_utc >= r.raised_at_utc and was_said(k.at_utc, "asof")
+                and k.at_utc >= r.raised_at_utc and acknowledgement_counts(k.at_utc, "asof")
         ) as acknowledged
     from raised r
 ),
@@ -136,7 +136,7 @@ not_silenced as (
         select 1 from acknowledgements k
         where k.turnout_id = e.turnout_id and coalesce(k.section_id, e.section_id) = e.section_id
             and coalesce(k.band, e.band) = e.band and k.action = 'suppress'
-            and was_said(k.at_utc, "asof")
+            and acknowledgement_counts(k.at_utc, "asof")
             and coalesce(k.until_utc, timestamp '9999-01-01') > "asof"
     )
 ),
