@@ -4,7 +4,7 @@ import os
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import date, datetime
 from functools import lru_cache
 from operator import attrgetter
 from pathlib import Path
@@ -13,6 +13,7 @@ from stat import S_ISREG
 
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import NOTE_FILES
+from turnout.config.events import MAX_LEAD_TIME, now
 from turnout.config.filename_pattern import compile_pattern, wrong_field
 from turnout.errors import ReadError
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
@@ -21,6 +22,7 @@ from turnout.records import Unit
 # Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
 UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
 IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
+FIRST_YEAR = 1990  # of a digital recording; the readers take an earlier start for an unset clock, too
 READABLE = 0o444  # mode of a file that everybody may read
 
 _name = attrgetter("name")
@@ -245,11 +247,8 @@ def _time_problem(match: Match) -> tuple[str, str] | None:
     """
     for group, form, quantity in _times_in(match.re):
         text = match[group]
-        if text is not None and not _is_calendar_time(text, form):
-            return (
-                f"{text!r} is no {quantity} of the calendar",
-                "Rename it after the day on which it was measured, in UTC",
-            )
+        if text is not None and (problem := _calendar_problem(text, form, quantity, now().date())):
+            return f"{text!r} {problem}", "Rename it after the day on which it was measured, in UTC"
     return None
 
 
@@ -261,13 +260,15 @@ def _times_in(expression: Pattern) -> tuple[tuple[str, str, str], ...]:
 
 
 @lru_cache(maxsize=10_000)
-def _is_calendar_time(text: str, form: str) -> bool:
-    """Whether a text is a valid time. Cached: a network has 140,000 files, but a few hundred days."""
+def _calendar_problem(text: str, form: str, quantity: str, today: date) -> str:
+    """What is wrong with a time, "" for a valid one. Cached: a network has 140,000 files, but a few hundred days."""
     try:
-        datetime.strptime(text, form)
+        day = datetime.strptime(text, form).date()
     except ValueError:
-        return False
-    return True
+        return f"is no {quantity} of the calendar"
+    if day > today + MAX_LEAD_TIME:  # a day or two may be the zone, or a clock that is wrong
+        return "is more than a year ahead"
+    return "" if day.year >= FIRST_YEAR else f"is before {FIRST_YEAR}, when no digital logger was in use"
 
 
 def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[str]) -> Iterator[ReadError]:

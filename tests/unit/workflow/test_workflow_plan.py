@@ -129,6 +129,8 @@ def test_the_part_by_which_alone_a_name_misses_the_pattern_is_named(fleet, name,
         ("t2/hammer/2024-13-45/A_1.uff", "'2024-13-45' is no day of the calendar"),
         ("t2/hammer/2023-02-29/A_1.uff", "'2023-02-29' is no day of the calendar"),
         ("t2/passages/20241345T101500Z.tdms", "'20241345T101500Z' is no time of the calendar"),
+        ("t2/hammer/2262-05-13/A_1.uff", "'2262-05-13' is more than a year ahead"),
+        ("t2/passages/19040101T000000Z.tdms", "'19040101T000000Z' is before 1990"),
     ],
 )
 def test_an_impossible_date_is_a_named_problem(fleet, name, found):
