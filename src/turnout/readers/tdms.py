@@ -13,6 +13,8 @@ from typing import Any, BinaryIO
 
 import nptdms
 import numpy as np
+from nptdms.reader import TdmsReader
+from nptdms.timestamp import TdmsTimestamp
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
@@ -35,6 +37,49 @@ SCALE_TYPE = re.compile(r"NI_Scale\[(\d+)\]_Scale_Type")
 APPLIED_PREFIXES = ("wf_", "NI_")  # properties of the time axis and of the scales that npTDMS applies
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
 UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
+
+
+ONE_WRITE_REMEDY = "Write each recording to a group of its own, or a file"
+MAX_GAP = 0.1  # s: time stamps of a computer's clock are no more precise
+DECIDING = ("wf_increment", "unit_string", "NI_Scale[", "NI_Scaling_Status", "NI_Number_Of_Scales")
+
+
+class _FirstValues(TdmsReader):
+    """Reads the metadata of all segments. npTDMS keeps the last value of a property, also for samples before it.
+
+    ``starts`` are the first start times of the channels. ``problems`` (problem, reason) are channels of which a
+    property that decides what the samples are has two values, or that pause between two writes.
+    """
+
+    def __init__(self, file: BinaryIO):
+        super().__init__(file)
+        self.starts: dict[str, np.datetime64] = {}
+        self.problems: dict[str, tuple[str, str]] = {}
+        self._counts: dict[str, int] = {}
+
+    def _update_object_properties(self, segment_object_properties: Mapping[str, Any] | None) -> None:
+        for path, properties in (segment_object_properties or {}).items():
+            first = self.object_metadata[path].properties if path in self.object_metadata else {}
+            n_before = self._counts.get(path, 0)
+            for name, value in properties:
+                if n_before and name.startswith(DECIDING) and first.get(name) and first[name] != value:
+                    problem = (
+                        f"its property {name!r} changes from {first[name]!r} to {value!r} after {n_before} samples"
+                    )
+                    self.problems.setdefault(path, (problem, "scale_unknown"))
+                if name == "wf_start_time" and isinstance(value, TdmsTimestamp):
+                    self._compare_start(path, value.as_datetime64(), n_before, first.get("wf_increment", 0.0))
+        super()._update_object_properties(segment_object_properties)
+        self._counts = {path: metadata.num_values for path, metadata in self.object_metadata.items()}
+
+    def _compare_start(self, path: str, start: np.datetime64, n_before: int, step: Any) -> None:
+        first = self.starts.setdefault(path, start)
+        elapsed = (start - first) / np.timedelta64(1, "s")
+        if n_before and elapsed and isinstance(step, float) and abs(elapsed - n_before * step) > MAX_GAP:
+            problem = (
+                f"a write began {elapsed:.6g} s after the first one, and {n_before} samples of {step:.6g} s lie between"
+            )
+            self.problems.setdefault(path, (problem, "truncated"))
 
 
 def read_raw(source: Source) -> RawFile:
@@ -60,7 +105,12 @@ def read_raw(source: Source) -> RawFile:
         truncation = find_truncation(file, source.size)
         with source.parsed_by("npTDMS", reason="truncated" if truncation else "unreadable"):
             file.seek(0)
+            first_values = _FirstValues(file)
+            first_values.read_metadata()
+            file.seek(0)
             tdms = nptdms.TdmsFile.open(file) if source.lazy else nptdms.TdmsFile.read(file)
+    for channel in (c for group in tdms.groups() for c in group.channels() if c.path in first_values.starts):
+        channel.properties["wf_start_time"] = first_values.starts[channel.path]
     groups = _records_of_groups(tdms.groups(), source)
     names = {channel.name for channels in groups for channel in channels}
     damaged = _damaged_paths(tdms) if truncation else set()
@@ -68,7 +118,10 @@ def read_raw(source: Source) -> RawFile:
         Entry(f"property of the file: {entry.name}", entry.name, entry.value)
         for entry in entries_of({name: _in_utc(value) for name, value in tdms.properties.items()}, "")
     ]
-    records = [_record(g, k, len(groups), names, damaged, tdms, of_file, source) for k, g in enumerate(groups)]
+    records = [
+        _record(g, k, len(groups), names, damaged, first_values.problems, tdms, of_file, source)
+        for k, g in enumerate(groups)
+    ]
     if truncation and not any(isinstance(r, ReadError) for r in records):
         records.append(source.error(f"record {len(records) + 1}", truncation, COPY_AGAIN, reason="truncated"))
     return RawFile(tuple(records), Metadata(tdms.properties, source).count(RECORD_COUNT_NAMES))
@@ -199,6 +252,7 @@ def _complete_record(
     n: int,
     names: set[str],
     damaged: set[str],
+    problems: Mapping[str, tuple[str, str]],
     tdms: nptdms.TdmsFile,
     of_file: Sequence[Entry],
     source: Source,
@@ -216,6 +270,9 @@ def _complete_record(
             problem = f"ends after {len(channel)}{f' of {promised:g}' if promised else ''} samples"
             place = f"{where}, channel {channel.name!r}"
             raise source.error(place, problem, COPY_AGAIN, reason="truncated")
+        if channel.path in problems:
+            problem, reason = problems[channel.path]
+            raise source.error(f"{where}, channel {channel.name!r}", problem, ONE_WRITE_REMEDY, reason)
     _check_steps(channels, where, source)
     samples = [_scaled_numbers(c, where, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)

@@ -461,3 +461,38 @@ def test_the_unit_of_the_x_axis_of_lvm_is_used_and_another_axis_is_no_time(made,
         (tmp_path / "a.lvm").write_text(f"{in_ms.replace(old, new)}X_Value\t" + "\n".join(rows) + "\n")
         (error,) = errors_of(tmp_path / "a.lvm", layout())
         assert words in error
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({}, ""),
+        ({"unit_string": "kN"}, "its property 'unit_string' changes from 'N' to 'kN' after 80 samples"),
+        ({"wf_increment": 1e-4}, "its property 'wf_increment' changes from 5e-05 to 0.0001 after 80 samples"),
+        ({"NI_Scale[0]_Linear_Slope": 2.0}, "'NI_Scale[0]_Linear_Slope' changes from 1.0 to 2.0"),
+        ({"wf_start_time": np.datetime64("2026-05-13T08:00:10")}, "a write began 10 s after the first one"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("is_in_file", [False, True])
+def test_a_channel_of_several_writes_begins_at_the_first_and_states_one_thing(tmp_path, changed, words, is_in_file):
+    """npTDMS returns the last value of a property, also for the samples before it."""
+    scale = {"NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Linear", "NI_Scale[0]_Linear_Slope": 1.0}
+    scale |= {"NI_Scale[0]_Linear_Y_Intercept": 0.0, "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF}
+    samples = np.random.default_rng(2).normal(size=(2, 120))
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        for k in range(3):
+            start = np.datetime64("2026-05-13T08:00:00") + np.timedelta64(2000 * k, "us")
+            facts = {"wf_increment": 1 / RATE, "wf_samples": 40, "wf_start_time": start, **scale}
+            rows = samples[:, 40 * k : 40 * k + 40]
+            force = facts | {"unit_string": "N"} | (changed if k == 2 else {})
+            rail = facts | {"unit_string": "m/s²"}
+            file.write_segment(
+                [nptdms.ChannelObject("g", "force", rows[0], force), nptdms.ChannelObject("g", "rail", rows[1], rail)]
+            )
+    size = {"max_duration": 1e-3, "max_whole_file_size": 0} if is_in_file else {}
+    result = read("a.tdms", tmp_path, layout(kind="passage"), **size)
+    records = [*result.recordings, *result.long_recordings]
+    if words:
+        assert not records and words in str(result.errors[0])
+    else:
+        assert [r.started_at for r in records] == [datetime(2026, 5, 13, 8)] and records[0].n_sample == 120
