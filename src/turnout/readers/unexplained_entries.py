@@ -14,6 +14,7 @@ What may convert whole numbers of a physical unit is reported as well (``whole_n
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import lru_cache
 from typing import Any
 
@@ -37,8 +38,10 @@ from turnout.readers.overload_flags import overload_entries
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import same_unit, with_stated_units
 from turnout.readers.statements import PLAIN_TYPES
+from turnout.readers.time_texts import stated_time
 from turnout.readers.whole_numbers import converting_entries
 from turnout.records import RawDescription
 from turnout.units import IGNORED
@@ -249,7 +252,9 @@ class EntryCheck:
             return []
         if self._key != key:
             self._key, self._seen = key, set()
-        new_entries = [entry for entry in record.entries if not entry.is_defined and self._is_new(entry)]
+        new_entries = [
+            e for e in record.entries if not e.is_defined and self._is_new(e) and not _is_start(e, record.started_at)
+        ]
         if not new_entries:
             self._last = record.entries, key
             return []
@@ -343,6 +348,14 @@ class EntryCheck:
             f"'checked_entries: {names}'"
         )
         return self.source.error(where, problem, remedy, reason=reason)
+
+
+def _is_start(entry: Entry, started_at: datetime | None) -> bool:
+    """Whether an entry is the time that was read as the start of the record."""
+    if started_at is None or not np.isscalar(entry.value) or not is_start_name(entry.name):
+        return False
+    time = stated_time(entry.value, entry.name)[0]
+    return time is not None and time.replace(tzinfo=None) == started_at.replace(tzinfo=None)
 
 
 def _is_plain(entry: Entry) -> bool:

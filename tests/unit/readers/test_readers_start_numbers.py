@@ -264,3 +264,11 @@ def test_a_zone_in_the_name_of_a_time_axis_is_that_of_its_start(tmp_path, form, 
 def test_a_zone_behind_a_time_is_its_zone(tmp_path, stamp):
     (record,) = read_unconverted(text(tmp_path, {"started_at": stamp, "rate": RATE}, {}), tmp_path)[2].records
     assert record.started_at == IN_UTC
+
+
+@pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
+def test_a_number_that_was_read_as_the_start_needs_no_explanation(tmp_path, form):
+    """Days of MATLAB have a fraction, as a scale has."""
+    path = form(tmp_path, {"start_time": DAYS + 719529.0, "rate": RATE}, {})
+    result = read(path, tmp_path, RawDescription(SENSORS, rate=RATE))
+    assert (result.recordings[0].started_at, result.errors) == (START, ())
