@@ -3,7 +3,7 @@
 import gzip
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -21,16 +21,14 @@ from turnout.readers.stated_scales import entry_statements
 from turnout.readers.time_texts import is_unread_uff_time, parse_uff_time
 from turnout.readers.timing import check_simultaneous
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
+from turnout.readers.uff_pairing import DIRECTIONS, PAIRING_REMEDY, ChannelKey, Pairing, channel_name, pair_sets
 from turnout.units import UNITS, conversion
 
-# ID line 1; entity, node and direction of the response; label and unit of the ordinate
-ChannelKey = tuple[str, str, int, int, str, str]
 PROMISED_RECORDS = re.compile(r"record \d+ of (\d+)$")
 TIME_RESPONSE, FREQUENCY_RESPONSE, TIME_AXIS = 1, 4, 17
 # Unit of a specific data type (records 9 and 10) without a label, where dataset 164 states SI.
 SI_OF_TYPE = {8: "m", 9: "N", 11: "m/s", 12: "m/s²", 13: "N", 15: "Pa"}
 QUANTITY_OF_TYPE = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration", 13: "force"}
-DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
 
 @dataclass(frozen=True)
@@ -54,8 +52,8 @@ def read_raw(source: Source) -> RawFile:
 
     The name of a channel is ID line 1. The response entity, the label of the ordinate and the degree of freedom
     ("12 +Z") are accepted as well. The version or sequence number (record 6, field 3) is the number of the record. If
-    it is the same in all sets, the order of the channels defines the records. "record k of n" in ID line 5, as this
-    program writes it, states n records.
+    it is the same in all sets, the times in ID line 3, the nodes of the impacts or a regular order define the records
+    (``pair_sets``). "record k of n" in ID line 5, as this program writes it, states n records.
 
     Parameters
     ----------
@@ -147,38 +145,10 @@ def _records(
     """RawRecord or ReadError per record, in order."""
     nameless = [s for s in sets if not s.labels]
     named = [s for s in sets if s.labels]
-    keys = [_channel_key(s) for s in named]
-    per_key = Counter(keys)
-    channels = list(dict.fromkeys(keys))
-    numbers = [s.sequence for s in named]
-    if len(set(zip(keys, numbers))) == len(named) and len(set(numbers)) > 1:
-        span = range(min(numbers), max(numbers) + 1)
-        is_dense = len(span) <= len(set(numbers)) + len(nameless)  # else the logger's own numbering has gaps
-        groups: dict[int, dict] = {n: {} for n in (span if is_dense else sorted(set(numbers)))}
-        for key, number, dataset in zip(keys, numbers, named):
-            groups[number][key] = dataset
-        ordered = list(groups.values())
-    elif nameless and len(named) > len(channels) and nameless[0].offset < named[-1].offset:
-        problem = (
-            "a set without readable header stands between others, and no sequence numbers say which belong together"
-        )
-        raise source.error(f"byte {nameless[0].offset}", f"{nameless[0].damage}; {problem}")
-    else:
-        interleaved = all(key == channels[i % len(channels)] for i, key in enumerate(keys))
-        if (
-            not interleaved
-            and len(set(per_key.values())) > 1
-            and sum(keys[i] != keys[i - 1] for i in range(1, len(keys))) > len(channels)
-        ):
-            raise source.error("the sets", "channels come in no regular order and carry no sequence numbers")
-        n_taken: Counter[tuple] = Counter()
-        ordered = [{} for _ in range(max(per_key.values(), default=0))]
-        for key, dataset in zip(keys, named):
-            ordered[n_taken[key]][key] = dataset
-            n_taken[key] += 1
-    n = len(ordered)
-    for k, group in enumerate(ordered):
-        yield _record(group, channels, k, n, stated_units, source)
+    pairing = pair_sets(named, nameless, source)
+    n = len(pairing.groups)
+    for k in range(n):
+        yield _record(pairing, k, stated_units, source)
     last = max((s.offset for s in named), default=-1)
     trailing = [s for s in nameless if not s.dataset_type and s.offset > last]
     for dataset in nameless:
@@ -194,32 +164,20 @@ TRAILING_REMEDY = (
 )
 
 
-def _channel_key(dataset: UffDataset) -> ChannelKey:
-    """Key of a set's channel: all its names."""
-    return (
-        dataset.ids[0] if dataset.ids[0] not in ("", "NONE") else "",
-        *dataset.response,
-        dataset.labels[1][1],
-        dataset.labels[1][2],
-    )
-
-
-def _record(
-    group: Mapping[ChannelKey, UffDataset],
-    channels: Sequence[ChannelKey],
-    k: int,
-    n: int,
-    stated_units: FileUnits | None,
-    source: Source,
-) -> RawRecord | ReadError:
+def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: Source) -> RawRecord | ReadError:
     """One record from the sets of its channels, or its error."""
+    group, channels, n = pairing.groups[k], pairing.channels, len(pairing.groups)
+    if problem := pairing.problems.get(k):
+        return source.error(f"record {k + 1} of {n}", problem, PAIRING_REMEDY)
     for key in channels:
         dataset = group.get(key)
         if dataset is None:
-            problem = f"channel {_channel_name(key)!r} is missing from this record"
+            problem = f"channel {channel_name(key)!r} is missing from this record"
+            if label := pairing.labels.get(k):
+                problem += f", which {channel_name(next(iter(group)))!r} gives {label}"
             return source.error(f"record {k + 1} of {n}", problem, COPY_AGAIN, reason="truncated")
         if dataset.damage:
-            place = f"record {k + 1} of {n}, channel {_channel_name(key)!r}, byte {dataset.offset}"
+            place = f"record {k + 1} of {n}, channel {channel_name(key)!r}, byte {dataset.offset}"
             return source.error(place, dataset.damage, COPY_AGAIN, reason="truncated")
     sets = [group[key] for key in channels]
     first = sets[0]
@@ -251,20 +209,12 @@ def _axis(dataset: UffDataset) -> tuple[float, float]:
     return float(dataset.x[0]), float(dataset.x[-1] - dataset.x[0]) / (len(dataset.x) - 1)
 
 
-def _channel_name(key: ChannelKey) -> str:
-    """The name of a channel: ID line 1, or the first of its other names that is not empty."""
-    return next(
-        (name for name in (key[0], key[1], key[4]) if name and name != "NONE"),
-        f"{key[2]} {DIRECTIONS.get(key[3], key[3])}",
-    )
-
-
 def _distinct_names(channels: Sequence[ChannelKey]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
     """(names, aliases): the names are of the first type that differs for all channels."""
     dofs = [_dof_name(("", *key[2:4])) for key in channels]
     name_lists = [[key[0] for key in channels], [key[1] for key in channels], [key[4] for key in channels], dofs]
     distinct_lists = [names for names in name_lists if len(set(names)) == len(names) and not {"", "NONE"} & set(names)]
-    names = distinct_lists[0] if distinct_lists else [_channel_name(key) for key in channels]
+    names = distinct_lists[0] if distinct_lists else [channel_name(key) for key in channels]
     aliases = tuple(tuple(a for a in (key[0], key[1], key[4], dof) if a) for key, dof in zip(channels, dofs))
     return tuple(names), aliases
 

@@ -207,11 +207,108 @@ def test_a_lost_header_between_unnumbered_sets_forbids_pairing(hammer_test, in_s
     data = path.read_bytes()
     for k in range(4):
         data = data.replace(f"    1         0{k + 1:5d}".encode(), b"    1         0    0")
+    data = re.sub(rb"\d\d-\w\w\w-\d\d \d\d:\d\d:\d\d", b"NONE              ", data)
     assert len(_read_bytes(path, data, in_si).recordings) == 4
     third = data.find(b"    -1\n    58", data.find(b"    -1\n    58", data.find(b"    -1\n    58") + 7) + 7)
     broken = data[: third + 11] + b"??" + data[third + 13 :]
-    with pytest.raises(ReadError, match="no sequence numbers say which belong together"):
+    with pytest.raises(ReadError, match="no numbers or times say which belong together"):
         _read_bytes(path, broken, in_si)
+
+
+def _sets_without_numbers(hammer_test, tmp_path, line_3=None):
+    """Text of each set F1 R1 F2 R2 ... without sequence numbers, with other texts in ID line 3 if they are given."""
+    text = write(hammer_test, tmp_path / "a.uff", "uff58").read_text(encoding="utf-8")
+    sets = ["    -1\n    58" + part for part in text.split("    -1\n    58")[1:]]
+    sets = [re.sub(r"^(    1         0) {4}\d", r"\1    0", part, flags=re.MULTILINE) for part in sets]
+    if line_3 is not None:
+        lines = [part.split("\n") for part in sets]
+        sets = ["\n".join([*one[:4], stamp, *one[5:]]) for one, stamp in zip(lines, line_3, strict=True)]
+    return sets
+
+
+STAMPS = [f"13-May-24 10:0{k // 2}:0{k % 2}" for k in range(8)]  # of both sets of an impact but for rounding
+SAME = ["13-May-24 10:00:00"] * 8
+CHANNEL_AFTER_CHANNEL = (0, 2, 4, 6, 1, 3, 5, 7)
+MOVED_AND_LOST = {
+    "shuffled": (5, 0, 3, 6, 1, 7, 2, 4),
+    "swapped in a record": (0, 1, 3, 2, 4, 5, 6, 7),
+    "one lost": (0, 2, 3, 4, 5, 6, 7),
+    "two lost, in turn": (0, 3, 4, 7),
+    "two lost, shifted": (0, 3, 2, 5, 4, 7),
+    "channel after channel, two lost": (0, 2, 6, 1, 5, 7),
+    "channel after channel, one lost": (2, 4, 6, 1, 3, 5, 7),
+}
+
+
+def _impacts(result, hammer_test):
+    """Number of the impact of each recording, each with force and response of one impact."""
+    impacts = []
+    for recording in result.recordings:
+        same = [
+            [np.allclose(recording.samples[i], h.samples[i], rtol=1e-5, atol=1e-9) for h in hammer_test]
+            for i in range(2)
+        ]
+        assert same[0] == same[1] and sum(same[0]) == 1
+        impacts.append(same[0].index(True))
+    return impacts
+
+
+@pytest.mark.parametrize("order", MOVED_AND_LOST.values(), ids=MOVED_AND_LOST)
+def test_sets_without_numbers_are_paired_by_their_times(order, hammer_test, in_si, tmp_path):
+    sets = _sets_without_numbers(hammer_test, tmp_path, STAMPS)
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in order).encode(), in_si)
+    assert _impacts(result, hammer_test) == [k for k in range(4) if {2 * k, 2 * k + 1} <= set(order)]
+    assert all("is missing from this record" in e.problem for e in result.errors if e.where.startswith("record"))
+
+
+@pytest.mark.parametrize("line_3", [SAME, ["NONE"] * 8])
+@pytest.mark.parametrize("name", ["shuffled", "swapped in a record", "one lost", "channel after channel, one lost"])
+def test_sets_in_no_regular_order_without_times_are_no_records(name, line_3, hammer_test, in_si, tmp_path):
+    sets = _sets_without_numbers(hammer_test, tmp_path, line_3)
+    with pytest.raises(ReadError, match="come in no regular order, and neither numbers, times nor nodes") as caught:
+        _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in MOVED_AND_LOST[name]).encode(), in_si)
+    assert "field 3 of record 6" in caught.value.remedy
+
+
+@pytest.mark.parametrize("order", [range(8), CHANNEL_AFTER_CHANNEL])
+@pytest.mark.parametrize("line_3", [SAME, STAMPS, ["NONE"] * 8, [*STAMPS[:4], *["NONE"] * 4]])
+def test_sets_in_regular_order_need_no_times(line_3, order, hammer_test, in_si, tmp_path):
+    sets = _sets_without_numbers(hammer_test, tmp_path, line_3)
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in order).encode(), in_si)
+    assert _impacts(result, hammer_test) == [0, 1, 2, 3]
+
+
+def test_a_contradiction_forbids_the_order_for_records_that_no_time_confirms(hammer_test, in_si, tmp_path):
+    """Impacts 1 and 2 have no times, the rail of 3 and the force of 4 are lost: 3 and 4 would be one record."""
+    sets = _sets_without_numbers(hammer_test, tmp_path, [*["NONE"] * 4, *STAMPS[4:]])
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 1, 2, 3, 4, 7)).encode(), in_si)
+    assert result.recordings == ()
+    problems = [e.problem for e in result.errors if e.where.startswith("record ")]
+    contradiction = "states 2024-05-13 10:02:00 in ID line 3, channel 'rail' 2024-05-13 10:03:01 in ID line 3"
+    unsettled = "record 3 shows that sets are lost or moved, and nothing confirms those of this record"
+    assert problems[:2] == [unsettled] * 2 and contradiction in problems[2]
+    sets = _sets_without_numbers(hammer_test, tmp_path, [*STAMPS[:2], *["NONE"] * 2, *STAMPS[4:]])
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 1, 2, 3, 4, 7)).encode(), in_si)
+    assert _impacts(result, hammer_test) == [0]
+
+
+def _at_nodes(sets, nodes):
+    """Sets whose references are at these nodes."""
+    lines = [one.split("\n") for one in sets]
+    return [
+        "\n".join([*one[:7], f"{one[7][:66]}{node:10d}{one[7][76:]}", *one[8:]])
+        for one, node in zip(lines, nodes, strict=True)
+    ]
+
+
+def test_nodes_of_the_impacts_pair_sets_without_times(hammer_test, in_si, tmp_path):
+    sets = _at_nodes(_sets_without_numbers(hammer_test, tmp_path, SAME), [11, 11, 12, 12, 13, 13, 14, 14])
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 3, 4, 1, 6, 7)).encode(), in_si)
+    assert sorted(_impacts(result, hammer_test)) == [0, 3]
+    sets = _at_nodes(_sets_without_numbers(hammer_test, tmp_path, SAME), [11, 11, 11, 11, 13, 13, 13, 13])
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 1, 2, 7, 4, 3, 6, 5)).encode(), in_si)
+    assert result.recordings == ()
+    assert "channel 'force' states an impact at node 11, channel 'rail' an impact at node 13" in str(result.errors[1])
 
 
 def _read_bytes(path, data, description):
