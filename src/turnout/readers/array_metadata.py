@@ -11,7 +11,6 @@ from turnout.readers.entries import Entry, UnreadObject, entries_of
 from turnout.readers.lazy import ARRAYS
 from turnout.readers.metadata_names import (
     ATTRIBUTES_MARK,
-    CONDITION_NAMES,
     UNIT_NAMES,
 )
 from turnout.readers.sample_variables import (
@@ -21,6 +20,7 @@ from turnout.readers.sample_variables import (
     matrices,
     plain_name,
     size_of_longest,
+    underscored_name,
     vectors,
 )
 from turnout.readers.scale_words import is_scale_name
@@ -50,6 +50,7 @@ class Metadata:
 
     def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None, place: str = ""):
         self.lower = {plain_name(k): v for k, v in variables.items()}
+        self.underscored = {underscored_name(k): v for k, v in reversed(self.lower.items())} | self.lower
         self.variables, self.parent, self.source, self.place = variables, parent, source, place
 
     @cached_property
@@ -81,7 +82,7 @@ class Metadata:
             If the variable is damaged.
         """
         for name in names:
-            if (value := self.lower.get(name)) is not None:
+            if (value := self.underscored.get(name)) is not None:
                 if isinstance(value, ReadError):
                     raise value
                 return value
@@ -129,9 +130,10 @@ class Metadata:
         str
             "start_time [s since 1904-01-01]"; "" without such a variable.
         """
-        for name in (n for n in names if self.lower.get(n) is not None):
-            attributes = {k.lower(): v for k, v in dict(self.lower.get(name + ATTRIBUTES_MARK) or {}).items()}
-            beside = [self.lower.get(f"{name}_{word}") for word in UNIT_NAMES[:2]]
+        for name in (n for n in names if self.underscored.get(n) is not None):
+            of_name = self.underscored.get(underscored_name(name + ATTRIBUTES_MARK))
+            attributes = {k.lower(): v for k, v in dict(of_name or {}).items()}
+            beside = [self.underscored.get(f"{name}_{word}") for word in UNIT_NAMES[:2]]
             unit = next((v for v in (*map(attributes.get, UNIT_NAMES), *beside) if isinstance(v, str)), "")
             return f"{name} [{unit}]" if unit.strip() else name
         return self.parent.label_of(names) if self.parent else ""
@@ -244,13 +246,7 @@ class Metadata:
         dict of str to any
             Name -> value of the conditions that are stored with the samples of record ``k``.
         """
-        present: set[str] = set()
-        level: Metadata | None = self
-        while level:
-            present |= CONDITION_NAMES.keys() & level.lower.keys()
-            level = level.parent
-        names = sorted({CONDITION_NAMES[name] for name in present}, key=CONDITIONS.index)
-        values = {name: single_value(self.get((name, name.replace("_", " "))), k, n) for name in names}
+        values = {name: single_value(self.get((name,)), k, n) for name in CONDITIONS}
         return {name: value for name, value in values.items() if value is not None}
 
 

@@ -36,7 +36,7 @@ from turnout.readers.csv_rows import columns_in_memory, lazy_columns
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
-from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
+from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
@@ -185,19 +185,12 @@ def _records(
                 f"record {k + 1} of {n}", problem, remedy, reason="truncated" if is_cut_off else "wrong_length"
             )
             continue
-        date, start = (
-            facts.record_value(START_DATE_NAMES, k, n),
-            facts.record_value((f"started_at_{k}", *START_NAMES), k, n),
-        )
+        start = facts.record_value((f"started_at_{k}", *START_NAMES), k, n)
         yield RawRecord(
             names=tuple(names[i] for i in selected),
             samples=[columns[i] if isinstance(columns[i], LazyColumn) else columns[i][a:b] for i in selected],
             units=tuple(units[i] for i in selected),
-            **start_fields(
-                date if start is None else start,
-                f"{date} {start}" if date and start else None,
-                declared=facts.label_of(START_NAMES),
-            ),
+            **start_fields(start, declared=facts.label_of(START_NAMES)),
             axis_starts=(first,) if k == 0 else (),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],

@@ -1,6 +1,4 @@
-"""Names of metadata that loggers use in European languages: in lower case, without accents, with "_" for blanks."""
-
-from turnout.readers.source import CONDITIONS
+"""Names of metadata that loggers use in European languages: in lower case, without accents, with "_" between words."""
 
 START_NAMES = (
     "started_at", "start_time", "starttime", "wf_start_time", "startzeit", "startzeitpunkt", "messbeginn", "messstart",
@@ -23,4 +21,3 @@ CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
 UNIT_NAMES = ("units", "unit", "channel_units")
 ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 RECORD_COUNT_NAMES = ("n_records", "n_record")
-CONDITION_NAMES = {spelling: name for name in CONDITIONS for spelling in (name, name.replace("_", " "))}

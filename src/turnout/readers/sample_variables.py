@@ -1,5 +1,6 @@
 """Which variables of a file hold samples, and which are metadata."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -32,6 +33,26 @@ def plain_name(name: str) -> str:
     str
     """
     return name if name == "T" else name.lower()
+
+
+def underscored_name(name: str) -> str:
+    """A name with "_" for blanks and hyphens, as ``metadata_names`` lists names.
+
+    Parameters
+    ----------
+    name : str
+        Name of a variable.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> underscored_name("start time"), underscored_name("start-time")
+    ('start_time', 'start_time')
+    """
+    return re.sub(r"[ -]+", "_", name.strip())
 
 
 class Attributes(dict):
@@ -166,7 +187,8 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.size > 1 and (v.dtype.kind in "fiu" or is_flag_series(v))
-        if plain_name(name) not in reserved_names and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
+        if underscored_name(plain_name(name)) not in reserved_names
+        and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
     }
     longest = max((v.size for v in candidates.values()), default=0)
     return {name: v for name, v in candidates.items() if 2 * v.size > longest}

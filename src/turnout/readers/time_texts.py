@@ -75,6 +75,33 @@ def is_date(text: str) -> bool:
     return bool(DATE_ALONE.fullmatch(text.strip()))
 
 
+def is_day(text: str) -> bool:
+    """Whether a text is a date without a time of day, in any notation.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry.
+
+    Returns
+    -------
+    bool
+        Also with the month as a word.
+
+    Examples
+    --------
+    >>> [is_day(text) for text in ("2024-05-13", "13 May 2024", "13.5.24", "13 May 2024 10:00", "12:30", "May")]
+    [True, True, True, False, False, False]
+    """
+    text = text.strip()
+    is_worded = len(text) <= MAX_WORDED_DATE and re.search(r"\b\d{4}\b", text) and _month_of(text)
+    return is_date(text) or bool(SHORT_DATE.fullmatch(text)) or bool(is_worded and ":" not in text)
+
+
+SHORT_DATE = re.compile(r"\d{1,2}[-./]\d{1,2}[-./]\d{2}|\d{1,2}-[A-Za-z]{3}-\d{2}")
+MAX_WORDED_DATE = 40  # characters
+
+
 def _month_of(text: str) -> int:
     """Number of the only month that a text names, 0 for none or several."""
     letters = unicodedata.normalize("NFKD", text.casefold())

@@ -1,0 +1,127 @@
+"""Start times of records from their entries: in one of them, or with day and time of day in two, "Date" and "Time"."""
+
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import datetime
+
+from turnout.errors import ReadError
+from turnout.readers.entries import Entry
+from turnout.readers.metadata_names import START_DATE_NAMES
+from turnout.readers.rate_units import words_of
+from turnout.readers.source import RawRecord
+from turnout.readers.start_columns import start_in_cells
+from turnout.readers.stated_starts import (
+    DATE_WORD,
+    MAX_UNREAD,
+    OTHER,
+    START,
+    TIME_WORD,
+    is_start_name,
+    with_stated_start,
+)
+from turnout.readers.stated_zones import zone_in_name, zone_of
+from turnout.readers.time_texts import is_day, parse_time
+
+CLOCK_ALONE = re.compile(
+    r"(\d{1,2}:\d{2})(:\d{2}(?:[.,]\d{1,12})?)?((?: ?[AaPp]\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?)"
+)
+BARE_WORDS = frozenset(("date", "dato", "datum", "fecha", "time", "zeit"))
+
+
+def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRecord | ReadError, ...]:
+    """The records with the starts that their metadata state, if no format defines one.
+
+    An entry that all records have is about the file: one of the record itself counts more. If the format gives one of
+    the records a start, those without stay so, because a start of the file would precede it.
+
+    Parameters
+    ----------
+    records : sequence of RawRecord or ReadError
+        The records as their reader returns them.
+
+    Returns
+    -------
+    tuple of (RawRecord or ReadError)
+        The same number of records.
+    """
+    intact = [r for r in records if isinstance(r, RawRecord)]
+    if len(intact) > 1 and any(r.started_at for r in intact):
+        return tuple(records)
+    counts = Counter(key for r in intact for key in {_key(e) for e in r.entries if _may_state_start(e.name)})
+    return tuple(
+        _with_start(r, _entries_of_start(r, counts, len(intact))) if isinstance(r, RawRecord) else r for r in records
+    )
+
+
+def _key(entry: Entry) -> tuple[str, str, str]:
+    return entry.place, entry.name, str(entry.value)
+
+
+def _may_state_start(name: str) -> bool:
+    """Whether a name may mean the start of a recording, or its day or time of day."""
+    words = words_of(name)
+    is_part = any(DATE_WORD.search(word) or TIME_WORD.search(word) for word in words)
+    return is_start_name(name) or (is_part and not any(OTHER.search(word) for word in words))
+
+
+def _entries_of_start(record: RawRecord, counts: Counter, n: int) -> tuple[Entry, ...]:
+    """Entries that may state the start: those of the record alone if they do, else those of the file."""
+    entries = tuple(e for e in record.entries if _may_state_start(e.name))
+    of_record = tuple(e for e in entries if counts[_key(e)] < n)
+    stated = _with_start(replace(record, started_at=None, unread_start=""), of_record)
+    return of_record if stated.started_at or stated.unread_start else entries
+
+
+def _with_start(record: RawRecord, entries: tuple[Entry, ...]) -> RawRecord:
+    """The record with the start that these entries state."""
+    is_part = is_day(record.unread_start) or CLOCK_ALONE.fullmatch(record.unread_start)
+    if record.unread_start and not is_part:
+        return record
+    whole = with_stated_start(replace(record, unread_start="", entries=entries))
+    if not (whole.started_at or whole.unread_start):
+        whole = _with_joined_start(whole)
+    unread_start = whole.unread_start if whole.started_at or whole.unread_start else record.unread_start
+    return replace(whole, entries=record.entries, unread_start=unread_start)
+
+
+def _with_joined_start(record: RawRecord) -> RawRecord:
+    """The record with the start of two entries, one of the day and one of the time of day."""
+    days = _texts(record.entries, is_day)
+    clocks = _texts(record.entries, lambda text: bool(CLOCK_ALONE.fullmatch(text)))
+    if not clocks:
+        stated = [day for day, name in days.items() if "_".join(words_of(name)) in START_DATE_NAMES]
+        return replace(record, unread_start=stated[0]) if stated else record
+    if not days:
+        return record
+    if len(days) > 1 or len(clocks) > 1:
+        return replace(record, unread_start=" or ".join((*days, *clocks))[:MAX_UNREAD])
+    (day, _), (clock, name) = *days.items(), *clocks.items()
+    start, text = _start_of_pair(day, clock)
+    if start and start.tzinfo is None and (zone := zone_in_name(name)):
+        known = zone_of(zone)
+        return replace(record, started_at=start.replace(tzinfo=known), unread_zone="" if known else zone)
+    return replace(record, started_at=start, unread_start="" if start else text)
+
+
+def _texts(entries: Sequence[Entry], is_wanted: Callable[[str], bool]) -> dict[str, str]:
+    """Text -> name of the entries whose text is wanted; those of a start count more than a bare "Date"."""
+    wanted = [(text, e.name) for e in entries if is_wanted(text := str(e.value).strip())]
+    explicit = [(text, name) for text, name in wanted if _is_explicit(name)]
+    return dict(explicit or wanted)
+
+
+def _is_explicit(name: str) -> bool:
+    return any(START.search(word) and word not in BARE_WORDS for word in words_of(name))
+
+
+def _start_of_pair(day: str, clock: str) -> tuple[datetime | None, str]:
+    """Start of a day and a time of day, or the text of one that cannot be read."""
+    match = CLOCK_ALONE.fullmatch(clock)
+    with_seconds = clock if match is None or match[2] else f"{match[1]}:00{match[3]}"
+    start = parse_time(f"{day} {with_seconds}")
+    if start:
+        return start, ""
+    start, text = start_in_cells([day, with_seconds], ["day", "clock"])
+    return start, text or f"{day} {clock}"
