@@ -25,14 +25,17 @@ PASSAGE_CHANNEL = {
     "section": Key("text", "section it watches", required=True, pattern=LABEL),
 }
 # Minimum rates: below them a recording shows no mode of the track. They also catch a rate written in kHz.
-HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, nullable=True)
-PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, nullable=True)
+# Maximum rates: no converter for these sensors is faster. They catch a rate in mHz or with a digit too many.
+MAX_RATE = 10_000_000
+MAX_COUNT = 10**12  # records, or samples of a record: above it a typing error
+HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, maximum=MAX_RATE, nullable=True)
+PASSAGE_RATE = Key("number", "samples per second", unit="Hz", minimum=100, maximum=MAX_RATE, nullable=True)
 FILES = {
     "files": Key("text", "pattern of the file names below the turnout's raw folder", required=True),
     "format": Key("text", "reader, one of `turnout check --formats`; auto: by the file itself"),
     "rate": HAMMER_RATE,
-    "records": Key("integer", "records in one file; null: any number", minimum=1, nullable=True),
-    "samples": Key("integer", "samples per record; null: any number", minimum=1, nullable=True),
+    "records": Key("integer", "records in one file; null: any number", minimum=1, maximum=MAX_COUNT, nullable=True),
+    "samples": Key("integer", "samples per record; null: any number", minimum=1, maximum=MAX_COUNT, nullable=True),
     "time_zone": Key("text", "time zone of the file's time stamps, an IANA name"),
     "checked_entries": Key("text", "entries of the files that state neither rate, scale nor unit; separated by ;"),
 }

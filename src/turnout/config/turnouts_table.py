@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -25,9 +25,9 @@ ROW = {
     "lon_deg": Key("number", "longitude, WGS 84", unit="°", minimum=-180, maximum=180),
     "external_id": Key("text", "the owner's id"),
     "id_scheme": Key("text", "scheme of external_id: railML, RINF, the owner's own"),
-    "hammer_rate_hz": Key("number", "samples per second of its hammer tests", unit="Hz", minimum=HAMMER_RATE.minimum),
+    "hammer_rate_hz": replace(HAMMER_RATE, meaning="samples per second of its hammer tests", nullable=False),
     "hammer_format": Key("text", "reader of its hammer tests"),
-    "passage_rate_hz": Key("number", "samples per second of its passages", unit="Hz", minimum=PASSAGE_RATE.minimum),
+    "passage_rate_hz": replace(PASSAGE_RATE, meaning="samples per second of its passages", nullable=False),
     "passage_format": Key("text", "reader of its passages"),
     "pad_type": Key("text", "railpad of all its sections"),
     "sleeper_type": Key("text", "sleeper of all its sections"),

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from turnout.readers.metadata_names import TIME_NAMES
+from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.units import conversion
 
@@ -13,9 +14,10 @@ SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us"
 
 
 def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
-    """Number of the time column: by its name, else by its unit.
+    """Number of the time column: by its name and unit, else by one of them.
 
-    No sensor measures in seconds, so a unit of time identifies the column in any language.
+    No sensor measures in seconds, so a unit of time identifies the column in any language. A column in the unit of
+    another quantity is no time under any name, and "T" without a unit only if nothing else is.
 
     Parameters
     ----------
@@ -33,12 +35,25 @@ def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
     --------
     >>> time_column(["Kraft", "Zeit"], ["N", "s"]), time_column(["idő", "erő"], ["ms", "N"])
     (1, 0)
-    >>> time_column(["force", "rail"], ["N", ""])
+    >>> time_column(["T", "t", "force"], ["°C", "s", "N"]), time_column(["T", "force"], ["°C", "N"])
+    (1, None)
     """
-    for i, name in enumerate(names):
-        if name.strip().lower() in TIME_WORDS:
-            return i
-    return next((i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT), None)
+    by_unit = [i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT]
+    is_named = [name.strip().lower() in TIME_WORDS for name in names]
+    by_name = [i for i, unit in enumerate(units) if is_named[i] and not _is_of_other_quantity(names[i], unit)]
+    sure = [i for i in by_name if names[i].strip() != "T"]
+    return next(iter([*(i for i in by_unit if is_named[i]), *sure, *by_unit, *by_name]), None)
+
+
+def _is_of_other_quantity(name: str, unit: str) -> bool:
+    """Whether a column has a unit of another quantity than time; under the name "T" any that is none of time."""
+    time_unit = rate_unit(unit)
+    if unit.strip().casefold() in MEANINGLESS_UNITS or (time_unit is not None and time_unit.is_step):
+        return False
+    try:
+        return bool(conversion(unit))
+    except ValueError:
+        return name.strip() == "T"
 
 
 def seconds_per_number(unit: str, source: Source) -> float:

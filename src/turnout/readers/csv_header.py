@@ -99,7 +99,8 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         raise source.error(f"byte {is_binary.start()}", f"{is_binary[0][0]:#04x} is no text", NO_TEXT_REMEDY)
     if len(text_lines) < 2:
         raise source.error("line 1", "no line of numbers follows", COPY_AGAIN, reason="empty")
-    raise source.error("the file", *_no_numbers(text_lines[-1]))
+    where, problem, remedy = _no_numbers(head_lines, text_lines[-1])
+    raise source.error(where, problem, remedy)
 
 
 def _complete_head(
@@ -209,13 +210,26 @@ def _check_row_above(
 CLOCK_TIME = re.compile(r"(?<!\d)\d{1,2}:\d{2}:\d{2}(?!\d)")
 
 
-def _no_numbers(line: str) -> tuple[str, str]:
-    """Problem and remedy of a text whose last ``line`` is no line of numbers."""
+def _no_numbers(lines: Sequence[str], last: str) -> tuple[str, str, str]:
+    """Place, problem and remedy of a text without a row of numbers; ``last`` is its last line that is no note."""
+    if CLOCK_TIME.search(last):
+        problem = f"no line of numbers; the last line reads {last[:60]!r}, with the time of a clock"
+        return "the file", problem, "Export the time in seconds from the start of the record"
+    separator = next((s for s in SEPARATORS if s in last), ",")
+    cells = cells_of(last, separator)
+    words = [i for i, cell in enumerate(cells) if cell and not is_row([cell, "0"])]
+    if len(words) < len(cells) and words:
+        i = words[0]
+        same = [names for line in lines if len(names := cells_of(line, separator)) == len(cells)]
+        name = next((names[i] for names in same if not any(map(is_number, names))), "") or str(i + 1)
+        problem = f"{cells[i][:60]!r} is no number, and no row holds only numbers, dates and times"
+        place = f"line {max(k for k, line in enumerate(lines, 1) if line == last)}, column {name!r}"
+        return place, problem, WORDS_REMEDY
     remedy = "Export numbers as '-12.5' between semicolons, tabs, commas or blanks, the time in seconds"
-    problem = f"no line of numbers; the last line reads {line[:60]!r}"
-    if CLOCK_TIME.search(line):
-        return f"{problem}, with the time of a clock", "Export the time in seconds from the start of the record"
-    return problem, remedy
+    return "the file", f"no line of numbers; the last line reads {last[:60]!r}", remedy
+
+
+WORDS_REMEDY = "Export this column as numbers, states such as TRUE and FALSE as 1 and 0, or leave it out"
 
 
 def _states_scale(name: str, value: str) -> bool:

@@ -70,19 +70,31 @@ WRONG = {
     "number that is none": (row("t3\tmain\t\t12,4"), "line 4, column 10: km is '12,4'. Write a number from 0 to"),
     "rate of zero": (
         row("t3\tmain\t\t\t0"),
-        "line 4, column 11: hammer_rate_hz is 0.0. Write a number of at least 250",
+        "line 4, column 11: hammer_rate_hz is 0.0. Write a number from 250",
     ),
     "rate of the table in kHz": (
         row("t3\tmain\t\t\t51.2"),
-        "hammer_rate_hz is 51.2. Write a number of at least 250 Hz",
+        "hammer_rate_hz is 51.2. Write a number from 250 to 1e+07 Hz",
+    ),
+    "rate of the table with digits too many": (
+        row("t3\tmain\t\t\t51200000"),
+        "hammer_rate_hz is 51200000.0. Write a number from 250 to 1e+07 Hz",
+    ),
+    "rate with digits too many": (
+        layout("rate: 20000", "rate: 20000000"),
+        "line 9, column 9: rate is 20000000. Write a number from 250 to 1e+07 Hz",
+    ),
+    "samples beyond any file": (
+        layout("rate: 20000", "rate: 20000\n  samples: 10000000000000"),
+        "samples is 10000000000000. Write a whole number from 1 to 1e+12",
     ),
     "rate in kHz": (
         layout("rate: 20000", "rate: 12.8"),
-        "line 9, column 9: rate is 12.8. Write a number of at least 250 Hz",
+        "line 9, column 9: rate is 12.8. Write a number from 250 to 1e+07 Hz",
     ),
     "rate of passages in kHz": (
         layout('  files: "passages/', '  rate: 51.2\n  files: "passages/'),
-        "line 16, column 9: rate is 51.2. Write a number of at least 100 Hz",
+        "line 16, column 9: rate is 51.2. Write a number from 100 to 1e+07 Hz",
     ),
     "limit in kN": (
         layout("source: force, ", "source: force, limit: 22, "),
@@ -397,8 +409,8 @@ def test_a_wrong_campaign_is_said_with_column_value_and_what_to_write(tmp_path, 
             "position is 24600. Write a number from -10000 to 10000 m (24600 mm are 24.6 m)",
         ),
         ("position: 24.6", "position: 24,6", "unknown key '6'. If it belongs to the number before it, write a point"),
-        ("rate: 20000", "rate: 25.6", "rate is 25.6. Write a number of at least 250 Hz (25.6 kHz are 25600 Hz)"),
-        ("rate: 20000", "rate: -5", "rate is -5. Write a number of at least 250 Hz."),
+        ("rate: 20000", "rate: 25.6", "rate is 25.6. Write a number from 250 to 1e+07 Hz (25.6 kHz are 25600 Hz)"),
+        ("rate: 20000", "rate: -5", "rate is -5. Write a number from 250 to 1e+07 Hz."),
     ],
 )
 def test_a_number_in_another_unit_is_recognised(tmp_path, written, instead, words):

@@ -478,3 +478,29 @@ def test_names_without_cells_are_an_error_and_a_comment_is_none(tmp_path):
         read("a.csv", tmp_path, description)
     (tmp_path / "a.csv").write_text(f"nr;{names[0]};{names[1]};Comment\n{rows}")
     assert read("a.csv", tmp_path, description).recordings[0].n_sample == 40
+
+
+TEMPERATURES = ["T [°C]", "t (K)", "T [Nm]", "Time [kN]"]
+
+
+@pytest.mark.parametrize("name", TEMPERATURES)
+@pytest.mark.parametrize("time", ["t [s]", "Zeit [s]", "time", "idő [s]"])
+def test_a_column_in_another_unit_than_of_time_is_no_time_axis(name, time, tmp_path):
+    rows = "".join(f"21.5;{k / 20000:.8g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text(f"{name};{time};force;acc\n{rows}", encoding="utf-8")
+    ignored = RawChannel("t", name.split(" ")[0], "ignored")
+    description = replace(NAMED, channels=(*NAMED.channels, ignored))
+    result = read("a.csv", tmp_path, description)
+    assert result.errors == () and result.recordings[0].rate == 20000.0
+
+
+@pytest.mark.parametrize("word", ["TRUE", "FALSE", "on", "overload"])
+@pytest.mark.parametrize("separator", [";", ",", "\t"])
+def test_a_column_of_words_is_named(separator, word, tmp_path):
+    rows = [separator.join((f"{a:.4f}", f"{b:.4f}", word)) for a, b in X]
+    lines = ["rate: 20000", separator.join(("force", "acc", "valid")), *rows]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(ReadError) as caught:
+        read("a.csv", tmp_path, NAMED)
+    expected = f"a.csv, line 52, column 'valid': {word!r} is no number, and no row holds only numbers, dates and times"
+    assert str(caught.value).startswith(expected) and "states such as TRUE and FALSE as 1 and 0" in caught.value.remedy
