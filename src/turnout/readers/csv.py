@@ -65,19 +65,23 @@ def read_raw(source: Source) -> RawFile:
     encoding = wide_encoding(source.head)
     lazy = source.lazy and not encoding
     data = source.memory_map if lazy else _in_utf8(source, encoding) if encoding else source.data
+    end = len(data) - (data[-1:] == END_OF_FILE)
+    if data.find(b"\n") < 0:
+        data, lazy = data[:end].replace(b"\r", b"\n"), False
+    end, remarks = _end_of_rows(data, end, source)
     if isinstance(data, bytes):
-        data = data.removesuffix(END_OF_FILE)
-    if isinstance(data, bytes) and b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
-    data, remarks = _without_cut_row(data, source)
+        data = data[:end]
     head, names, units, offset, separator, entries = read_head(data, source)
     if separator == BLANK:
+        data = data[:end]
         data = data[:offset] + _with_single_blanks(data[offset:])
     is_in_memory = separator == BLANK or "record" in [name.strip().lower() for name in names]
     is_in_memory = is_in_memory or any(map(is_clock_or_date, first_cells(data, offset, separator)))
-    read_columns = lazy_columns if lazy and not is_in_memory else columns_in_memory
     time = time_column(names, units)
-    columns, footer = read_columns(source, data, offset, separator, names, time)
+    if lazy and not is_in_memory:
+        columns, footer = lazy_columns(source, data, offset, end, separator, names, time)
+    else:
+        columns, footer = columns_in_memory(source, data[:end], offset, separator, names)
     entries = (*entries, *footer)
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head, source)
@@ -95,33 +99,32 @@ def _with_single_blanks(rows: bytes) -> bytes:
 N_COMPARED_ROWS = 20  # rows whose last numbers are compared with one that may be cut
 
 
-def _without_cut_row(data: bytes | mmap, source: Source) -> tuple[bytes | mmap, tuple[ReadError, ...]]:
-    """The text without its last row if that may be cut, and the remark on it.
+def _end_of_rows(data: bytes | mmap, end: int, source: Source) -> tuple[int, tuple[ReadError, ...]]:
+    """Byte behind the last row, without one that may be cut, and the remark on it; ``end`` is that behind the text.
 
     A row without line break is complete if it has as many separators as the rows above and its last number as many
-    decimals as all of theirs. Only text in memory can be shortened: a lazy file is rejected.
+    decimals as all of theirs.
 
     Raises
     ------
     ReadError
-        If the file is read lazily and its last row may be cut.
+        If the text is empty or its only row may be cut.
     """
-    if data[-1:] in (b"\n", b"\r"):
-        return data, ()
-    start = max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
-    rows = data[max(0, start - N_COMPARED_ROWS * (len(data) - start + 80)) : start].splitlines()[-N_COMPARED_ROWS:]
-    last = data[start:]
+    if data[end - 1 : end] in (b"\n", b"\r"):
+        return end, ()
+    start = max(data.rfind(b"\n", 0, end), data.rfind(b"\r", 0, end)) + 1
+    rows = data[max(0, start - N_COMPARED_ROWS * (end - start + 80)) : start].splitlines()[-N_COMPARED_ROWS:]
+    last = data[start:end]
     if len(rows) == N_COMPARED_ROWS and all(_shape(row) == _shape(last) for row in rows) and _shape(last)[1]:
-        return data, ()
-    if not decode_text(data[:]).strip():
+        return end, ()
+    if not last.strip() and not decode_text(data[:end]).strip():
         raise source.error("line 1", "there is no text", COPY_AGAIN, reason="empty")
-    line = data[:].count(b"\n") + 1
+    line = data[:end].count(b"\n") + 1
     problem = "the last line has no line break: its last number may be cut"
     remedy = f"{COPY_AGAIN}, or add the line break if it is whole"
-    if isinstance(data, mmap) or start == 0:
+    if start == 0:
         raise source.error(f"line {line}", problem, remedy, reason="truncated")
-    left_out = source.error(f"line {line}", f"{problem}. It is left out", remedy, reason="truncated")
-    return data[:start], (left_out,)
+    return start, (source.error(f"line {line}", f"{problem}. It is left out", remedy, reason="truncated"),)
 
 
 def _shape(row: bytes) -> tuple[int, int]:

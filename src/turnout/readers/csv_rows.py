@@ -28,7 +28,7 @@ from turnout.readers.source import Source
 
 
 def columns_in_memory(
-    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+    source: Source, data: bytes, offset: int, separator: str, names: Sequence[str]
 ) -> tuple[list[Column], tuple[Entry, ...]]:
     """All columns as arrays.
 
@@ -36,7 +36,7 @@ def columns_in_memory(
     ----------
     source : Source
         The text file.
-    data : bytes or mmap
+    data : bytes
         Bytes of the file.
     offset : int
         Byte of the first number.
@@ -44,8 +44,6 @@ def columns_in_memory(
         Separator of the cells.
     names : sequence of str
         Names of the columns.
-    time : int or None
-        Number of the time column, from 0; None without one.
 
     Returns
     -------
@@ -72,13 +70,20 @@ def columns_in_memory(
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
         except pa.ArrowInvalid:
-            end = _start_of_footer(data, offset, separator)
+            end = _start_of_footer(data, offset, len(data), separator)
             if end == len(data):
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
     _check_one_block(data, offset, end, source)
-    below = [decode_line(text) for text in data[end:].splitlines()]
-    return _columns_of(table, *context), tuple(entries_of_lines(below, separator, names, line_number(data, end) + 1))
+    return _columns_of(table, *context), _footer_entries(data, end, len(data), separator, names)
+
+
+def _footer_entries(
+    data: bytes | mmap, start: int, end: int, separator: str, names: Sequence[str]
+) -> tuple[Entry, ...]:
+    """Entries of the lines of text below the numbers."""
+    below = [decode_line(text) for text in data[start:end].splitlines()]
+    return tuple(entries_of_lines(below, separator, names, line_number(data, start) + 1)) if below else ()
 
 
 def _columns_of(
@@ -96,12 +101,11 @@ def _columns_of(
 MAX_FOOTER_LINES = 20
 
 
-def _start_of_footer(data: bytes | mmap, offset: int, separator: str) -> int:
-    """Byte at which lines of words begin that end the file, as "End of data"; its length without one.
+def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) -> int:
+    """Byte at which lines of words begin that end the text, as "End of data"; ``end``, its own end, without one.
 
     A line with a number in one of its cells is a row of samples with an error in it, never a footer.
     """
-    end = len(data)
     number = re.compile(rb'"?[-+]?[.,]?\d[\d.,eE+-]*"?')
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
@@ -134,7 +138,13 @@ def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) 
 
 
 def lazy_columns(
-    source: Source, data: bytes | mmap, offset: int, separator: str, names: Sequence[str], time: int | None
+    source: Source,
+    data: bytes | mmap,
+    offset: int,
+    end: int,
+    separator: str,
+    names: Sequence[str],
+    time: int | None,
 ) -> tuple[list[Column], tuple[Entry, ...]]:
     """Columns that read their numbers when sliced; a time column is read at once.
 
@@ -146,6 +156,8 @@ def lazy_columns(
         Bytes of the file.
     offset : int
         Byte of the first number.
+    end : int
+        Byte behind the text.
     separator : str
         Separator of the cells.
     names : sequence of str
@@ -156,7 +168,7 @@ def lazy_columns(
     Returns
     -------
     tuple of (list of Column, tuple of Entry)
-        Columns, and no entries: a file with text below its numbers is rejected.
+        Columns, and entries of the lines of text below the numbers.
 
     Raises
     ------
@@ -164,22 +176,77 @@ def lazy_columns(
         If a cell is no number, a row has another width, or an empty line separates the rows.
     """
     options = _options(data, offset, separator, len(names))
-    rows = RowReader(source.path, offset, options)
+    rows = RowReader(source.path, offset, end, options)
     line = line_number(data, offset)
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
-        times = rows.scan(time)
-    _check_one_block(data, offset, len(data), source)
+        try:
+            times = rows.scan(time)
+        except pa.ArrowInvalid:
+            end_of_numbers = _start_of_footer(data, offset, end, separator)
+            if end_of_numbers == end:
+                raise
+            rows = RowReader(source.path, offset, end_of_numbers, options)
+            times = rows.scan(time)
+    _check_one_block(data, offset, rows.end, source)
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
     for i, statistics in enumerate(rows.marks):
         if statistics.may_be_for_thousands:
             check_thousands(columns[i][:], i, names[i], data, offset, separator, source)
     if time is not None and times is not None:
         columns[time] = times
-    return columns, ()
+    return columns, _footer_entries(data, rows.end, end, separator, names)
 
 
 def line_number(data: bytes | mmap, offset: int) -> int:
     return data[:offset].count(b"\n")
+
+
+class FilePart(io.RawIOBase):
+    """Bytes of a file from ``start`` up to ``stop`` as a file of their own, which is read from its beginning.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    start, stop : int
+        First byte, and that behind the last one.
+    """
+
+    def __init__(self, path: Path, start: int, stop: int):
+        self.file, self.n_left = path.open("rb"), stop - start
+        self.file.seek(start)
+
+    def readable(self) -> bool:
+        """Whether it can be read.
+
+        Returns
+        -------
+        bool
+            Always.
+        """
+        return True
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Further bytes.
+
+        Parameters
+        ----------
+        size : int or None
+            At most so many; all if it is negative or None.
+
+        Returns
+        -------
+        bytes
+            Empty at the end of the part.
+        """
+        data = self.file.read(self.n_left if size is None or size < 0 else min(size, self.n_left))
+        self.n_left -= len(data)
+        return data
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+        super().close()
 
 
 class RowReader:
@@ -191,12 +258,14 @@ class RowReader:
         The text file.
     offset : int
         Byte at which the numbers begin.
+    end : int
+        Byte behind them.
     options : dict of str to any
         Options of ``pyarrow.csv.open_csv``.
     """
 
-    def __init__(self, path: Path, offset: int, options: dict[str, Any]):
-        self.path, self.offset, self.options = path, offset, options
+    def __init__(self, path: Path, offset: int, end: int, options: dict[str, Any]):
+        self.path, self.offset, self.end, self.options = path, offset, end, options
         self.n_row, self.begin = 0, 0
         self.marks: list[MarkStatistics] = []
         self.batches: list[pa.RecordBatch] = []
@@ -241,9 +310,7 @@ class RowReader:
         return LazyColumn(lambda start, stop: self._read_rows(i, start, stop), self.n_row, np.dtype(float))
 
     def _open(self) -> csv.CSVStreamingReader:
-        file = self.path.open("rb")
-        file.seek(self.offset)
-        return csv.open_csv(file, **self.options)
+        return csv.open_csv(FilePart(self.path, self.offset, self.end), **self.options)
 
     def _read_rows(self, i: int, start: int, stop: int) -> np.ndarray:
         if self.reader is None or start < self.begin:

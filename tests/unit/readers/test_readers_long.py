@@ -146,3 +146,40 @@ def test_marks_for_thousands_are_found_in_a_long_file_too(tmp_path):
     for max_whole_file_size in (0, 2**20):
         with pytest.raises(ReadError, match=r"column 'left': '-?1,\d{3}' has a mark for thousands"):
             read("x.txt", tmp_path, description, max_duration=0.01, max_whole_file_size=max_whole_file_size)
+
+
+ENDS_OF_TEXT = {
+    "a footer": "End of data\nsamples;2000\n",
+    "a footer without line break": "End of data\nstopped by hand",
+    "the mark of DOS": "\x1a",
+    "a footer and the mark of DOS": "End of data\n\x1a",
+    "a row that may be cut": "0.1\t2.",
+    "a whole row without line break": "0.1250\t0.2500",
+    "a word among the rows": "End of data\n0.1\t0.2\n",
+    "another rate in a footer": "Sampling rate\t16000 Hz\n",
+    "another block": "\n0.1\t0.2\n",
+}
+
+
+@pytest.mark.parametrize("line_break", ["\n", "\r\n", "\r"], ids=["lf", "crlf", "cr"])
+@pytest.mark.parametrize("end", ENDS_OF_TEXT.values(), ids=ENDS_OF_TEXT)
+def test_a_long_text_ends_as_a_short_one(end, line_break, tmp_path):
+    numbers = np.random.default_rng(9).normal(size=(2000, 2))
+    rows = "".join(f"{a:.4f}\t{b:.4f}\n" for a, b in numbers)
+    text = f"rate\t8000 Hz\nleft [m/s²]\tright [m/s²]\n{rows}{end}"
+    (tmp_path / "x.txt").write_bytes(text.replace("\n", line_break).encode())
+    channels = tuple(RawChannel(name, name, "acceleration") for name in ("left", "right"))
+    description = RawDescription(channels, kind="passage")
+    outcomes = []
+    for max_whole_file_size in (2**20, 0):
+        try:
+            result = read("x.txt", tmp_path, description, 0.01, max_whole_file_size)
+        except ReadError as error:
+            outcomes.append(str(error))
+            continue
+        samples = [r.samples for r in result.recordings]
+        samples += [np.asarray(r.read(0, r.n_sample)) for r in result.long_recordings]
+        outcomes.append(([s.tolist() for s in samples], [str(e) for e in result.errors]))
+    assert outcomes[0] == outcomes[1]
+    is_read = not isinstance(outcomes[0], str) and len(outcomes[0][0]) == 1
+    assert is_read == (end not in (ENDS_OF_TEXT[n] for n in list(ENDS_OF_TEXT)[-3:]))
