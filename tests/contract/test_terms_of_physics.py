@@ -10,6 +10,7 @@ import pytest
 from turnout.mismatch.turnout.candidates.rail_defects import SCANS
 from turnout.physics import TERMS, PhysicsTerm, effects_by_name
 from turnout.physics.hypothesis import (
+    BaySite,
     BladeSite,
     ChannelSite,
     ContactSite,
@@ -39,6 +40,7 @@ SWITCH = TurnoutTrack(
 SENSORS = (Sensor("A", 12.1), Sensor("B", 12.0, "sleeper"))
 SITES = (
     SupportSite(20, 12.0, 30, 5, 35, True),
+    BaySite(20, 12.3, 30),
     TrackSite(TRACK.rail, True),
     ChannelSite("A", 4, ("impacts 1:A",), True, 8.0, 6.0, 0.4),
     SaturatedChannelSite("A", 50.0, 1.0, 20.0),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
+from turnout.physics.hypothesis import BaySite, Hypothesis, SupportMotion, SupportSite
 from turnout.physics.requirement import IMPACTS
 from turnout.physics.term import Parameter, PhysicsTerm
 from turnout.simulate.links import Link
@@ -24,22 +24,26 @@ STARTS = tuple((15.0, f, 0.03) for f in np.geomspace(60.0, 800.0, 45))  # [kg, H
 
 @dataclass(frozen=True)
 class AttachedResonator(PhysicsTerm):
-    r"""A mass on a spring on the rail over one support,
-    :math:`\Delta K = -\omega^2 m\,(1 + 2i\zeta r)/(1 - r^2 + 2i\zeta r)`, :math:`r = f/f_0`."""
+    r"""A mass on a spring on the rail, over one support or ``beyond`` it by that share of the bay behind it,
+    :math:`\Delta K = -\omega^2 m\,(1 + 2i\zeta r)/(1 - r^2 + 2i\zeta r)`, :math:`r = f/f_0`.
+
+    It is attached to the nearest node of the mesh: within an eighth of a bay with four elements in each.
+    """
 
     support: int
     mass: float
     frequency: float = 300.0
     damping: float = 0.03
+    beyond: float = 0.0
 
     name = "attached_resonator"
-    left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail over sleeper {support}"
+    left_out = "{mass:.1f} kg resonate at {frequency:.0f} Hz on the rail {where}"
     message = "A mass of {mass} on the track at {place} resonates at {frequency}"
     site_check = "Look for parts attached to the rail there: a box, a rod, a heater"
     separating_test = "a hammer test above and beside this place"
     effect_type = "matrix"
     frame = "frequency"
-    site_types = (SupportSite,)
+    site_types = (SupportSite, BaySite)
     requirements = (IMPACTS,)
     column_type = "support"
     smallest_reportable = 5.0
@@ -56,9 +60,11 @@ class AttachedResonator(PhysicsTerm):
         return cls(20, 20.0, 250.0)
 
     @classmethod
-    def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
-        """A light mass over this support at several frequencies."""
-        yield Hypothesis(STARTS, {"support": site.support}, site.where, site.n_sites)
+    def hypotheses(cls, site: SupportSite | BaySite) -> Iterator[Hypothesis]:
+        """A light mass over this support, or in the middle of this bay, at several frequencies."""
+        beyond = {"beyond": 0.5} if isinstance(site, BaySite) else {}
+        n_scanned = 2 * site.n_sites  # over the supports, and between them
+        yield Hypothesis(STARTS, {"support": site.support, **beyond}, site.where, n_scanned)
 
     def links(self, track: Track) -> Sequence[Link]:
         """Links of an additional degree of freedom at the support."""
@@ -66,11 +72,27 @@ class AttachedResonator(PhysicsTerm):
         if self.mass == 0.0:
             return []
         omega, node = 2.0 * np.pi * self.frequency, ("resonator", self.support)
-        spring = ((("rail", self.support), 1.0), (node, -1.0))
+        spring = ((self._rail_node(track), 1.0), (node, -1.0))
         return [
             Link(spring, self.mass * omega**2, 2.0 * self.damping * omega * self.mass, tag="resonator"),
             Link(((node, 1.0),), mass=self.mass, tag="resonator"),
         ]
+
+    def _rail_node(self, track: Track) -> tuple:
+        """Name of the node of the rail that carries it."""
+        steps = round(self.beyond * track.elements_per_bay)
+        return ("rail", self.support, steps) if steps else ("rail", self.support)
+
+    @property
+    def supports(self) -> range:
+        """The support under it, or those on both sides."""
+        return range(self.support, self.support + (2 if self.beyond else 1))
+
+    def sentence(self) -> str:
+        """Sentence that states what was left out, with the numbers of this term."""
+        j = self.support
+        where = f"between sleepers {j} and {j + 1}" if self.beyond else f"over sleeper {j}"
+        return self._sentence_with(where=where)
 
     def dynamic_stiffness(self, frequency: ArrayLike) -> np.ndarray:
         """Stiffness that the mass on its spring adds at the rail.
@@ -91,9 +113,9 @@ class AttachedResonator(PhysicsTerm):
         return -(omega**2) * self.mass * (1.0 + inner) / (1.0 - r**2 + inner)
 
     def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
-        """The inertia of the mass as if it were fixed to the rail."""
-        return "rail", -self.mass * np.gradient(np.gradient(motion.rail)) * motion.rate**2
+        """The inertia of the mass as if it were fixed to the rail, a half on both sides of a bay."""
+        return "rail", -self.mass / len(self.supports) * np.gradient(np.gradient(motion.rail)) * motion.rate**2
 
-    def condensed_links(self, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
+    def condensed_links(self, track: Track, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
         """The stiffness of mass and spring at the rail."""
-        return [(((("rail", self.support), 1.0),), self.dynamic_stiffness(frequency))]
+        return [(((self._rail_node(track), 1.0),), self.dynamic_stiffness(frequency))]

@@ -49,6 +49,20 @@ class SupportSite:
 
 
 @dataclass(frozen=True)
+class BaySite:
+    """The middle between a ``support`` and the next one, at ``place`` [m]; ``n_sites`` supports are tested."""
+
+    support: int
+    place: float
+    n_sites: int
+
+    @property
+    def where(self) -> dict[str, object]:
+        """The site in the words of a candidate."""
+        return {"place": self.place}
+
+
+@dataclass(frozen=True)
 class TrackSite:
     """The whole track, with the ``rail`` of its file. ``has_passages``: whether there are passages."""
 
@@ -162,7 +176,7 @@ class BladeSite:
     has_passages: bool
 
 
-Site = SupportSite | TrackSite | ChannelSite | SaturatedChannelSite | ContactSite | TrainSite | BladeSite
+Site = SupportSite | BaySite | TrackSite | ChannelSite | SaturatedChannelSite | ContactSite | TrainSite | BladeSite
 
 
 @dataclass(frozen=True)

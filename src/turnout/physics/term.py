@@ -181,7 +181,7 @@ class PhysicsTerm(Effect):
 
         Parameters
         ----------
-        site : SupportSite, TrackSite, ChannelSite, SaturatedChannelSite, ContactSite or TrainSite
+        site : SupportSite, BaySite, TrackSite, ChannelSite, SaturatedChannelSite, ContactSite or TrainSite
             A site of one of the classes in ``site_types``.
 
         Returns
@@ -245,11 +245,13 @@ class PhysicsTerm(Effect):
         """
         raise NotImplementedError(f"{self.name} is not of column type 'support'")
 
-    def condensed_links(self, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]] | None:
+    def condensed_links(self, track: Track, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]] | None:
         """Dynamic stiffness between the degrees of freedom of the base model, for links that create their own.
 
         Parameters
         ----------
+        track : Track
+            The track without them.
         frequency : (n,) array of complex
             Frequencies. [Hz]
 

@@ -55,6 +55,15 @@ def test_a_resonator_on_the_rail_is_den_hartogs_auxiliary_mass():
     assert np.allclose(with_term(term), expected, atol=0.0, rtol=1e-9)
 
 
+def test_a_resonator_in_the_middle_of_a_bay_acts_there():
+    term = physics.AttachedResonator(20, 25.0, 180.0, 0.05, beyond=0.5)
+    middle = ("rail", 20, TRACK.elements_per_bay // 2)
+    expected = effect_of_one_link(term.dynamic_stiffness(F), middle)
+    assert np.allclose(with_term(term), expected, atol=0.0, rtol=1e-9)
+    assert [ends for ends, _ in term.condensed_links(TRACK, F)] == [((middle, 1.0),)]
+    assert "between sleepers 20 and 21" in term.sentence()
+
+
 def test_a_zener_pad_on_every_support_is_the_track_with_that_complex_stiffness():
     term = physics.ZenerPad(0.8)
     for k, f in enumerate(F):

@@ -116,7 +116,7 @@ def _link_responses(
 
 def _impedances(track: Track, term: PhysicsTerm, omega: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
     """(ends, impedance (n_line,)) of every link that a term adds."""
-    condensed = term.condensed_links(receptance_observation.SHIFTED_LINES)
+    condensed = term.condensed_links(track, receptance_observation.SHIFTED_LINES)
     if condensed is not None:
         return condensed
     links = [*term.links(track), *tangent_links((term,), track)]

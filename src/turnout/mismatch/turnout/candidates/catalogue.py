@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
 from turnout.mismatch.turnout.priors import SATURATION
 from turnout.physics.hypothesis import (
+    BaySite,
     BladeSite,
     ChannelSite,
     ContactSite,
@@ -151,6 +153,7 @@ def sites_of(data: CaseData) -> Iterator[Site]:
     Site
     """
     yield from _support_sites(data)
+    yield from _bay_sites(data)
     yield TrackSite(data.site.nominal.turnout.track.rail, bool(data.aligned_passages))
     yield from channel_sites(data)
     yield from _blade_sites(data)
@@ -166,6 +169,14 @@ def _support_sites(data: CaseData) -> Iterator[SupportSite]:
     for j in zone.effect_supports:
         place = round(float(positions[j]), 3)
         yield SupportSite(j, place, len(zone.effect_supports), zone.first, zone.last, bool(data.aligned_passages))
+
+
+def _bay_sites(data: CaseData) -> Iterator[BaySite]:
+    """The middles between the supports that are tested."""
+    zone = data.site.nominal
+    positions = zone.turnout.track_of("main").support
+    for j, k in pairwise(zone.effect_supports):
+        yield BaySite(j, round(float(0.5 * (positions[j] + positions[k])), 3), len(zone.effect_supports))
 
 
 def _blade_sites(data: CaseData) -> Iterator[BladeSite]:
