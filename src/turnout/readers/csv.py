@@ -117,7 +117,7 @@ def _end_of_rows(data: bytes | mmap, end: int, source: Source) -> tuple[int, tup
     last = data[start:end]
     if len(rows) == N_COMPARED_ROWS and all(_shape(row) == _shape(last) for row in rows) and _shape(last)[1]:
         return end, ()
-    if not last.strip() and not decode_text(data[:end]).strip():
+    if not decode_text(last).strip() and not decode_text(data[:end]).strip():
         raise source.error("line 1", "there is no text", COPY_AGAIN, reason="empty")
     line = data[:end].count(b"\n") + 1
     problem = "the last line has no line break: its last number may be cut"
