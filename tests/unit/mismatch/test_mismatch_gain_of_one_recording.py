@@ -9,12 +9,13 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate import Candidate, EffectSite
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_unmasked, single_witness
+from turnout.mismatch.engine.cross_validation import effect_energy, gain_where_unmasked
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.single_witness import single_witness
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)

@@ -1,12 +1,11 @@
-"""Scores on held-out conditions, single witnesses of a name, and the overlap of two effects.
+"""Scores on held-out conditions, energies of the change by an effect, and the overlap of two effects.
 
-A single witness is one recording, or all impacts at one position, without which a name has no support. The overlap is
-the share of the change by one effect in sensors and recordings that another effect changes as well.
+The overlap is the share of the change by one effect in sensors and recordings that another effect changes as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.observation import Observation
-    from turnout.mismatch.engine.search import Search
 
 
 def held_out_score(case: Case, fit: Fit) -> dict[str, float]:
@@ -262,85 +260,31 @@ def signature_overlap(case: Case, fit: Fit, first: Candidate, second: Candidate)
 
 def _energy_shares(observations: Sequence[Observation], changes: Sequence[np.ndarray]) -> np.ndarray | None:
     """(n_sensor_and_recording,) shares of the energy of ``changes``. None if it is zero."""
-    energies = [e for o, d in zip(observations, changes) for e in _energy_by_sensor(o, o.effective * np.square(d))]
+    squares = ((o, o.effective * np.square(change)) for o, change in zip(observations, changes))
+    energies = [energy for o, square in squares for energy in sums_by_sensor(o, square).values()]
     total = float(np.sum(energies))
     return np.array(energies) / total if total > 0.0 else None
 
 
-def _energy_by_sensor(observation: Observation, energy: np.ndarray) -> Iterable[float]:
-    """Sums of ``energy`` (n,) by sensor. One sum if the observation has no sensor labels."""
-    if observation.cells is None or "sensor" not in observation.labels:
-        return [float(np.sum(energy))]
-    level, code = np.unique(observation.labels["sensor"].astype(str), return_inverse=True)
-    inside = observation.cells >= 0
-    return np.bincount(code[observation.cells[inside]], energy[inside], minlength=level.size)
-
-
-def single_witness(
-    search: Search, fit: Fit, candidate: Candidate, gain: float, by_condition: Mapping[str, float]
-) -> str:
-    """The condition whose gain alone supports a name while the gain of all others together does not.
-
-    "" if there is none.
-
-    A real effect shows wherever it acts. A gain in one recording that others do not share belongs to that recording, if
-    at least two others show the effect with half its energy. Two are needed, since nuisances may absorb the gain of
-    one. Trains are exempt: speed and roughness differ at each passage.
-
-    Impacts at one position are one witness, however often they are repeated. They share the fittings, the twist of the
-    rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
-    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the witness.
-    Passages share none of these faults: if they are enough for a name without any impact, they are a second witness.
-    What other impacts lose by the name is a question of its own (``is_contradicted``).
+def sums_by_sensor(observation: Observation, amounts: np.ndarray) -> dict[str, float]:
+    """Sums of a non-negative amount of each sample by sensor.
 
     Parameters
     ----------
-    search : Search
-    fit : Fit
-        It has ``candidate`` in it.
-    candidate : Candidate
-    gain : float
-        Of all conditions together. [nats]
-    by_condition : dict
-        Condition -> gain when it is left out. [nats]
+    observation : Observation
+    amounts : (n,) array of float
+
+    Returns
+    -------
+    dict
+        Sensor -> sum. One sum, of "", if the observation has no sensor labels.
     """
-    case, threshold = search.case, search.settings.threshold
-    if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, threshold):
-        return position
-    strongest = max(by_condition, key=lambda c: by_condition[c], default="")
-    if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
-        return ""
-    other_gain = sum(by_condition.values()) - by_condition[strongest]
-    if other_gain >= threshold:
-        return ""
-    energies = effect_energy(case, fit, candidate)
-    min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
-    return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
-
-
-def _single_hammer_position(
-    hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float], threshold: float
-) -> str:
-    """Position, in words, whose impacts alone support half of a name or more, while all others do not.
-
-    "" if there is none, or if recordings without impacts support the name. Half of a name is enough to confirm one:
-    the price of a name is that of a search among many effects, and others need to confirm only the one that was found.
-    """
-    gains: dict[float, float] = {}
-    for condition, condition_gain in by_condition.items():
-        if condition in hammer_positions:
-            gains[hammer_positions[condition]] = gains.get(hammer_positions[condition], 0.0) + condition_gain
-    if len(gains) < THRESHOLDS.min_hammer_positions:
-        return ""
-    strongest = max(gains, key=lambda position: gains[position])
-    other_gain = sum(by_condition.values()) - gains[strongest]
-    gain_without_impacts = sum(g for condition, g in by_condition.items() if condition not in hammer_positions)
-    if gain_without_impacts >= threshold:
-        return ""
-    if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
-        return ""
-    is_alone = gains[strongest] > THRESHOLDS.min_confirmation * threshold > other_gain
-    return f"all impacts at {strongest:g} m" if is_alone else ""
+    if observation.cells is None or "sensor" not in observation.labels:
+        return {"": float(np.sum(amounts))}
+    level, code = np.unique(observation.labels["sensor"].astype(str), return_inverse=True)
+    inside = observation.cells >= 0
+    sums = np.bincount(code[observation.cells[inside]], amounts[inside], minlength=level.size)
+    return dict(zip(level.tolist(), sums.tolist()))
 
 
 def effect_energy(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:

@@ -13,10 +13,11 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.candidate_search import Entry, RefitTask, prescreened_entries, shortlist
-from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score, single_witness
+from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
 from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader
+from turnout.mismatch.engine.single_witness import single_sensor, single_witness
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -221,6 +222,7 @@ def _with_condition_gains(search: Search, fit: Fit, score: Score) -> Score:
     witness = ""
     if score.is_reportable:
         witness = single_witness(search, score.fit, score.candidate, score.gain, by_condition)
+        witness = witness or single_sensor(case, fit, score.fit, score.candidate, search.settings.threshold)
     worst_gain, unmasked_gain = min(by_condition.values(), default=0.0), gain_where_unmasked(case, fit, by_condition)
     return replace(
         score, worst_gain=worst_gain, by_condition=by_condition, single_witness=witness, unmasked_gain=unmasked_gain

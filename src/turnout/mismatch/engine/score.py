@@ -22,7 +22,7 @@ class Score:
     ``gain`` in held-out log density over the base model, less the log of the number of sites [nats]. ``worst_gain``
     least gain of a condition. ``explained`` share of the excess. ``is_ordinary``: similar components of this case
     differ by this size anyway, or the required observations do not support it. ``single_witness`` the one condition on
-    which it rests (``cross_validation.single_witness``). ``unmasked_gain`` gain of conditions in which no earlier
+    which it rests (``engine.single_witness``). ``unmasked_gain`` gain of conditions in which no earlier
     effect shows.
     """
 

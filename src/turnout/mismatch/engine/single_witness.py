@@ -1,0 +1,127 @@
+"""Single witnesses: the one recording, position of impacts or sensor without which a name has no support."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.mismatch.engine.cross_validation import effect_energy, effect_signature, sums_by_sensor
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.search import Search
+
+
+def single_witness(
+    search: Search, fit: Fit, candidate: Candidate, gain: float, by_condition: Mapping[str, float]
+) -> str:
+    """The condition whose gain alone supports a name while the gain of all others together does not.
+
+    "" if there is none.
+
+    A real effect shows wherever it acts. A gain in one recording that others do not share belongs to that recording, if
+    at least two others show the effect with half its energy. Two are needed, since nuisances may absorb the gain of
+    one. Trains are exempt: speed and roughness differ at each passage.
+
+    Impacts at one position are one witness, however often they are repeated. They share the fittings, the twist of the
+    rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
+    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the witness.
+    Passages share none of these faults: if they are enough for a name without any impact, they are a second witness.
+    What other impacts lose by the name is a question of its own (``is_contradicted``).
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+        It has ``candidate`` in it.
+    candidate : Candidate
+    gain : float
+        Of all conditions together. [nats]
+    by_condition : dict
+        Condition -> gain when it is left out. [nats]
+    """
+    case, threshold = search.case, search.settings.threshold
+    if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, threshold):
+        return position
+    strongest = max(by_condition, key=lambda c: by_condition[c], default="")
+    if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
+        return ""
+    other_gain = sum(by_condition.values()) - by_condition[strongest]
+    if other_gain >= threshold:
+        return ""
+    energies = effect_energy(case, fit, candidate)
+    min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
+    return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
+
+
+def _single_hammer_position(
+    hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float], threshold: float
+) -> str:
+    """Position, in words, whose impacts alone support half of a name or more, while all others do not.
+
+    "" if there is none, or if recordings without impacts support the name. Half of a name is enough to confirm one:
+    the price of a name is that of a search among many effects, and others need to confirm only the one that was found.
+    """
+    gains: dict[float, float] = {}
+    for condition, condition_gain in by_condition.items():
+        if condition in hammer_positions:
+            gains[hammer_positions[condition]] = gains.get(hammer_positions[condition], 0.0) + condition_gain
+    if len(gains) < THRESHOLDS.min_hammer_positions:
+        return ""
+    strongest = max(gains, key=lambda position: gains[position])
+    other_gain = sum(by_condition.values()) - gains[strongest]
+    gain_without_impacts = sum(g for condition, g in by_condition.items() if condition not in hammer_positions)
+    if gain_without_impacts >= threshold:
+        return ""
+    if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
+        return ""
+    is_alone = gains[strongest] > THRESHOLDS.min_confirmation * threshold > other_gain
+    return f"all impacts at {strongest:g} m" if is_alone else ""
+
+
+def single_sensor(case: Case, without: Fit, fit: Fit, candidate: Candidate, threshold: float) -> str:
+    """The sensor that alone supports an effect of track or train, though others would show it at least half as plainly.
+
+    What only one channel shows belongs to this channel. A real effect gains where its change has energy. The test is
+    made if the change has half as much energy in all other channels together as in that one. They confirm a name with
+    half of the evidence that it needs, as other positions confirm that of impacts at one position.
+
+    Parameters
+    ----------
+    case : Case
+    without, fit : Fit
+        Without the candidate and with it.
+    candidate : Candidate
+    threshold : float
+        Evidence that a name needs. [nats]
+
+    Returns
+    -------
+    str
+        "the sensor NAME", or "" if there is none. An effect of a sensor has none.
+    """
+    if "sensor" in candidate.where:
+        return ""
+    gains: dict[str, float] = {}
+    energies: dict[str, float] = {}
+    changes = effect_signature(case, fit, candidate)
+    for o, change, before, after in zip(case.observations, changes, without.predictions, fit.predictions):
+        weight = 0.5 * o.effective / fit.scale[o.data_type]
+        squares = (np.square(o.whiten(o.data - p)) for p in (before, after))
+        lost, left = (sums_by_sensor(o, weight * s) for s in squares)
+        for sensor, energy in sums_by_sensor(o, weight * np.square(change)).items():
+            gains[sensor] = gains.get(sensor, 0.0) + lost[sensor] - left[sensor]
+            energies[sensor] = energies.get(sensor, 0.0) + energy
+    strongest = max(gains, key=lambda sensor: gains[sensor], default="")
+    if not strongest:
+        return ""
+    gain, energy = gains.pop(strongest), energies.pop(strongest)
+    is_alone = gain > THRESHOLDS.min_confirmation * threshold > sum(gains.values())
+    would_show = sum(energies.values()) >= THRESHOLDS.min_energy_ratio * energy
+    return f"the sensor {strongest}" if is_alone and would_show else ""

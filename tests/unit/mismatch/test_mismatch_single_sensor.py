@@ -1,0 +1,73 @@
+"""What one sensor alone shows, though others would have to show it, is no effect of the track."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.errors import SimulationError
+from turnout.mismatch.engine.candidate import Candidate, EffectSite
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.single_witness import single_sensor
+from turnout.physics import Parameter
+
+SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
+BUMP = np.sin(np.linspace(0.0, 6.0, 100))
+SENSORS = np.repeat(["A1", "A2"], BUMP.size)
+THRESHOLD = 12.0  # nats
+
+
+class TwoSensors(Case):
+    """Two recordings of two sensors, with the share of a bump that each has in truth and by the model."""
+
+    def __init__(self, true, model, impossible_without=False):
+        self.model, self.impossible_without = self.both(model), impossible_without
+        data = self.both(true)
+        cells = np.arange(data.size)
+        self.observations = tuple(
+            Observation(name, name, data, np.full(data.size, 0.1), cells=cells, labels={"sensor": SENSORS}, rows=2)
+            for name in "ab"
+        )
+        self.candidates = (Candidate.of("bump", SIZE, lambda p: p["size"], ((0.5,),), {"place": 3.0}),)
+
+    def both(self, shares):
+        return np.concatenate([share * BUMP for share in shares])
+
+    def predict(self, values, terms, observations):
+        if self.impossible_without and not terms:
+            raise SimulationError("cannot go without")
+        return [sum(terms) * self.model for _ in observations]
+
+    def witness(self, candidate=None):
+        (own,) = self.candidates
+        fit = fit_jointly(self, self.candidates, [0.5], iterations=20)
+        without = replace(fit, predictions=[np.zeros(SENSORS.size) for _ in self.observations])
+        return single_sensor(self, without, fit, candidate or own, THRESHOLD)
+
+
+@pytest.mark.parametrize(
+    "true, model, witness",
+    [
+        ((1.0, 1.0), (1.0, 1.0), ""),  # both show it
+        ((1.0, 0.0), (1.0, 1.0), "the sensor A1"),  # A2 would show as much, and loses
+        ((0.0, 1.0), (1.0, 1.0), "the sensor A2"),
+        ((1.0, 0.0), (1.0, 0.72), "the sensor A1"),  # 0.52 of the energy
+        ((1.0, 0.0), (1.0, 0.68), ""),  # 0.46: too little to be missed
+        ((0.02, 0.0), (1.0, 1.0), ""),  # too little gain to be a name of one sensor
+        ((1.0, 0.5), (1.0, 0.72), ""),  # A2 has the effect, though smaller
+    ],
+)
+def test_an_effect_gains_where_its_change_has_energy(true, model, witness):
+    assert TwoSensors(true, model).witness() == witness
+
+
+def test_without_a_simulation_there_is_nothing_to_compare():
+    assert TwoSensors((1.0, 0.0), (1.0, 1.0), impossible_without=True).witness() == ""
+
+
+def test_what_a_sensor_does_itself_needs_no_other():
+    case = TwoSensors((1.0, 0.0), (1.0, 1.0))
+    of_a_sensor = replace(case.candidates[0], site=EffectSite({"sensor": "A1"}))
+    assert case.witness() == "the sensor A1" and case.witness(of_a_sensor) == ""
