@@ -222,7 +222,7 @@ def _with_condition_gains(search: Search, fit: Fit, score: Score) -> Score:
     witness = ""
     if score.is_reportable:
         witness = single_witness(search, score.fit, score.candidate, score.gain, by_condition)
-        witness = witness or single_sensor(case, fit, score.fit, score.candidate, search.settings.threshold)
+        witness = witness or single_sensor(search, fit, score)
     worst_gain, unmasked_gain = min(by_condition.values(), default=0.0), gain_where_unmasked(case, fit, by_condition)
     return replace(
         score, worst_gain=worst_gain, by_condition=by_condition, single_witness=witness, unmasked_gain=unmasked_gain

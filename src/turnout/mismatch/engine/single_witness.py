@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from turnout.mismatch.engine.candidate import Candidate
-    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
 
 
@@ -85,33 +85,34 @@ def _single_hammer_position(
     return f"all impacts at {strongest:g} m" if is_alone else ""
 
 
-def single_sensor(case: Case, without: Fit, fit: Fit, candidate: Candidate, threshold: float) -> str:
+def single_sensor(search: Search, without: Fit, score: Score) -> str:
     """The sensor that alone supports an effect of track or train, though others would show it at least half as plainly.
 
     What only one channel shows belongs to this channel. A real effect gains where its change has energy. The test is
     made if the change has half as much energy in all other channels together as in that one. They confirm a name with
-    half of the evidence that it needs, as other positions confirm that of impacts at one position.
+    half of the evidence that it needs, as other positions confirm that of impacts at one position. No sensor shows the
+    prior penalty that nuisances pay to imitate an effect: if that is most of the gain, no sensor is the witness.
 
     Parameters
     ----------
-    case : Case
-    without, fit : Fit
-        Without the candidate and with it.
-    candidate : Candidate
-    threshold : float
-        Evidence that a name needs. [nats]
+    search : Search
+    without : Fit
+        The fit without the candidate.
+    score : Score
+        The candidate, with its fit.
 
     Returns
     -------
     str
         "the sensor NAME", or "" if there is none. An effect of a sensor has none.
     """
+    fit, candidate, threshold = score.fit, score.candidate, search.settings.threshold
     if "sensor" in candidate.where:
         return ""
     gains: dict[str, float] = {}
     energies: dict[str, float] = {}
-    changes = effect_signature(case, fit, candidate)
-    for o, change, before, after in zip(case.observations, changes, without.predictions, fit.predictions):
+    changes = effect_signature(search.case, fit, candidate)
+    for o, change, before, after in zip(search.case.observations, changes, without.predictions, fit.predictions):
         weight = 0.5 * o.effective / fit.scale[o.data_type]
         squares = (np.square(o.whiten(o.data - p)) for p in (before, after))
         lost, left = (sums_by_sensor(o, weight * s) for s in squares)
@@ -119,7 +120,7 @@ def single_sensor(case: Case, without: Fit, fit: Fit, candidate: Candidate, thre
             gains[sensor] = gains.get(sensor, 0.0) + lost[sensor] - left[sensor]
             energies[sensor] = energies.get(sensor, 0.0) + energy
     strongest = max(gains, key=lambda sensor: gains[sensor], default="")
-    if not strongest:
+    if not strongest or sum(gains.values()) < THRESHOLDS.min_held_out_share * score.gain:
         return ""
     gain, energy = gains.pop(strongest), energies.pop(strongest)
     is_alone = gain > THRESHOLDS.min_confirmation * threshold > sum(gains.values())
