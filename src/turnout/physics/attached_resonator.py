@@ -62,7 +62,7 @@ class AttachedResonator(PhysicsTerm):
 
     @classmethod
     def hypotheses(cls, site: SupportSite | BaySite) -> Iterator[Hypothesis]:
-        """A light mass over this support, or in the middle of this bay, at several frequencies."""
+        """A light and a heavy mass over this support, or in the middle of this bay, at several frequencies."""
         beyond = {"beyond": 0.5} if isinstance(site, BaySite) else {}
         n_scanned = 2 * site.n_sites  # over the supports, and between them
         yield Hypothesis(STARTS, {"support": site.support, **beyond}, site.where, n_scanned)
