@@ -16,6 +16,7 @@ ChannelKey = tuple[str, str, int, int, str, str]
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 FORCE_TYPES = (9, 13)  # specific data types of an ordinate (record 9)
 MAX_STAMP_DIFFERENCE = timedelta(seconds=1)  # between the sets of a record: ID line 3 is rounded to seconds
+MAX_LISTED = 6  # channels that a message lists
 PAIRING_REMEDY = (
     "Export the sets with the number of the impact in field 3 of record 6, or with its time in ID line 3, or each "
     "impact to a file"
@@ -201,12 +202,9 @@ def _check_order(
     is_channel_after_channel = len(list(groupby(keys))) == len(channels) and len(set(counts.values())) == 1
     if is_in_turn or is_channel_after_channel:
         return
-    found = ", ".join(f"{n} of channel {channel_name(key)!r}" for key, n in list(counts.items())[:MAX_LISTED])
-    problem = f"{found} come in no regular order, and neither numbers, times nor nodes say which belong together"
+    numbers = ", ".join(f"{n} of channel {channel_name(key)!r}" for key, n in list(counts.items())[:MAX_LISTED])
+    problem = f"{numbers} come in no regular order, and neither numbers, times nor nodes say which belong together"
     raise source.error("the sets", problem, PAIRING_REMEDY)
-
-
-MAX_LISTED = 6  # channels that a message lists
 
 
 def _contradiction(

@@ -41,6 +41,19 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
     assert np.max(squares[1]) < 4.0
 
 
+def test_a_mass_on_the_rail_is_tried_over_sleepers_and_in_the_middle_between_them(lightly_damped):
+    case, _, _ = lightly_damped
+    masses = [c for c in case.candidates if c.family == "attached_resonator"]
+    over = sorted(c.position for c in masses if "sleeper" in c.where)
+    between = sorted(c.position for c in masses if "sleeper" not in c.where)
+    assert len(over) > 3
+    assert np.allclose(between, 0.5 * (np.array(over[:-1]) + over[1:]), atol=1e-3, rtol=0.0)  # rounded to mm
+    track = case.predictor.track()
+    node = {c.position: c.term(c.starts[0]).links(track)[0].ends[0][0] for c in masses}
+    assert {node[x][:1] + node[x][2:] for x in over} == {("rail",)}
+    assert {node[x][:1] + node[x][2:] for x in between} == {("rail", track.elements_per_bay // 2)}
+
+
 def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped):
     """What lies farther out cannot be distinguished from all that lies beyond it; it has values, no names."""
     case, _, _ = lightly_damped

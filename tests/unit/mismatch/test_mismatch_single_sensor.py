@@ -10,6 +10,7 @@ from turnout.mismatch.engine.candidate import Candidate, EffectSite
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.refit import _with_condition_gains
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.single_witness import single_sensor
@@ -40,6 +41,10 @@ class TwoSensors(Case):
         if self.impossible_without and not terms:
             raise SimulationError("cannot go without")
         return [sum(terms) * self.model for _ in observations]
+
+    def fits(self):
+        """Without the bump and with it."""
+        return fit_jointly(self), fit_jointly(self, self.candidates, [0.5], iterations=20)
 
     def witness(self, candidate=None, gain=15.0):
         (own,) = self.candidates
@@ -72,6 +77,15 @@ def test_a_gain_that_is_the_penalty_of_nuisances_has_no_sensor():
 
 def test_without_a_simulation_there_is_nothing_to_compare():
     assert TwoSensors((1.0, 0.0), (1.0, 1.0), impossible_without=True).witness() == ""
+
+
+@pytest.mark.parametrize("true, witness", [((1.0, 1.0), ""), ((1.0, 0.0), "the sensor A1")])
+def test_the_leader_of_a_search_is_tested_for_it(true, witness):
+    case = TwoSensors(true, (1.0, 1.0))
+    case.expensive = True
+    without, fit = case.fits()
+    leader = _with_condition_gains(Search(case), without, Score(case.candidates[0], 15.0, 0.0, 1.0, fit))
+    assert leader.single_witness == witness
 
 
 def test_what_a_sensor_does_itself_needs_no_other():

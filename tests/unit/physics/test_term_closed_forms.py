@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from turnout import physics
+from turnout.physics.hypothesis import SupportMotion
 from turnout.simulate import car, uniform_track
 from turnout.simulate.frequency_response import receptance, responses
 from turnout.simulate.matrices import assemble
@@ -62,6 +63,19 @@ def test_a_resonator_in_the_middle_of_a_bay_acts_there():
     assert np.allclose(with_term(term), expected, atol=0.0, rtol=1e-9)
     assert [ends for ends, _ in term.condensed_links(TRACK, F)] == [((middle, 1.0),)]
     assert "between sleepers 20 and 21" in term.sentence()
+
+
+def test_both_supports_of_a_bay_carry_half_of_a_mass_that_is_fixed_to_the_rail():
+    time = np.arange(0.0, 0.2, 1e-4)
+    motion = SupportMotion(1e-4 * np.sin(60.0 * time), np.zeros(time.size), 1e4, 300e6, 90e6)
+    over, between = (physics.AttachedResonator(20, 25.0, 180.0, beyond=share) for share in (0.0, 0.5))
+    assert (list(over.supports), list(between.supports)) == ([20], [20, 21])
+    inertia = 25.0 * 60.0**2 * 1e-4 * np.sin(60.0 * time)
+    for term in (over, between):
+        target, force = term.pseudo_force(motion)
+        # central differences of a sine: (60 rad/s * 1e-4 s)^2 / 3 of it; the ends are one-sided
+        assert target == "rail"
+        assert np.allclose(len(term.supports) * force[2:-2], inertia[2:-2], atol=2e-5 * np.max(inertia), rtol=0.0)
 
 
 def test_a_zener_pad_on_every_support_is_the_track_with_that_complex_stiffness():

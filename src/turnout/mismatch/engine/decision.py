@@ -80,7 +80,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
          "{e.leader.in_words} would have a value that is physically impossible", HOW),
     Rule("single_witness", lambda e: e.leader.single_witness, "unknown",
-         "only {e.leader.single_witness} shows {e.leader.in_words}, and other recordings do not confirm it", ENDS),
+         "only {e.leader.single_witness} shows {e.leader.in_words}, and nothing else confirms it", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
          "with {e.leader.in_words}, one condition is predicted worse (evidence lost: {e.largest_loss:.0f} nats)", ENDS),
     Rule("size_at_limit", lambda e: e.limit_forms, "a_or_b",

@@ -21,9 +21,9 @@ class Score:
 
     ``gain`` in held-out log density over the base model, less the log of the number of sites [nats]. ``worst_gain``
     least gain of a condition. ``explained`` share of the excess. ``is_ordinary``: similar components of this case
-    differ by this size anyway, or the required observations do not support it. ``single_witness`` the one condition on
-    which it rests (``engine.single_witness``). ``unmasked_gain`` gain of conditions in which no earlier
-    effect shows.
+    differ by this size anyway, or the required observations do not support it. ``single_witness``: the one recording,
+    position of impacts or sensor on which it rests, in words (module ``single_witness``). ``unmasked_gain`` gain of
+    conditions in which no earlier effect shows.
     """
 
     candidate: Candidate
