@@ -28,7 +28,7 @@ def test_a_casting_weighs_what_its_stretch_in_the_file_does():
         assert found[np.searchsorted(x, 6.0)] == factor
 
 
-def test_a_nose_is_as_deep_and_long_as_it_says():
+def test_a_nose_is_as_deep_and_long_as_its_parameters_state():
     """Nothing 0.4 of the length before it and 0.6 behind, its depth in the middle, rounded: no corner."""
     assert CAST.dip(6.0) == pytest.approx(1.2e-3)
     assert CAST.dip(6.0 - 0.32 - 0.016) == 0.0 < CAST.dip(6.0 - 0.32 + 0.001)
@@ -98,7 +98,7 @@ def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path)
         case_reports.draw_case(truth, [], None, tmp_path / "story.svg", {})
 
 
-def test_a_nose_wears_at_its_tip_by_as_much_as_it_says_and_nowhere_else(site):
+def test_a_nose_wears_at_its_tip_by_the_stated_depth_and_nowhere_else(site):
     """Parabolic slopes of 0.25 and 0.75 of the length: the depth at the tip, a quarter of it half way to either end."""
     effect = load_effects()["nose"]
     where, p = effect.draw(np.random.default_rng(2), site, 1.5e-3)

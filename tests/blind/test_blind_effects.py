@@ -86,7 +86,7 @@ def test_a_full_set_has_what_the_proof_asks_for():
     assert len({p.seed for p in plans}) == len(plans)
 
 
-def test_the_order_of_the_cases_says_nothing():
+def test_the_order_of_the_cases_has_no_information_on_their_effects():
     """Names sort the cases otherwise than any stratum: ranks of the controls among the names are like any others."""
     plans = plan_cases(3, EFFECTS)
     named = sorted(range(len(plans)), key=lambda k: case_id(3, k))

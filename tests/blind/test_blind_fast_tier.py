@@ -95,7 +95,7 @@ def test_a_case_has_the_tests_and_the_trains_of_a_campaign(again):
 
 
 @pytest.mark.slow
-def test_the_tool_names_nothing_in_the_blows_of_a_control(again):
+def test_the_diagnosis_names_nothing_in_the_impacts_of_a_control(again):
     """Hammer tests alone, which take it seconds; the whole campaign is for a release."""
     case, folder, _ = again
     answers = answers_of(finding_rows(folder / case, case, "hammer_only"))

@@ -76,7 +76,7 @@ def test_the_owner_has_the_notes_of_all_visits_and_its_events_but_not_the_effect
     assert "growth" not in written and truth["onset"] not in written
 
 
-def test_work_is_in_the_world_from_the_start_of_its_day_as_the_events_say():
+def test_work_is_in_the_world_from_the_start_of_its_day_as_in_the_events():
     site = history.draw_site(np.random.default_rng(3))
     n = site.world.position.size
     when = site.campaigns[0].replace(hour=9)

@@ -31,7 +31,7 @@ EFFECT = {"kind": "pad", "where": {"position": 3.1, "sleeper": 40}, "parameters"
           "locked_to": "place"}  # fmt: skip
 
 
-def test_an_oracle_gets_the_right_name_at_the_true_place_and_nothing_else():
+def test_an_oracle_gets_the_right_name_at_the_true_position_and_nothing_else():
     assert [c.where["place"] for c in _candidates(CASE, EFFECT)] == [3.0]
     gain = {"kind": "gain", "where": {"sensor": "A3"}, "parameters": {"gain": 1.2}}
     assert [c.where for c in _candidates(CASE, gain)] == [{"sensor": "A3"}]

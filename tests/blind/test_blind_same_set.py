@@ -46,13 +46,13 @@ def test_a_set_for_a_tool_follows_from_its_sources_alone(light, tmp_path, monkey
     assert seeds[0] == seeds[1] == int(digest(b"turnout blind " + b"a" * 64)[:15], 16) != seeds[2]
 
 
-@pytest.mark.parametrize(("tool", "refused"), [("a" * 64, False), ("b" * 64, True)])
-def test_a_set_for_one_tool_lets_no_other_in(light, tmp_path, monkeypatch, tool, refused):
+@pytest.mark.parametrize(("tool", "is_rejected"), [("a" * 64, False), ("b" * 64, True)])
+def test_a_set_for_one_tool_lets_no_other_in(light, tmp_path, monkeypatch, tool, is_rejected):
     tool_is(monkeypatch, "a" * 64)
     make_set(tmp_path / "set", tmp_path / "truth", "tool", limit=1)
     tool_is(monkeypatch, tool)
     command = '{python} -c "print(\'[{{\\"verdict\\": \\"none\\"}}]\')"'
-    if refused:
+    if is_rejected:
         with pytest.raises(BlindError, match="examines: made for another tool"):
             diagnose_set(tmp_path / "set", tmp_path / "truth", command, report=lambda text: None)
         assert not (tmp_path / "set" / "findings").exists()

@@ -145,7 +145,7 @@ def test_a_confidently_wrong_tool_fails_where_it_should():
     assert found["probability: worst fifth, stated from seen"].value > 0.9
 
 
-def test_a_wrong_place_axle_train_or_sensor_is_seen():
+def test_a_wrong_position_axle_train_or_sensor_is_detected():
     def off(t):
         rows = perfect(t)
         for r in rows:
@@ -269,7 +269,7 @@ def both(gap_at, sensor):
 
 
 @pytest.mark.parametrize(("gap_at", "sensor", "right"), [(4.2, "A2", True), (8.2, "A2", False), (4.2, "A3", False)])
-def test_both_of_two_effects_are_right_where_their_places_are(gap_at, sensor, right):
+def test_both_of_two_effects_are_right_at_their_positions(gap_at, sensor, right):
     judged = judge(truth("d", "double", "void", "gain"), answers_of(both(gap_at, sensor)))
     assert judged.matches == ("named", "named")
     found = {f.name: f for f in figures([judged])}
@@ -277,7 +277,7 @@ def test_both_of_two_effects_are_right_where_their_places_are(gap_at, sensor, ri
     assert found["two effects: one right and none wrong"].k == 1
 
 
-def test_a_name_said_twice_of_one_effect_is_wrong_once_and_does_not_lend_its_size():
+def test_a_name_given_twice_for_one_effect_is_wrong_once_and_does_not_lend_its_size():
     gain = {"term": "sensor_gain", "fixed": {"channel_name": "A2"}, "parameters": {"gain": {"value": 1.3, "se": 0.01}}}
     other = {"term": "sensor_gain", "fixed": {"channel_name": "A3"}, "parameters": {"gain": {"value": 0.8, "se": 0.01}}}
     rows = [{"verdict": "named", "term": "sensor_gain", "channel": "A2", "term_json": json.dumps([gain, other])}]
@@ -306,10 +306,10 @@ def test_a_fall_counts_wherever_a_name_was_given():
     fell = {"fit_before_pct": 50.0, "fit_after_pct": 20.0}
     alarm = judge(truth("c", "control"), answers_of([{"verdict": "named", "term": "rail_shear", **fell}]))
     mute = judge(truth("d", "double", "void", "gain"), answers_of([both(4.2, "A2")[0] | {"fit_before_pct": 50.0}]))
-    sound = judge(
+    intact = judge(
         truth("s", "single", "void"), answers_of([row(truth("s", "single", "void")["effects"][0], "hanging_sleeper")])
     )
-    found = {f.name: f for f in figures([alarm, mute, sound])}["held-out fit: fell by more than its standard error"]
+    found = {f.name: f for f in figures([alarm, mute, intact])}["held-out fit: fell by more than its standard error"]
     assert (found.k, found.n) == (2, 3)
 
 
@@ -333,7 +333,7 @@ def test_fifths_hold_equal_numbers_and_ties_stay_together():
     assert reliability(judged)[0][0] == pytest.approx(0.15)
 
 
-def test_exact_probabilities_differ_from_the_shares_as_the_binomial_distribution_says():
+def test_exact_probabilities_differ_from_the_shares_by_the_binomial_distribution():
     """One group of 25 answers stated with 0.8: 2.5 and 97.5 % points of |k/25 - 0.8|, k binomial."""
     results = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": 0.8}])) for _ in range(25)]
     k = np.arange(26)
@@ -362,19 +362,19 @@ def test_probabilities_are_compared_for_each_kind_of_answer():
     assert by_answer(results) == {"none": (pytest.approx(0.7), 1, 2), "one name": (pytest.approx(0.9), 1, 2)}
 
 
-def test_an_oracle_by_another_tool_is_refused(tmp_path):
+def test_an_oracle_by_another_tool_is_rejected(tmp_path):
     """Its fits and the tool's would be compared, and are those of two engines."""
     held = {"tool_sha256": "a" * 64, "commit_sha256": "b" * 64}
-    told = held | {"asked": ["s0", "s1"], "fits": {"s0": {"before": 20.0, "oracle": 30.0}, "s1": {"error": "no"}}}
+    oracle = held | {"asked": ["s0", "s1"], "fits": {"s0": {"before": 20.0, "oracle": 30.0}, "s1": {"error": "no"}}}
     (tmp_path / "diagnosis.json").write_text(json.dumps(held))
-    (tmp_path / "oracle.json").write_text(json.dumps(told))
+    (tmp_path / "oracle.json").write_text(json.dumps(oracle))
     assert read_oracle(tmp_path) == {"s0": (20.0, 30.0)}
     assert oracle_text(tmp_path) == [
         "Oracle: 2 of 2 clear singles asked, in the order of their ids, 1 without an answer (s1: no)."
     ]
-    (tmp_path / "oracle.json").write_text(json.dumps(told | {"asked": ["s0", "s1", "s2"]}))
+    (tmp_path / "oracle.json").write_text(json.dumps(oracle | {"asked": ["s0", "s1", "s2"]}))
     assert "2 of 3 clear singles asked, in the order of their ids (1 not yet), 1 without" in oracle_text(tmp_path)[0]
-    (tmp_path / "oracle.json").write_text(json.dumps(told | {"tool_sha256": "c" * 64}))
+    (tmp_path / "oracle.json").write_text(json.dumps(oracle | {"tool_sha256": "c" * 64}))
     with pytest.raises(BlindError, match="Ask the oracle with that tool"):
         read_oracle(tmp_path)
 

@@ -90,7 +90,7 @@ def test_a_user_of_the_project_can_read_the_case(made):
 
 
 def test_names_sizes_and_times_carry_no_label(made):
-    """Two cases differ in nothing that a listing shows but their id and which middle section was not struck."""
+    """Two cases differ in nothing that a listing shows but their id and which middle section has no impacts."""
     listings = []
     for case in cases(made[0]):
         files = [p for p in sorted(case.rglob("*.npz"))]
@@ -379,7 +379,7 @@ def test_sets_are_pooled_and_none_counts_twice(scored, tmp_path):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_kept_set_is_small_and_says_all(scored, tmp_path):
+def test_an_archived_set_is_small_and_complete(scored, tmp_path):
     path = write_archive(scored, tmp_path / "kept")
     assert path.stat().st_size < 20e3
     held = read_archive(tmp_path / "kept")
@@ -392,13 +392,13 @@ def test_a_kept_set_is_small_and_says_all(scored, tmp_path):
             verify_archive({**held, "truths": {**held["truths"], case: json.dumps(spoilt)}})
 
 
-def test_a_kind_that_is_not_there_is_refused_before_anything_is_made(tmp_path):
+def test_an_unknown_kind_is_rejected_before_anything_is_written(tmp_path):
     with pytest.raises(BlindError, match=r"--only, vod: no such kind\. There are ballast"):
         make_set(tmp_path / "set", tmp_path / "truth", 1, only={"vod", "pad"})
     assert not list(tmp_path.iterdir())
 
 
-def test_what_was_said_of_a_wheel_or_a_second_place_is_on_the_map():
+def test_findings_at_a_wheel_or_a_second_position_are_on_the_map():
     """What has no place is written with its wheel, and every name of a finding is drawn, not the first alone."""
     figure, axis = pyplot().subplots()
     truth = {"effects": [{"kind": "flat", "where": {"train": "railcar", "axle": 2}}], "sensors": {"A1": 2.0}}

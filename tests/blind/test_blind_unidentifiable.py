@@ -33,7 +33,7 @@ def concealed(kind, rung=-1, seed=3):
     return site, world, drawn
 
 
-def roll_apart(site, world, other_site, other_world, k=0):
+def passage_difference(site, world, other_site, other_world, k=0):
     """Share [%] of a passage's response by which two worlds differ."""
     shown = [
         _sensor_signals(s, w, passage_motion(s, w, k, np.random.default_rng(k)), "passage", [1])
@@ -42,8 +42,8 @@ def roll_apart(site, world, other_site, other_world, k=0):
     return _relative_difference(*shown, PASSAGE_BAND, PASSAGE_DECIMATION)
 
 
-def strike_apart(site, world, other):
-    """The same of an impact at each place."""
+def impact_difference(site, world, other):
+    """The same of an impact at each position."""
     return _relative_difference(_impact_signals(site, other, [1]), _impact_signals(site, world, [1]), HAMMER_BAND, 3)
 
 
@@ -57,9 +57,9 @@ def test_pads_softened_by_warmth_are_soft_pads_where_it_is_always_warm():
     rival = site.world.copy()
     warm = np.mean(site.temperatures) - rival.reference
     rival.pad = rival.pad * np.exp(-drawn.parameters["coefficient"] * warm)
-    assert strike_apart(site, world, rival) < HIDDEN
-    assert roll_apart(site, world, site, rival) < HIDDEN
-    assert strike_apart(site, world, site.world) > HIDDEN  # it is there to be seen, if not to be told
+    assert impact_difference(site, world, rival) < HIDDEN
+    assert passage_difference(site, world, site, rival) < HIDDEN
+    assert impact_difference(site, world, site.world) > HIDDEN  # recordings show it, but do not identify it
 
 
 def test_a_gap_that_never_closes_is_no_ballast_at_all():
@@ -67,8 +67,8 @@ def test_a_gap_that_never_closes_is_no_ballast_at_all():
     rival = site.world.copy()
     rival.ballast[drawn.where["sleeper"]] = rival.ballast_damping[drawn.where["sleeper"]] = 0.0
     loaded = next(k for k, p in enumerate(site.passages) if p.train == "loaded")
-    assert roll_apart(site, world, site, rival, loaded) == pytest.approx(0.0, abs=1e-6)
-    assert strike_apart(site, world, rival) == pytest.approx(0.0, abs=1e-6)
+    assert passage_difference(site, world, site, rival, loaded) == pytest.approx(0.0, abs=1e-6)
+    assert impact_difference(site, world, rival) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_channels_all_too_sensitive_are_heavier_trains_on_rougher_rails():
@@ -82,11 +82,11 @@ def test_channels_all_too_sensitive_are_heavier_trains_on_rougher_rails():
     trains = {n: Train(t.name, tuple(map(heavier, t.cars)), t.radius, t.contact) for n, t in site.true_trains.items()}
     rough = {k: (lambda *a, f=f: gain * f(*a)) for k, f in site.roughness.items()}
     other = replace(site, true_trains=trains, roughness=rough)
-    assert roll_apart(site, world, other, site.world) < HIDDEN
-    assert roll_apart(site, world, site, site.world) > 2.0 * HIDDEN
+    assert passage_difference(site, world, other, site.world) < HIDDEN
+    assert passage_difference(site, world, site, site.world) > 2.0 * HIDDEN
 
 
-def test_a_pad_out_of_earshot_is_nothing_at_all():
+def test_a_pad_beyond_the_reach_of_all_sensors_is_not_observable():
     site, world, _ = concealed("beyond_reach")
-    assert strike_apart(site, world, site.world) < HIDDEN
-    assert roll_apart(site, world, site, site.world) < HIDDEN
+    assert impact_difference(site, world, site.world) < HIDDEN
+    assert passage_difference(site, world, site, site.world) < HIDDEN

@@ -28,7 +28,7 @@ def test_every_kind_with_a_right_name_belongs_to_that_effect():
             assert kind in library()[name].kinds
 
 
-def test_relatives_are_mutual_and_are_laws_of_one_component_or_part():
+def test_relatives_are_mutual_and_are_effects_of_one_component_or_part():
     relatives = {name: set(effect.relatives) for name, effect in library().items()}
     assert all(name in relatives[other] and name != other for name, others in relatives.items() for other in others)
     assert relatives["hanging_sleeper"] == {"local_ballast", "ballast_hardening"}

@@ -59,7 +59,7 @@ def test_derivatives_are_those_of_any_case(beam, terms):
 
 
 @pytest.mark.slow
-def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
+def test_what_was_left_out_is_named_or_answered_unknown(shared_data):
     if not (shared_data / "frf_beam_sdypy").is_dir():
         pytest.skip(f"no recordings: {shared_data}/frf_beam_sdypy does not exist")
     found = real_frfs.analyse(shared_data, ("A1", "A2", "A3", "A4", "B1", "B2"))
@@ -77,7 +77,7 @@ def test_what_was_left_out_is_found_or_said_to_be_unknown(shared_data):
     assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
     size, half, above = real_frfs.beam_printed()  # by six frequencies, three of which lie beyond the fitted band
     assert beam.verdict.scores[0].estimates[0][0] == pytest.approx(size, abs=half)
-    assert above > 0.01  # what no law of the library holds: so B, not A
+    assert above > 0.01  # what no effect of the library describes: so B, not A
     assert beam.verification.after > beam.verification.before + 10.0
     assert said["B1"] == ("named", ("impact_gain",))
     assert found["B1"][2].fit.terms[0].where == "impact 1"

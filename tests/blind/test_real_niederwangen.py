@@ -73,7 +73,7 @@ def test_the_conclusions_and_their_page_come_out_again(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_change_of_pads_would_have_been_told_from_one_of_the_rail(folder):
+def test_a_change_of_pads_would_have_been_distinguished_from_one_of_the_rail(folder):
     """S2's own numbers with the model's factor of another change in them: the right name, and no absorber."""
     quiet = next(m for m in niederwangen.read(folder) if m.section == "S2")
     priors = niederwangen.calibrate(quiet)

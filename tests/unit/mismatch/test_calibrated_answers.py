@@ -99,7 +99,7 @@ def test_softer_ballast_that_trains_feel_less_is_a_hanging_sleeper():
 
 @pytest.mark.parametrize("kind", [0, 1])
 @pytest.mark.parametrize("seed", range(5))
-def test_impacts_alone_or_trains_alone_do_not_tell_a_gap_from_soft_ballast(kind, seed):
+def test_impacts_alone_or_trains_alone_do_not_distinguish_a_gap_from_soft_ballast(kind, seed):
     visits = histories(np.random.default_rng(seed), 4, step("ballast@1.20", -1.6, 2))
     alone = [replace(v, groups=v.groups[kind : kind + 1]) for v in visits]
     before = [replace(v, groups=v.groups[: 2 - (v.time >= 2 * STEP)]) for v in visits]  # trains before the change only
@@ -111,7 +111,7 @@ def test_impacts_alone_or_trains_alone_do_not_tell_a_gap_from_soft_ballast(kind,
 @pytest.mark.parametrize(
     ("trains_feel", "names"), [(1.0, ("local_ballast", "hanging_sleeper")), (0.0, ("hanging_sleeper",))]
 )
-def test_trains_tell_only_a_gap_that_they_close_from_soft_ballast(trains_feel, names):
+def test_trains_distinguish_only_a_gap_that_they_close_from_soft_ballast(trains_feel, names):
     """Beside a gap that no train closes, the rest of the bed is soft under impacts and trains alike."""
     answers = [
         last_answers(histories(np.random.default_rng(s), 4, step("ballast@1.20", -1.6, 2), trains_feel))["change"]
@@ -120,14 +120,14 @@ def test_trains_tell_only_a_gap_that_they_close_from_soft_ballast(trains_feel, n
     assert [a.names for a in answers] == [names] * 10
 
 
-def test_trains_of_some_visits_tell_a_gap_and_leave_the_evidence_of_the_impacts():
+def test_trains_of_some_visits_identify_a_gap_and_leave_the_evidence_of_the_impacts():
     visits = histories(np.random.default_rng(7), 6, step("ballast@1.20", -1.6, 3), trains_feel=0.0)
     impacts = [replace(v, groups=v.groups[:1]) for v in visits]
     ends = [v if k in (0, 5) else i for k, (v, i) in enumerate(zip(visits, impacts))]
     alone = change_answer(PARAMETERS, impacts, [], CANDIDATES, 12.0, 6.0, True)
-    told = change_answer(PARAMETERS, impacts, [], CANDIDATES, 12.0, 6.0, True, (PARAMETERS, ends))
-    assert (alone.names, told.names) == (SOFT_OR_GAP, ("hanging_sleeper",))
-    assert told.gain == alone.gain and (told.size, told.onset) == (alone.size, alone.onset)
+    with_trains = change_answer(PARAMETERS, impacts, [], CANDIDATES, 12.0, 6.0, True, (PARAMETERS, ends))
+    assert (alone.names, with_trains.names) == (SOFT_OR_GAP, ("hanging_sleeper",))
+    assert with_trains.gain == alone.gain and (with_trains.size, with_trains.onset) == (alone.size, alone.onset)
 
 
 def test_a_change_is_as_probable_where_the_file_is_unsure():
@@ -139,7 +139,7 @@ def test_a_change_is_as_probable_where_the_file_is_unsure():
     assert {c.sd for c in stretch_candidates(unsure)} == {0.5}
 
 
-def test_trains_that_say_little_of_the_support_do_not_decide():
+def test_trains_with_little_information_on_the_support_do_not_decide():
     visits = []
     for v in histories(np.random.default_rng(1), 4, step("ballast@1.20", -1.6, 2)):
         trains = replace(v.groups[1], matrix=1e-6 * v.groups[1].matrix, vector=1e-6 * v.groups[1].vector)
@@ -334,7 +334,7 @@ def test_a_nose_certainly_twice_as_deep_as_in_the_file_is_a_finding_with_its_pos
         assert answer["file"].size == pytest.approx(size, abs=2.0 * answer["file"].sd)
 
 
-def test_a_spring_that_changes_with_its_damper_is_named_and_nothing_is_told_of_outer_supports():
+def test_a_spring_that_changes_with_its_damper_is_named_and_outer_supports_have_no_finding():
     """Data see the sum of spring and damper best: without the pair, the damper is the better explanation."""
     pad = StateParameter("pad@1.20", 0.0, 0.1, 0.02, "pad", 2, 1.2)
     damper = StateParameter("pad_damper@1.20", 0.0, 0.15, 0.04, "pad_damper", 2, 1.2)
@@ -528,7 +528,7 @@ def test_an_alarm_on_an_intact_history_gets_no_name():
     assert named <= 3  # 0.5 expected at most, Poisson: more than 3 with a probability of 0.2 %
 
 
-def test_a_gap_of_several_sleepers_is_told_from_soft_ballast_by_trains():
+def test_trains_distinguish_a_gap_of_several_sleepers_from_soft_ballast():
     change = sum(step(f"ballast@{x:.2f}", 1.0, 0)(0) for x in (0.6, 1.2, 1.8))
     for trains_feel, names in ((1.0, ("local_ballast", "hanging_sleeper")), (0.0, ("hanging_sleeper",))):
         visits = histories(np.random.default_rng(7), 6, lambda v: -1.0 * (v >= 3) * change, trains_feel)

@@ -126,7 +126,7 @@ def test_without_change_no_effect_has_evidence():
     assert np.mean(np.array(gains) > 2.0) < 0.05
 
 
-def test_slow_growth_that_the_random_walk_follows_is_told_by_the_drift():
+def test_slow_growth_that_the_random_walk_follows_is_detected_by_the_drift():
     """Growth of 0.16 a year: the belief expects each visit, and the drift of three years is beyond 3 sd."""
     rng = np.random.default_rng(5)
     detected, unexpected, sizes = 0, 0, []

@@ -96,7 +96,7 @@ def test_what_trains_alone_feel_is_named_with_its_size_and_onset(names, effect, 
     assert answer.onset == (0.5, 1.0)
 
 
-def test_of_the_first_visit_on_nothing_is_said():
+def test_the_first_visit_has_no_finding():
     """An error of the model is the same in all trains and not in impacts: only a change of it is evidence."""
     answer = answers(history(np.random.default_rng(3), 0.6 * unit("pad_stiffness"), first=0))
     assert answer["change"].verdict == "none" and answer["file"].names != ("pad_preload",)
@@ -127,7 +127,7 @@ def test_intact_histories_have_no_evidence_of_it():
 
 
 def test_a_gain_that_no_effect_of_the_library_explains_is_no_pad_under_load():
-    """Trains hear it as a pad as well, impacts do not: the best effect leaves a change of impacts, so it is unknown."""
+    """Trains show it as a pad as well, impacts do not: the best effect leaves a change of impacts, so it is unknown."""
     visits = history(np.random.default_rng(7), 0.0, gained=unit("gain_A1"))
     alike = [replace(v, groups=(v.groups[0], as_pad(v.groups[1], "gain_A1", "pad@0.60"))) for v in visits]
     answer = answers(alike, candidates_under_load(PARAMETERS))["change"]

@@ -26,7 +26,7 @@ def case_of(kind, law, amount, **options):
 @pytest.mark.parametrize(
     ("kind", "law", "amount", "power"), [("forced", "quadratic_drag", 0.3, 1), ("free", "dry_friction", 0.01, -1)]
 )
-def test_the_concealed_law_is_named_with_its_size(kind, law, amount, power):
+def test_the_concealed_effect_is_named_with_its_size(kind, law, amount, power):
     case = case_of(kind, law, amount)
     found = diagnose(case)
     assert (found.verdict.answer, found.names, found.verdict.grade) == ("named", (law,), "A")
@@ -37,11 +37,11 @@ def test_the_concealed_law_is_named_with_its_size(kind, law, amount, power):
 
 
 @pytest.mark.parametrize("kind", ["forced", "free"])
-def test_a_system_without_a_concealed_law_has_no_finding(kind):
+def test_a_system_without_a_concealed_effect_has_no_finding(kind):
     assert diagnose(case_of(kind, "", 0.0)).verdict.answer == "none"
 
 
-def test_a_law_that_is_not_in_the_library_gets_no_other_name():
+def test_an_effect_that_is_not_in_the_library_gets_no_other_name():
     found = diagnose(case_of("free", "dry_friction", 0.03, without=("dry_friction",)))
     assert found.verdict.answer == "unknown"
 

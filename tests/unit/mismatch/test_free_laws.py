@@ -1,4 +1,4 @@
-"""Laws that are in no library: a name beside which a free law still explains held-out recordings is withdrawn."""
+"""Effects that are in no library: a name beside which a free law still explains held-out data is withdrawn."""
 
 import numpy as np
 import pytest
@@ -54,13 +54,13 @@ def verdicts(made, tolerance=0.02):
 
 
 @pytest.mark.parametrize(("seed", "tolerance"), [(3, 0.02), (1, 0.05)])
-def test_microslip_that_no_lumped_law_describes_has_no_name(seed, tolerance):
+def test_microslip_that_no_lumped_effect_describes_has_no_name(seed, tolerance):
     (verdict, *_) = verdicts(records(seed, microslip), tolerance)
     assert verdict.answer == "unknown" and "free_law_predicts_better" in verdict.trail
 
 
 @pytest.mark.parametrize(("law", "amount"), [("quadratic_drag", 1.0)])
-def test_a_law_of_the_library_keeps_its_name(law, amount):
+def test_an_effect_of_the_library_keeps_its_name(law, amount):
     index, scale = np.array([LAWS[law][0]]), 12.0 / OMEGA**2
 
     def response(u):

@@ -42,7 +42,7 @@ def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_sur
     assert spreads["cast_mass_0"] == dict((n, e) for n, _, e in CASTING_SDS)["cast_mass"] > spreads["cast_mass_3"]
 
 
-def test_a_piece_is_told_by_its_position(zone):
+def test_the_meaning_of_a_piece_states_its_position(zone):
     meanings = {n.name: n.meaning for n in track_nuisances(zone, ())}
     assert meanings["cast_mass_0"] == "ln mass of the rail from 22.7 to 23.0 m"
     assert meanings["cast_bending_3"] == "ln bending stiffness of the rail from 24.2 to 25.2 m"
@@ -85,7 +85,7 @@ def test_without_any_change_the_track_is_that_of_the_file(ends):
     assert covered @ np.diff(node) == pytest.approx(sum(c.piece.end - c.piece.start for c in zone.castings))
 
 
-def test_castings_are_those_of_the_track_that_blows_are_modelled_on():
+def test_castings_are_those_of_the_track_on_which_impacts_are_modelled():
     cast = TRACK.with_(stretches=(NOSE,))
     turnout = replace(PLAN.turnout, track=TRACK, tracks={"diverging": TRACK, "main": cast})
     assert zone_of(turnout, [21.0, 27.3]).castings

@@ -1,4 +1,4 @@
-"""Ceilings of channels: peaks that follow the trains, peaks that stay, peaks of which only the loud ones stay."""
+"""Limits of channels: peaks that follow the trains, peaks that stay, peaks of which only the largest stay."""
 
 from types import SimpleNamespace
 
@@ -9,49 +9,49 @@ from turnout.mismatch.turnout.priors import SATURATION
 from turnout.mismatch.turnout.saturation import saturated_channels, saturation_gain
 from turnout.records import Channel, Recording
 
-LOUD = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
+PEAKS = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
 SCATTER = 0.1 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
 
 
 def test_peaks_that_stay_gain_the_logarithm_of_the_scatter_they_lack():
-    gain = saturation_gain(np.full(6, np.log(8.0)), LOUD)
+    gain = saturation_gain(np.full(6, np.log(8.0)), PEAKS)
     assert np.isclose(
-        gain, 3.0 * np.log(1.0 + np.var(LOUD) / SATURATION.scatter_floor**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
+        gain, 3.0 * np.log(1.0 + np.var(PEAKS) / SATURATION.scatter_floor**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
     )
 
 
 def test_peaks_that_follow_the_trains_gain_nothing():
-    assert saturation_gain(LOUD - 0.7 + SCATTER, LOUD) < 2.0
+    assert saturation_gain(PEAKS - 0.7 + SCATTER, PEAKS) < 2.0
 
 
-def test_only_the_loud_passages_may_reach_the_ceiling():
-    peaks = np.minimum(np.log(90.0), LOUD + 0.01 * SCATTER)
-    assert saturation_gain(peaks, LOUD) > 12.0
-    # the quiet ones alone are at no ceiling; whatever is flat gains something over what follows
-    assert saturation_gain(peaks[::-1], LOUD) < 0.5 * saturation_gain(peaks, LOUD)
+def test_only_the_strong_passages_may_reach_the_limit():
+    peaks = np.minimum(np.log(90.0), PEAKS + 0.01 * SCATTER)
+    assert saturation_gain(peaks, PEAKS) > 12.0
+    # the quiet ones alone are at no limit; whatever is flat gains something over what follows
+    assert saturation_gain(peaks[::-1], PEAKS) < 0.5 * saturation_gain(peaks, PEAKS)
 
 
 @pytest.mark.parametrize("limit, found", [(None, ["A1"]), (1000.0, ["A1"]), (90.0, [])])
 def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, found):
     """Two of six passages stay below 90 m/s², where A1 ends: a fault, unless that is the range stated."""
 
-    def passage(loud):
-        peaks = np.array([min(loud, 90.0), 1.3 * loud, 0.8 * loud])
+    def passage(peak):
+        peaks = np.array([min(peak, 90.0), 1.3 * peak, 0.8 * peak])
         samples = peaks[:, None] * np.sin(np.linspace(0.0, 50.0, 1001))
         named = ("A1", "A2", "A3")
         channels = tuple(Channel(n, "acceleration", "m/s²", limit=limit if n == "A1" else None) for n in named)
         return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
 
     sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
-    campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[passage(np.exp(loud)) for loud in LOUD])
+    campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[passage(np.exp(peak)) for peak in PEAKS])
     assert list(saturated_channels(campaign, 12.0)) == found
 
 
-def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
-    """Three passages bang once, alike for A1, which shows five times as much there as where it spends its time."""
+def test_impacts_of_a_flat_that_one_channel_shows_less_are_no_limit():
+    """Three passages have one impact each, alike for A1: five times what it shows for the rest of the time."""
     quiet, others = np.array([66.0, 64.0, 70.0, 68.0, 73.0]), np.array([46.0, 45.0, 49.0, 48.0, 51.0])
-    bangs, heard = np.array([302.0, 312.0, 320.0]), np.array([400.0, 460.0, 480.0])
-    assert saturation_gain(np.log([*quiet, *bangs]), np.log([*others, *heard])) > 12.0 + np.log(3.0)
+    limited, larger = np.array([302.0, 312.0, 320.0]), np.array([400.0, 460.0, 480.0])
+    assert saturation_gain(np.log([*quiet, *limited]), np.log([*others, *larger])) > 12.0 + np.log(3.0)
 
     def passage(mine, theirs, rolled):
         samples = np.outer([rolled[0], rolled[1], rolled[1]], np.sin(np.linspace(0.0, 50.0, 1001)))
@@ -61,5 +61,6 @@ def test_bangs_of_a_flat_that_one_channel_hears_less_are_no_ceiling():
 
     sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
     rolling = [passage(a, b, (a, b)) for a, b in zip(quiet, others, strict=True)]
-    banging = [passage(a, b, (66.0, 46.0)) for a, b in zip(bangs, heard, strict=True)]
-    assert saturated_channels(SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *banging]), 12.0) == {}
+    with_impact = [passage(a, b, (66.0, 46.0)) for a, b in zip(limited, larger, strict=True)]
+    campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *with_impact])
+    assert saturated_channels(campaign, 12.0) == {}

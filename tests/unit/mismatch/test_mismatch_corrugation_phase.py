@@ -83,7 +83,7 @@ def test_on_intact_rail_the_best_phase_less_its_price_is_rarely_evidence():
     assert np.mean(ratios) < 2.0 and np.mean(np.array(ratios) > np.exp(3.0)) <= 0.05
 
 
-def test_a_candidate_of_the_level_starts_in_phase_and_promises_what_the_band_holds_of_it():
+def test_a_candidate_of_the_level_starts_in_phase_and_expects_the_evidence_in_its_band():
     """It competes with corrugation that the free waves alone suggest, whose promise is that of the band."""
     true = physics.RailCorrugation(20.5, 27.0, 1.5e-5, -2.5e-5, LENGTH)
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (true,), 7))

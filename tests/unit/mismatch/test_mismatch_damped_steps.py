@@ -43,7 +43,7 @@ def test_after_a_failure_a_step_that_would_end_the_fit_is_not_tried_again(slope)
     assert trials(slope, 0.26) == 1
 
 
-def test_a_step_that_promises_more_is_tried_with_rising_damping():
+def test_a_step_with_a_larger_predicted_gain_is_tried_with_rising_damping():
     """Each damping is six times the last, until a trial fails that promised less: 0.25 (1 + 2 d) / (1 + d)²."""
     least = 0.2
     promises = [0.25 * (1.0 + 2.0 * d) / (1.0 + d) ** 2 for d in (0.0, *(0.01 * 6.0**k for k in range(7)))]

@@ -64,11 +64,11 @@ def test_a_start_from_afar_that_gains_nothing_is_not_refitted():
     assert shortlist(Search(case), fit_jointly(case)) == []
 
 
-def test_only_trains_that_leave_more_than_sound_ones_are_simulated():
+def test_only_trains_with_more_residual_than_intact_ones_are_simulated():
     """Weighted mean squares of 2 and 0.5, where intact turnouts leave 0.7; a hammer test leaves more and is no
     train."""
-    names = {"loud 1": "a", "loud 2": "a", "quiet": "b", "blows": None}
-    rms = {"loud 1": 1.0, "loud 2": np.sqrt(3.0), "quiet": np.sqrt(0.5), "blows": 9.0}
+    names = {"rough 1": "a", "rough 2": "a", "quiet": "b", "impacts": None}
+    rms = {"rough 1": 1.0, "rough 2": np.sqrt(3.0), "quiet": np.sqrt(0.5), "impacts": 9.0}
     seen = [Observation(n, n, np.zeros(40), np.ones(40), effective=0.5) for n in names]
     case = SimpleNamespace(
         observations=seen, control_level={"passage": 0.7},

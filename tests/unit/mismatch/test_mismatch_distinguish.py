@@ -33,7 +33,7 @@ def test_an_effect_explains_itself_and_no_explanation_beats_it(one_warm_day):
 
 
 @pytest.mark.slow
-def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_are_not(one_warm_day):
+def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_do(one_warm_day):
     from dataclasses import replace
 
     plan = small_plan((15.0,), speeds=(40.0,))
@@ -59,6 +59,6 @@ def test_passages_below_160_hz_are_blind_to_frequency_dependent_pads_and_blows_a
         ),
     ],
 )
-def test_a_plan_that_can_show_nothing_is_refused_in_a_sentence(more, said, capsys):
+def test_a_plan_that_can_show_nothing_is_rejected_in_a_sentence(more, said, capsys):
     assert main(["distinguish", "--sensors", "23.4", *more]) == 2
     assert said in capsys.readouterr().err

@@ -44,7 +44,7 @@ def test_a_slow_train_that_is_never_far_away_is_no_other_source():
     assert found([passage_of(f"p{k}", rng, v) for k, v in enumerate(speeds)]) == []
 
 
-def test_a_train_with_rough_wheels_is_louder_at_every_distance_and_no_other_source():
+def test_a_train_with_rough_wheels_has_a_higher_level_at_every_distance_and_is_no_other_source():
     rng = np.random.default_rng(2)
     passages = [passage_of(f"p{k}", rng, 25.0, roughness=6.0 if k == 3 else 1.0) for k in range(6)]
     assert found(passages) == []
@@ -78,7 +78,7 @@ def test_a_train_that_may_be_longer_by_a_car_is_compared_behind_that_car():
     assert all(e.when == "before" for e in found(passages, [longer]))
 
 
-def test_one_passage_that_is_louder_after_its_train_shows_no_source_of_its_own():
+def test_one_passage_with_a_higher_level_after_its_train_shows_no_source_of_its_own():
     def event(when, excess, train="ic3", name="p1"):
         return Disturbance(name, when, excess, 1e-9, train)
 

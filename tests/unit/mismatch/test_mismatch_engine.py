@@ -179,7 +179,7 @@ def test_errors_of_another_generator_are_no_effect_where_they_are_integrated_out
     assert known.count("none") == 8
 
 
-def test_whitening_gives_unit_variance_to_what_it_was_told_of():
+def test_whitening_gives_unit_variance_to_the_modelled_noise():
     rng = np.random.default_rng(3)
     modes = rng.normal(size=(40, 5))
     o = Observation("a", "a", np.zeros(40), 0.3, modes=modes)
@@ -208,7 +208,7 @@ class Offset(Line):
 
 
 def test_a_nuisance_that_is_missing_comes_back_as_physics_and_is_none_where_it_is_known():
-    """Finding: an offset forgotten in the model is a bent law; with the offset free nothing is missing."""
+    """Finding: an offset forgotten in the model is a curved effect; with the offset free nothing is missing."""
     forgotten = [diagnose(Offset(seed, known=False)) for seed in range(6)]
     known = [diagnose(Offset(seed, known=True)).verdict.answer for seed in range(6)]
     best = [max(d.scores, key=lambda s: s.gain) for d in forgotten]
@@ -216,7 +216,7 @@ def test_a_nuisance_that_is_missing_comes_back_as_physics_and_is_none_where_it_i
     assert known == ["none"] * 6
 
 
-def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
+def test_two_effects_that_agree_on_one_condition_are_distinguished_by_another():
     """Finding: what is left out must differ in condition. x|x| follows x³ on one reach with another slope; on further
     reaches it cannot, although neither data nor noise are more."""
 
@@ -226,7 +226,7 @@ def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
         case.x = {f"part {k}": np.linspace(-r, r, 60) for k, r in enumerate(reaches)}
         data = {n: x + 0.1 * x**3 + 0.08 * rng.normal(size=x.size) for n, x in case.x.items()}
         case.observations, case.reserved = tuple(Observation(n, n, y, 0.08) for n, y in data.items()), ()
-        parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "share of a law", "made up 2026")
+        parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "share of an effect", "made up 2026")
         square = Candidate.of("signed_square", (parameter,), lambda psi: ("square", psi["amount"]), ((0.3,),))
         case.candidates = (*case.candidates, square)
         law = {3: lambda x: x**3, "square": lambda x: x * np.abs(x)}
@@ -243,7 +243,7 @@ def test_two_laws_that_agree_on_one_condition_are_told_apart_by_another():
     assert min(other) > asked
 
 
-def test_a_size_errs_by_the_share_its_law_is_loose_as_well():
+def test_the_error_of_a_size_includes_the_model_error_of_its_effect():
     case = Line(lambda x: x + 0.4 * x**2)
     strict = case.candidates[0]
     fit = fit_jointly(case, (strict,), np.array([0.3]))

@@ -25,22 +25,22 @@ WAVE = np.sin(9.0 * X)
 
 
 class Brittle(Case):
-    """A wave of 1.2 in three recordings and in one that is kept back; ``refuses`` (terms, observations) or not."""
+    """A wave of 1.2 in three recordings and in one that is held out; ``is_divergent`` (terms, observations) raises."""
 
-    def __init__(self, refuses):
-        rng, self.refuses = np.random.default_rng(5), refuses
+    def __init__(self, is_divergent):
+        rng, self.is_divergent = np.random.default_rng(5), is_divergent
         found = [Observation(f"o{k}", f"day {k}", 1.2 * WAVE + 0.1 * rng.normal(size=X.size), 0.1) for k in range(4)]
         self.observations, self.reserved = tuple(found[:3]), tuple(found[3:])
         self.candidates = (Candidate.of("wave", AMOUNT, lambda p: p["amount"], ((0.5,),)),)
 
     def predict(self, values, terms, observations):
-        if self.refuses(terms, observations):
+        if self.is_divergent(terms, observations):
             raise SimulationError("Newton's iteration did not converge")
         return [sum(terms) * WAVE for _ in observations]
 
 
-def test_a_name_that_cannot_be_simulated_on_what_was_kept_back_is_not_given():
-    """Without the fault it is named, and the fit after it is told."""
+def test_a_name_that_cannot_be_simulated_on_what_was_held_out_is_not_given():
+    """Without the fault it is named, and the fit after it is stated."""
     sound = diagnose(Brittle(lambda terms, observations: False))
     assert sound.names == ("wave",) and sound.verification.after > 80.0
     found = diagnose(Brittle(lambda terms, observations: bool(terms) and observations[0].name == "o3"))
@@ -48,7 +48,7 @@ def test_a_name_that_cannot_be_simulated_on_what_was_kept_back_is_not_given():
     assert found.verification.n == 1
 
 
-def test_where_nothing_kept_back_can_be_simulated_the_others_speak():
+def test_where_no_held_out_recording_can_be_simulated_the_others_decide():
     found = diagnose(Brittle(lambda terms, observations: observations[0].name == "o3"))
     assert found.names == ("wave",)
     assert np.isnan(found.verification.before) and found.verification.after is None
@@ -77,7 +77,7 @@ def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made(
     assert found.values["amount"] == pytest.approx(1.2, abs=0.05)  # five standard errors
 
 
-def test_a_train_of_two_lengths_is_refused():
+def test_a_train_of_two_lengths_is_rejected():
     """Wheels are counted from the front: the ninth of eight is no wheel."""
     long, short = (PassageInput(f"p{n}", None, SimpleNamespace(wheels=range(n)), 20.0, "freight") for n in (12, 8))
     with pytest.raises(SimulationError, match="'freight' has 12 and 8 wheels"):
@@ -101,7 +101,7 @@ def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used(mon
     assert names - {first.name} >= set(case.aligned_passages) and len(case.aligned_passages) > 2
 
 
-def test_wheels_that_were_never_heard_are_not_called_polygonal():
+def test_wheels_in_no_fitted_recording_are_not_called_polygonal():
     """No slot of theirs was recorded; a recording too slow for short waves has no bin for them either."""
     nothing = SimpleNamespace(level=np.full((2, 4, 60), np.nan))
     z, apart = wheel_excess([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))

@@ -1,4 +1,4 @@
-"""Frames of a residual: which level stands out of those that sound recordings differ by anyway."""
+"""Frames of a residual: which level stands out of those by which intact recordings differ."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ OF_A_ROW = {"place_low_m": 2.4, "place_high_m": 8.7, "wheel_within_m": None, "ev
             "n_hammer_tests": 6, "n_passages": 8, "n_sensors": 4}  # fmt: skip
 
 
-def test_a_loud_train_is_found_though_each_of_its_axles_is_a_frame_of_its_own():
+def test_a_train_of_high_level_is_found_though_each_of_its_axles_is_a_frame_of_its_own():
     """Two nepers of log energy are 8.7 dB; 36 cells of each train err by 0.5 / 6 neper, 0.4 dB."""
     rng, trains = np.random.default_rng(0), ("ic3", "freight", "railcar", "locomotive")
     cells = [(t, a, s, p) for t in trains for _ in range(2) for a in range(4) for s in "ABC" for p in range(6)]
@@ -44,9 +44,9 @@ USUAL = {
 }  # nepers: 2, 1, 1, 1.5 dB of level
 
 
-def cells_of_passages(seed, **louder):
+def cells_of_passages(seed, **raised):
     """(log energy, labels) of eight passages over four sensors: cells of a sensor, a wheel, a bay, a passage, and of a
-    passage at a sensor share a level of their own; ``louder`` level of a frame: by so many nepers."""
+    passage at a sensor share a level of their own; ``raised`` level of a frame: by so many nepers."""
     rng, sensors = np.random.default_rng(seed), {"A1": 2, "A2": 7, "A3": 12, "A4": 17}
     cells = [
         (name, f"{train}, axle {a}", f"{0.6 * (x + b):.1f}", train, f"{speed} km/h", f"{name} {speed}")
@@ -59,13 +59,13 @@ def cells_of_passages(seed, **louder):
     for name, spread in USUAL.items():
         levels, code = np.unique(labels[name].astype(str), return_inverse=True)
         energy += (spread * rng.normal(size=levels.size))[code]
-    for name, (level, more) in louder.items():
+    for name, (level, more) in raised.items():
         energy += more * (labels[name] == level)
     labels.pop("seen by")
     return energy, labels
 
 
-def test_sound_recordings_have_a_frame_below_five_per_cent_in_five_of_a_hundred():
+def test_intact_recordings_have_a_frame_below_five_per_cent_in_five_of_a_hundred():
     """However alike the cells of a level are: shuffled one by one they had three to five such frames in each."""
     called = sum(any(f.q < 0.05 for f in attribute(*cells_of_passages(seed))) for seed in range(200))
     low, high = binom.interval(0.95, 200, 0.05)
@@ -73,11 +73,11 @@ def test_sound_recordings_have_a_frame_below_five_per_cent_in_five_of_a_hundred(
 
 
 @pytest.mark.parametrize(("frame", "level"), [("place", "6.0"), ("wheel", "railcar, axle 3")])
-def test_a_bay_or_a_wheel_twice_as_loud_as_the_others_stands_out(frame, level):
+def test_a_bay_or_a_wheel_of_twice_the_amplitude_stands_out(frame, level):
     """Twice the amplitude are 1.4 nepers of energy, 6 dB."""
     found = [attribute(*cells_of_passages(seed, **{frame: (level, 1.5)})) for seed in range(25)]
-    told = [next(f for f in frames if f.frame == frame) for frames in found]
-    assert sum(f.q < 0.05 and f.level == level for f in told) >= 18
+    of_frame = [next(f for f in frames if f.frame == frame) for frames in found]
+    assert sum(f.q < 0.05 and f.level == level for f in of_frame) >= 18
 
 
 def diagnosed(answer, candidates, frames):
@@ -91,10 +91,10 @@ def diagnosed(answer, candidates, frames):
     )  # fmt: skip
 
 
-def test_a_row_has_no_place_from_a_frame_of_the_residual():
-    """A law of the whole track is in no sensor, and where nothing is missing there is nothing to be fixed to."""
-    law = physics.PadTemperature
-    warm = Candidate.of("pad_temperature", law.parameters, lambda p: law(**p), (), {}, "condition")
+def test_a_row_has_no_position_from_a_frame_of_the_residual():
+    """An effect of the whole track is in no sensor, and where nothing is missing there is nothing to be fixed to."""
+    effect = physics.PadTemperature
+    warm = Candidate.of("pad_temperature", effect.parameters, lambda p: effect(**p), (), {}, "condition")
     frames = [
         Attribution("sensor", "A2", 1.9, 0.1, 1e-3, 4e-3, 1253),
         Attribution("condition", "73 km/h", 1.0, 0.1, 0.2, 0.3, 1253),

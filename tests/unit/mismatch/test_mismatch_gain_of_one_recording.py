@@ -23,23 +23,24 @@ BUMP = np.sin(np.linspace(0.0, 6.0, 200))
 
 
 class Days(Case):
-    """A bump in three recordings, ``loud`` times as large in each; the second has half as many independent samples."""
+    """A bump in three recordings, ``factors`` times as large in each; the second has half the independent samples."""
 
-    def __init__(self, loud):
-        self.loud = dict(zip("abc", loud))
+    def __init__(self, factors):
+        self.factors = dict(zip("abc", factors))
         self.observations = tuple(
-            Observation(n, n, s * BUMP, np.full(BUMP.size, 0.1), 0.5 if n == "b" else 1.0) for n, s in self.loud.items()
+            Observation(n, n, s * BUMP, np.full(BUMP.size, 0.1), 0.5 if n == "b" else 1.0)
+            for n, s in self.factors.items()
         )
         self.candidates = (Candidate.of("bump", SIZE, lambda p: p["size"], ((0.5,),)),)
 
     def predict(self, values, terms, observations):
-        if not terms and self.loud["c"] < 0.0:
+        if not terms and self.factors["c"] < 0.0:
             raise SimulationError("cannot go without")
-        return [sum(terms) * self.loud[o.name] * BUMP for o in observations]
+        return [sum(terms) * self.factors[o.name] * BUMP for o in observations]
 
 
-def fitted(loud):
-    case = Days(loud)
+def fitted(factors):
+    case = Days(factors)
     return case, fit_jointly(case, case.candidates, [0.5], iterations=20)
 
 
@@ -48,40 +49,40 @@ def test_plainness_is_the_energy_of_the_change():
     size = float(fit.psi[0])
     for name, energy in effect_energy(case, fit, case.candidates[0]).items():
         share = 0.5 if name == "b" else 1.0
-        by_hand = share * np.sum((case.loud[name] * size * BUMP / 0.1) ** 2)
+        by_hand = share * np.sum((case.factors[name] * size * BUMP / 0.1) ** 2)
         assert energy == pytest.approx(by_hand, rel=1e-9)
 
 
 @pytest.mark.parametrize(
-    "loud, gains, alone",
+    "factors, gains, alone",
     [
-        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b has twice the energy, c as much: they keep silent
+        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b has twice the energy, c as much: none in them
         ((1.0, 1.02, 0.72), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b and c show 0.52 of the energy of a
-        ((1.0, 0.98, 0.72), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # b shows 0.48: one witness is none
-        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 12.0}, ""),  # the others bear it out
+        ((1.0, 0.98, 0.72), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # b shows 0.48: one recording does not confirm itself
+        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 12.0}, ""),  # the others confirm it
         ((1.0, 2.0, 1.0), {"a": 11.0, "b": 1.0, "c": -3.0}, ""),  # it does not hang on a, which would not do
         ((1.0, 2.0, 1.0), {}, ""),
-        ((1.0, 2.0, -1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # it cannot be said without
+        ((1.0, 2.0, -1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # it cannot be compared with no effect
     ],
 )
-def test_what_one_recording_says_and_its_like_do_not(loud, gains, alone):
-    case, fit = fitted(loud)
+def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gains, alone):
+    case, fit = fitted(factors)
     assert single_witness(Search(case), fit, case.candidates[0], 25.0, gains) == alone
     of_a_train = replace(case.candidates[0], site=EffectSite({"train": "ic3"}))
     assert single_witness(Search(case), fit, of_a_train, 25.0, gains) == ""
 
 
 @pytest.mark.parametrize(
-    "loud, nats",
+    "factors, nats",
     [
         ((1.0, 0.13, 0.0), 32.0),  # half of 0.13 squared is 0.8 % of the energy: not seen in b, nor in c
         ((1.0, 0.15, 0.0), 30.0),  # 1.1 %: b may hold what the first leaves
         ((1.0, 0.9, 1.0), 0.0),
-        ((1.0, 0.13, -1.0), 0.0),  # it cannot be said without
+        ((1.0, 0.13, -1.0), 0.0),  # it cannot be compared with no effect
     ],
 )
-def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
-    case, fit = fitted(loud)
+def test_recordings_without_the_first_effect_show_the_second(factors, nats):
+    case, fit = fitted(factors)
     gains = {"a": 7.0, "b": 2.0, "c": 30.0}
     assert gain_where_unmasked(case, fit, gains) == nats
     assert gain_where_unmasked(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
@@ -90,7 +91,7 @@ def test_recordings_without_the_first_effect_tell_of_the_second(loud, nats):
 @pytest.mark.parametrize(
     "apart, places, answer", [(12.5, 1, "named"), (11.5, 1, "unknown"), (15.1, 20, "named"), (14.9, 20, "unknown")]
 )
-def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, answer):
+def test_evidence_of_other_recordings_need_not_explain_the_residual_of_the_first_effect(apart, places, answer):
     """A tenth of an excess of twice the control level, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
     candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
@@ -100,15 +101,15 @@ def test_what_others_tell_need_not_explain_what_the_first_left(apart, places, an
     assert ("does not show" in said.reason) == (answer == "named")
 
 
-class Struck(Days):
-    """Two campaigns of impacts at each of these spots [m], and a train."""
+class ImpactCampaigns(Days):
+    """Two campaigns of impacts at each of these positions [m], and a train."""
 
-    def __init__(self, *spots):
+    def __init__(self, *positions):
         super().__init__((1.0, 1.0, 1.0))
-        self.spots = spots
+        self.positions = positions
 
     def hammer_positions(self):
-        return {f"{spot} {year}": spot for spot in self.spots for year in (2025, 2026)}
+        return {f"{position} {year}": position for position in self.positions for year in (2025, 2026)}
 
 
 @pytest.mark.parametrize(
@@ -122,26 +123,26 @@ class Struck(Days):
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 1.9), 36.0, "all impacts at 4.2 m"),  # 33, and 5.9 of the others
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 2.1), 36.0, ""),  # 6.1 of the others: half a name confirms one
         ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all impacts at 4.2 m"),  # 11, half a name, against 2.5
-        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others say half of one
+        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others have half of one
         ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5
-        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train bears it out
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train confirms it
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all impacts at 4.2 m"),  # 15.5 are most of 30
-        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is what nuisances pay
-        ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all impacts at 4.2 m"),  # yet others speak against it by 0.5
+        ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is the penalty of nuisances
+        ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all impacts at 4.2 m"),  # yet others contradict it by 0.5
         ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 12.1), 34.0, ""),  # a train alone is enough, whatever other impacts lose
         ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 11.9), 34.0, "all impacts at 4.2 m"),  # and here it is not
     ],
 )
-def test_blows_at_one_spot_are_one_witness(gains, gain, alone):
-    conditions = [f"{spot} {year}" for spot in (2.1, 4.2, 9.0) for year in (2025, 2026)]
+def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
+    conditions = [f"{position} {year}" for position in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
-    case = Struck(2.1, 4.2, 9.0)
+    case = ImpactCampaigns(2.1, 4.2, 9.0)
     assert single_witness(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
 
 
-def test_of_two_spots_neither_is_the_odd_one():
+def test_of_two_positions_neither_is_the_single_one():
     case, fit = fitted((1.0, 1.0, 1.0))
-    of_two = Struck(2.1, 4.2)
+    of_two = ImpactCampaigns(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
     assert single_witness(Search(of_two), fit, case.candidates[0], 15.0, gains) == ""
 

@@ -31,7 +31,7 @@ def wagon(places):
 
 
 def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
-    """Noise, and bursts of 4 ms when ``wheel`` strikes: less by a fifth in amplitude per metre to the sensor."""
+    """Noise, and bursts of 4 ms when the flat of ``wheel`` meets the rail: less by a fifth per metre to the sensor."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 2.4, 1.0 / RATE)
     samples = rng.normal(size=(len(PLACES), time.size))
@@ -50,14 +50,14 @@ def passage(phase, wheel, name, radius=0.46, strength=30.0, seed=0):
     return SimpleNamespace(name=name, sensors=sensors, reference=reference, speed=SPEED, time=time, passage=run)
 
 
-def scanned(mades):
-    loud = [band_excess(m) for m in mades]
-    return [best_flat_on_wheel(mades, loud, w) for w in range(len(WHEELS))]
+def scanned(passages):
+    excesses = [band_excess(m) for m in passages]
+    return [best_flat_on_wheel(passages, excesses, w) for w in range(len(WHEELS))]
 
 
-def test_a_row_of_blows_names_the_wheel_that_makes_them_its_radius_and_where_it_strikes():
-    mades = [passage(1.1, 1, "a", 0.446, seed=1), passage(2.3, 1, "b", 0.446, seed=2)]
-    found = scanned(mades)
+def test_a_series_of_impacts_identifies_the_wheel_its_radius_and_where_the_flat_meets_the_rail():
+    passages = [passage(1.1, 1, "a", 0.446, seed=1), passage(2.3, 1, "b", 0.446, seed=2)]
+    found = scanned(passages)
     nats = [n for n, *_ in found]
     assert int(np.argmax(nats)) == 1 and nats[1] > 20.0
     _, radius, phases = found[1]
@@ -68,18 +68,18 @@ def test_a_row_of_blows_names_the_wheel_that_makes_them_its_radius_and_where_it_
         assert np.abs(way - [true + k * 2 * np.pi * 0.446 for k in range(4)]).min() < 0.2
 
 
-def test_noise_and_bangs_at_one_place_blame_no_wheel():
+def test_noise_and_impacts_at_one_position_are_no_flat():
     assert max(n for n, *_ in scanned([passage(1.1, 1, "a", strength=0.0, seed=s) for s in (3, 4)])) < 4.0
-    banged = passage(1.1, 1, "a", strength=0.0, seed=5)
-    banged.passage.recording.samples[:, 5000:5020] *= 30.0  # one bang, all sensors
-    assert max(n for n, *_ in scanned([banged])) < 4.0
+    with_impact = passage(1.1, 1, "a", strength=0.0, seed=5)
+    with_impact.passage.recording.samples[:, 5000:5020] *= 30.0  # one impact, all sensors
+    assert max(n for n, *_ in scanned([with_impact])) < 4.0
 
 
-def with_nose(made, place, loud, seed):
-    """The same passage, every wheel banging at ``place`` as loud as ``loud`` says; axles a turn apart in a bogie."""
+def with_nose(made, place, strengths, seed):
+    """The same passage, every wheel with an impact at ``place``; axles a turn apart in a bogie."""
     rng = np.random.default_rng(seed)
     made.passage.vehicle = wagon([0.0, TURN, 10.7, 10.7 + TURN])
-    for behind, strength in zip(made.passage.vehicle.wheel_positions, loud):
+    for behind, strength in zip(made.passage.vehicle.wheel_positions, strengths):
         moment = made.reference + (place - PLACES[0] + behind) / SPEED
         inside = (made.time >= moment) & (made.time < moment + 0.004)
         for row, x in zip(made.passage.recording.samples, PLACES):
@@ -87,27 +87,27 @@ def with_nose(made, place, loud, seed):
     return made
 
 
-def test_a_nose_at_which_every_wheel_bangs_is_no_flat_of_the_loudest():
-    """The axles of a bogie stand a turn apart, so that the rear one strikes where it is, and where it is when the one
-    before it strikes: a row of two, in eight passages. It speaks against a flat. One of the last wheel beside that
-    nose is blamed on its bogie, of which the other wheel strikes a turn away, and more on it than on the other one."""
+def test_a_nose_at_which_every_wheel_has_an_impact_is_no_flat_of_the_strongest():
+    """The axles of a bogie stand a turn apart. So the rear one seems to have two impacts, its own and that of the axle
+    ahead, in eight passages: that is evidence against a flat. A flat of the last wheel beside that nose is found in
+    its bogie, of which the other wheel is a turn away, with more evidence for the last wheel."""
     uneven = (20.0, 30.0, 20.0, 20.0)
-    sound = [with_nose(passage(1.1, 3, f"{s}", strength=0.0, seed=s), 4.5, uneven, s + 50) for s in range(20, 28)]
-    assert max(n for n, *_ in scanned(sound)) < 0.0
+    intact = [with_nose(passage(1.1, 3, f"{s}", strength=0.0, seed=s), 4.5, uneven, s + 50) for s in range(20, 28)]
+    assert max(n for n, *_ in scanned(intact)) < 0.0
     flat = [with_nose(passage(p, 3, f"{p}", seed=int(9 * p)), 4.5, uneven, int(9 * p) + 50) for p in (1.1, 2.3)]
     nats = [n for n, *_ in scanned(flat)]
     assert int(np.argmax(nats)) == 3 and nats[3] > 20.0 + max(nats[:2])
 
 
-def test_a_flat_of_one_of_two_wheels_is_no_bang_of_the_rail():
-    """A wagon of two axles: the lower of two is not the one that strikes. One wheel tells no place at all."""
+def test_a_flat_of_one_of_two_wheels_is_no_impact_of_the_rail():
+    """A wagon of two axles: the lower of two is not the one with the flat. One wheel alone gives no position."""
     for wheels in ([0.0, 4.9], [0.0]):
         made = passage(1.1, 0, "a", seed=6)
         made.passage.vehicle = wagon(wheels)
-        assert best_flat_on_wheel([made], [band_excess(made)], 0)[0] > 15.0  # the louder of two would leave it nothing
+        assert best_flat_on_wheel([made], [band_excess(made)], 0)[0] > 15.0  # the larger of two would leave it nothing
 
 
-def test_no_single_bang_says_more_than_its_bound():
+def test_no_single_impact_has_more_evidence_than_its_bound():
     """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its middle over that of the odd."""
     bound = np.log(
         ((1.0 - FLATS.outlier_share) / np.sqrt(2.0 * np.pi) + FLATS.outlier_share * FLATS.outlier_density)

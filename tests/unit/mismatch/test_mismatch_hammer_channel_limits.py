@@ -18,7 +18,7 @@ FORCES = np.array([6.0, 6.7, 7.7, 8.4, 9.3, 10.4]) * 1e3
 POLE = -250.0 + 2j * np.pi * 430.0
 
 
-def blows(place, saturated=lambda x: x, share=1.0, limit=None):
+def hammer_input(place, saturated=lambda x: x, share=1.0, limit=None):
     """A test of six impacts at ``place`` on one mode; the channel A shows ``share`` of it, ``saturated``."""
     t = np.arange(4000) / RATE
     mode = np.real(np.exp(POLE * t) * (2.0 - 0.7j)) * 2e-3
@@ -56,7 +56,7 @@ def test_peaks_that_grow_with_the_force_or_faster_gain_nothing(slope):
 
 
 def test_one_limit_holds_in_all_tests_that_reach_it():
-    """A far test stays below the limit; of two that reach it each alone tells half."""
+    """A far test stays below the limit; of two that reach it each alone has half of the evidence."""
     x, top = np.log(FORCES), np.log(50.0)
     near, far = (x, np.minimum(top, x - 4.9)), (x, 1.3 * x - 9.5)
     assert far[1].max() < top
@@ -66,52 +66,52 @@ def test_one_limit_holds_in_all_tests_that_reach_it():
 
 def test_each_side_of_an_amplifier_holds_for_itself():
     """Limits of 36 and 24 m/s² are one of 30; a twentieth of that is within the scatter that is allowed for."""
-    limit, gain = limit_under_impacts([blows(3.0, uneven), blows(6.0, uneven, share=0.2)], at(3.0))
+    limit, gain = limit_under_impacts([hammer_input(3.0, uneven), hammer_input(6.0, uneven, share=0.2)], at(3.0))
     assert gain > 12.0
     assert limit == pytest.approx(30.0, rel=0.05)
 
 
-def test_a_linear_channel_has_no_ceiling():
-    limit, gain = limit_under_impacts([blows(3.0), blows(6.0, share=0.2)], at(3.0))
+def test_a_linear_channel_has_no_limit():
+    limit, gain = limit_under_impacts([hammer_input(3.0), hammer_input(6.0, share=0.2)], at(3.0))
     assert np.isnan(limit)
     assert gain == 0.0
 
 
-def test_beside_the_blow_one_side_alone_proves_nothing():
-    """There waves of all lengths meet: at 6 m, not struck, a channel has to hold on both sides."""
+def test_beside_the_impact_a_limit_of_one_side_proves_nothing():
+    """There waves of all lengths meet: at 6 m, where no impact is, a channel has to hold on both sides."""
 
     def one_side(x):
         return np.minimum(x, 24.0)
 
-    tests = [blows(3.0, one_side), blows(9.0, one_side)]
+    tests = [hammer_input(3.0, one_side), hammer_input(9.0, one_side)]
     assert limit_under_impacts(tests, at(3.0))[1] > 12.0
     assert limit_under_impacts(tests, at(6.0))[1] == 0.0
-    assert limit_under_impacts([blows(3.0, uneven), blows(9.0, uneven)], at(6.0))[1] > 12.0
+    assert limit_under_impacts([hammer_input(3.0, uneven), hammer_input(9.0, uneven)], at(6.0))[1] > 12.0
 
 
-def test_a_sensor_on_the_sleeper_is_not_where_the_rail_is_struck():
-    tests = [blows(3.0, lambda x: np.minimum(x, 24.0))]
+def test_a_sensor_on_the_sleeper_is_not_at_the_impact_on_the_rail():
+    tests = [hammer_input(3.0, lambda x: np.minimum(x, 24.0))]
     assert limit_under_impacts(tests, at(3.0))[1] > 12.0
     assert limit_under_impacts(tests, at(3.0, mounting="sleeper end"))[1] == 0.0
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-4])
-def test_noise_that_no_blow_exceeds_stays_and_is_no_limit(share):
-    assert limit_under_impacts([blows(3.0, share=share), blows(9.0, share=share)], at(3.0))[1] == 0.0
+def test_noise_that_no_impact_exceeds_is_no_limit(share):
+    assert limit_under_impacts([hammer_input(3.0, share=share), hammer_input(9.0, share=share)], at(3.0))[1] == 0.0
 
 
 def test_a_range_that_the_file_states_is_no_fault():
     """No impact below it is left."""
-    assert limit_under_impacts([blows(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
+    assert limit_under_impacts([hammer_input(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
 
 
 def test_a_channel_that_was_not_there_has_none():
-    assert limit_under_impacts([blows(3.0, uneven)], at(3.0, "B"))[1] == 0.0
+    assert limit_under_impacts([hammer_input(3.0, uneven)], at(3.0, "B"))[1] == 0.0
     assert limit_under_impacts([], at(3.0))[1] == 0.0
 
 
 def two_tests():
-    return [blows(3.0, uneven), blows(3.1, uneven)]
+    return [hammer_input(3.0, uneven), hammer_input(3.1, uneven)]
 
 
 def campaign(names="ABC", hammer=(), peaks=()):
@@ -126,7 +126,7 @@ def campaign(names="ABC", hammer=(), peaks=()):
 
 
 @pytest.mark.parametrize("names, found", [("ABC", ["A"]), ("AB", ["A"]), ("A", [])])
-def test_blows_alone_tell_a_ceiling_but_not_of_the_only_channel(names, found):
+def test_impacts_alone_show_a_limit_but_not_of_the_only_channel(names, found):
     known = saturated_channels(campaign(names, two_tests()), 12.0)
     assert list(known) == found
     assert all(c.limit == pytest.approx(30.0, rel=0.05) for c in known.values())
@@ -134,19 +134,19 @@ def test_blows_alone_tell_a_ceiling_but_not_of_the_only_channel(names, found):
 
 @pytest.mark.parametrize("shown, found", [(40.0, ["A"]), (45.0, [])])
 def test_no_limit_lies_far_below_what_trains_have_shown(shown, found):
-    """Of 30 a square wave rings up to 38 m/s² in the recorder's filter, of the louder side by a tenth more."""
+    """Of 30 a square wave rings up to 38 m/s² in the recorder's filter, of the larger side by a tenth more."""
     assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
 
 
 @pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])
-def test_two_that_speak_for_one_limit_speak_together(limit, share):
+def test_the_evidence_of_impacts_and_trains_for_one_limit_is_added(limit, share):
     """Trains of 60 to 300 m/s² of which A shows no more than ``limit``, impacts of which it shows 30."""
-    peaks = [(min(limit, 0.3 * loud), loud) for loud in (60.0, 90.0, 130.0, 180.0, 240.0, 300.0)]
-    rolled, struck = (
+    peaks = [(min(limit, 0.3 * peak), peak) for peak in (60.0, 90.0, 130.0, 180.0, 240.0, 300.0)]
+    by_trains, by_impacts = (
         saturated_channels(campaign(hammer=hammer, peaks=rolls), 3.0)["A"]
         for hammer, rolls in (((), peaks), (two_tests(), ()))
     )
     both = saturated_channels(campaign(hammer=two_tests(), peaks=peaks), 3.0)["A"]
-    plainer, lesser = sorted((rolled, struck), key=lambda c: -c.gain)
+    plainer, lesser = sorted((by_trains, by_impacts), key=lambda c: -c.gain)
     assert both.limit == plainer.limit
     assert both.gain == pytest.approx(plainer.gain + share * (lesser.gain + np.log(3.0)))

@@ -40,7 +40,7 @@ def found_in(plan, *terms, seed=3):
 
 
 @pytest.mark.slow
-def test_nothing_missing_nothing_said(plan):
+def test_where_nothing_is_missing_the_answer_is_none(plan):
     _, found = found_in(plan)
     assert found.verdict.answer == "none"
     assert found.verdict.probability > 0.5
@@ -55,9 +55,9 @@ def test_warm_pads_are_named_from_two_temperatures(plan):
     row = finding_row(found, IDENTITY)
     assert row["term"] == "pad_temperature" and row["position_m"] is None and row["next_measurement"]
     assert "per kelvin" in row["sentence"]
-    (told,) = json.loads(row["parameters_json"])
+    (estimate,) = json.loads(row["parameters_json"])
     # the row carries the fit's value, rounded to what its standard error is worth
-    assert told["value"] == pytest.approx(found.fit.psi[0], abs=told["se"])
+    assert estimate["value"] == pytest.approx(found.fit.psi[0], abs=estimate["se"])
 
 
 @pytest.mark.slow
@@ -69,7 +69,7 @@ def test_a_sensor_wired_the_other_way_round_is_named(plan):
     assert abs(found.fit.psi[0] + 1.0) < 2.0 * found.fit.psi_se[0]
 
 
-def test_nothing_to_diagnose_is_said():
+def test_a_campaign_without_recordings_is_an_error():
     with pytest.raises(SimulationError, match="neither a hammer test nor a passage"):
         CampaignInput(TurnoutTrack(uniform_track(12.0)), ())
 
@@ -84,19 +84,19 @@ def test_a_reserved_recording_that_is_not_there_is_named(plan):
         TrackCase(replace(campaign, reserved=(campaign.hammer[0].name,)))
 
 
-def test_fits_start_from_tests_that_are_not_kept_back(plan):
+def test_fits_start_from_tests_that_are_not_held_out(plan):
     """What a reserved test shows does not matter, be it three times as much."""
     campaign, starts = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1), []
     kept = campaign.hammer[1]
     for factor in (1.0, 3.0):
         size = [[1.0 if c.name == kept.force else factor] for c in kept.recordings[0].channels]
-        louder = tuple(replace(r, samples=np.array(size) * r.samples) for r in kept.recordings)
-        struck = (campaign.hammer[0], replace(kept, recordings=louder))
-        starts.append(TrackCase(replace(campaign, hammer=struck, reserved=(kept.name,)), families=()).start_values)
+        scaled = tuple(replace(r, samples=np.array(size) * r.samples) for r in kept.recordings)
+        hammer = (campaign.hammer[0], replace(kept, recordings=scaled))
+        starts.append(TrackCase(replace(campaign, hammer=hammer, reserved=(kept.name,)), families=()).start_values)
     assert starts[0] == starts[1] and any(starts[0].values())
 
 
-def test_channels_without_blows_are_left_out_and_said(plan):
+def test_channels_without_impacts_are_left_out_with_a_note(plan):
     campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1)
     silent = replace(campaign.hammer[0], recordings=campaign.hammer[0].recordings[:1])
     case = TrackCase(replace(campaign, hammer=(silent, campaign.hammer[1])))
@@ -116,8 +116,8 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]
 
 
-def test_a_shear_law_is_tried_in_the_rail_that_blows_bent():
-    """What a term says of the rail is said of its file; the rest stays as impacts found it, for passages as well."""
+def test_a_shear_stiffness_is_tried_in_the_rail_that_impacts_calibrated():
+    """A term about the rail is relative to its file; the rest stays as impacts calibrated it, for passages as well."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
     predictor = case.predictor.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
     file, bent = predictor.site.nominal.turnout.track.rail, predictor.track().rail
@@ -145,18 +145,18 @@ def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
     assert np.linalg.norm(found - exact) < 1e-3 * np.linalg.norm(exact)
 
 
-def test_a_blow_is_not_asked_of_sensors_far_from_it():
+def test_an_impact_is_not_compared_at_sensors_far_from_it():
     """At 8 m the tolerance of a model has 1 + (8 / 1.5)^2 = 29 times its variance at the impact."""
     plan = small_plan((15.0,), hammer_positions=(20.4, 30.0), passages=False)
     pairs = observe_tests(measured_campaign(plan), MismatchSettings().pair_tolerance).frf_pairs
-    heard = {(p.test.place, p.channel) for p in pairs.values()}
-    assert heard == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
+    compared = {(p.test.place, p.channel) for p in pairs.values()}
+    assert compared == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("limit", "most"), [(1000.0, 0.8), (4000.0, 0.45)])
-def test_a_blow_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, most):
-    """Time histories with dry friction against the law's secant: one rate for both leaves 0.77 and 0.54 of the change
+def test_an_impact_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, most):
+    """Time histories with dry friction against its secant: one rate for both leaves 0.77 and 0.54 of the change
     at 20 mm/s, 0.98 and 0.41 at 2 mm/s."""
     support = plan.turnout.track.nearest_support(22.2)
     case = TrackCase(measured_campaign(plan, (physics.DryFriction(support, limit),), 3))
@@ -188,7 +188,7 @@ def test_a_track_that_still_rings_when_the_record_ends_shows_the_receptance_of_i
     track, sensor = uniform_track(60.0, **values), Sensor("S1", 30.0)
     recordings = simulate_hammer(track, 30.0, Hammer(position_spread=0.0), (sensor,), 4, seed=5, duration=0.15)
     assert recordings[0].duration == pytest.approx(0.15)
-    test = HammerInput("blows", 30.0, recordings, "hammer", "", {})
+    test = HammerInput("impacts", 30.0, recordings, "hammer", "", {})
     ((pair, seen),) = receptance_observation.pairs_of_test(test, (sensor,), 0.03)
     n = pair.lines.size
     measured = (seen.data[:n] + 1j * seen.data[n:]) * pair.size

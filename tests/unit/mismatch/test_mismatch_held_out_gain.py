@@ -32,7 +32,7 @@ def test_the_stated_error_is_the_scatter_of_the_gain():
 
 def test_sensors_that_miss_alike_are_no_further_evidence():
     """Four sensors under one train miss the same: the gain scatters as that of one, and half of it would be stated were
-    each sensor's stretch a witness of its own."""
+    each sensor's stretch an observation of its own."""
     rng, gains, stated, apart = np.random.default_rng(6), [], [], []
     for _ in range(400):
         observations, before, after = drawn(rng)
@@ -45,13 +45,13 @@ def test_sensors_that_miss_alike_are_no_further_evidence():
     assert np.median(apart) < 0.7 * np.std(gains)
 
 
-def test_models_that_say_the_same_differ_by_nothing():
+def test_models_with_equal_predictions_differ_by_nothing():
     observations, before, _ = drawn(np.random.default_rng(4))
     assert gain_error(observations, before, before) == 0.0
 
 
 def test_noise_that_both_miss_is_not_in_the_error_of_the_gain():
-    """Noise three times as loud makes either fit unsure; the gain of two models that differ in one stretch has the
+    """Three times the noise makes either fit uncertain; the gain of two models that differ in one stretch has the
     error of one stretch among fifty."""
     observations, before, _ = (list(x) for x in drawn(np.random.default_rng(5)))
     after = [p.copy() for p in before]

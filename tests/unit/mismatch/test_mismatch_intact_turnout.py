@@ -1,4 +1,4 @@
-"""Sound panels of a real turnout's track file, lightly damped ones and the crossing among them, are no mismatch."""
+"""Intact panels of a real turnout's track file, lightly damped ones and the crossing among them, are no mismatch."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def measured(places, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("places", "seed"), [((3.6,), 1), ((13.8,), 7), ((24.6, 26.4), 7)])
-def test_what_the_base_model_leaves_of_sound_panels_is_what_it_leaves_of_controls(places, seed):
+def test_the_residual_of_intact_panels_is_that_of_controls(places, seed):
     """Switch, closure and crossing panel; by the settings' levels, which come from another generator's plain track."""
     case = TrackCase(measured(places, seed))
     assert len(case.aligned_passages) == len(SPEEDS)

@@ -160,7 +160,7 @@ def test_a_fit_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_s
     assert given_up.cost == start.cost and given_up.evaluations < found.evaluations
 
 
-def test_what_a_step_promises_is_what_it_gains_where_the_model_is_linear():
+def test_the_predicted_gain_of_a_step_is_its_gain_where_the_model_is_linear():
     """With the prior of all numbers, so that the fit is at its optimum after one step."""
     case = Bent(False)
     case._shown = lambda x: 0.02 * case.along @ x  # residuals below their errors: a noise scale of one
@@ -255,7 +255,7 @@ def test_a_fit_is_not_made_again_where_nobody_would_be_named():
     assert refit._base_from_leader(Search(Bent(True)), late, silent) is None
 
 
-def test_where_a_channel_was_at_its_range_the_passage_says_no_more_than_its_size():
+def test_a_passage_with_a_channel_at_its_range_confirms_only_its_size():
     rate, n = 4000.0, 4000
     samples = 3.0 * np.sin(2 * np.pi * 20.0 * np.arange(n) / rate) * np.ones((2, 1))
     samples[0, 2000] = -50.0

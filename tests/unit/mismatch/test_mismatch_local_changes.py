@@ -1,4 +1,4 @@
-"""A law at one place that only trains show: its evidence, and names of no position that it refutes."""
+"""An effect at one position that only trains show: its evidence, and names of no position that it refutes."""
 
 from dataclasses import replace
 
@@ -77,14 +77,14 @@ def test_the_evidence_is_that_of_dense_covariances(changes):
     assert local_change_evidence(case, fit) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
-def test_impacts_or_trains_alone_tell_of_no_difference():
+def test_impacts_or_trains_alone_show_no_difference():
     case = Supports(in_one(0.4))
     for name in ("hammer", "train"):
         case.observations = tuple(o for o in Supports(in_one(0.4)).observations if o.name == name)
         assert local_change_evidence(case, fit_jointly(case)) == 0.0
 
 
-def test_components_that_are_not_alike_have_no_place():
+def test_components_that_are_not_alike_have_no_position():
     case = Supports(in_one(0.4))
     case.nuisances = tuple(replace(n, index=None) for n in case.nuisances)
     assert local_change_evidence(case, fit_jointly(case)) == 0.0
@@ -93,7 +93,7 @@ def test_components_that_are_not_alike_have_no_place():
 @pytest.mark.parametrize(
     "at_one, where, answer", [(0.0, {}, "named"), (0.35, {}, "unknown"), (0.35, {"place": 3.0}, "named")]
 )
-def test_a_law_of_the_whole_track_is_no_name_where_a_change_of_one_support_remains(at_one, where, answer):
+def test_an_effect_of_the_whole_track_is_no_name_where_a_change_of_one_support_remains(at_one, where, answer):
     """All supports stiffer explain most of it. A name at a position may leave an error of its shape."""
     verdict = diagnose(Supports([0.5 + at_one * (j == 2) for j in range(N_SUPPORT)], where)).verdict
     assert verdict.answer == answer and ("local_change_remains" in verdict.trail) is (answer == "unknown")
@@ -101,7 +101,7 @@ def test_a_law_of_the_whole_track_is_no_name_where_a_change_of_one_support_remai
 
 @pytest.mark.parametrize("place, gain, answer", [(2, 50.0, "named"), (5, 50.0, "unknown"), (5, 1e4, "named")])
 def test_beside_a_name_at_a_position_its_errors_of_shape_count(place, gain, answer):
-    """One support is stiffer than all. The law at ``place`` explains it, or not; strong evidence leaves as much."""
+    """One support is stiffer than all. The effect at ``place`` explains it, or not; strong evidence leaves as much."""
     case = Supports([0.5 + 0.45 * (j == 2) for j in range(N_SUPPORT)])
     local = Candidate.of("local", SIZE, lambda values: values | {"support": place}, ((0.5,),), {"place": 3.0})
     case.candidates = (*case.candidates, local)

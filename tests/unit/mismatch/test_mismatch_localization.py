@@ -1,4 +1,4 @@
-"""What has no name is located: evidence for subspaces, quiet about a train, falls of the held-out fit."""
+"""A residual without a name is localized: evidence for subspaces, stretches before a train, losses of the fit."""
 
 from types import SimpleNamespace
 
@@ -47,7 +47,7 @@ def test_evidence_of_a_subspace_is_the_closed_form(i, j):
     assert subspace_evidence(b.T @ b, b.T @ r, r @ r, N, floor) == pytest.approx(expected, rel=1e-9)
 
 
-def test_what_sound_recordings_leave_is_no_evidence():
+def test_the_residual_of_intact_recordings_is_no_evidence():
     basis = orthonormal(N, N)
     r = basis @ np.full(N, np.sqrt(0.5))
     b = basis[:, :K]
@@ -77,7 +77,7 @@ class Places(Case):
 @pytest.mark.parametrize(
     "mix, frame, level", [([0.2, 0.5, 1.0], "place", 2.0), ([0.5, 1.0, 0.5], "place", 1.0), ([0, 1, 0], "sensor", "S1")]
 )
-def test_a_force_is_told_from_a_channel(mix, frame, level):
+def test_a_force_is_distinguished_from_a_channel(mix, frame, level):
     rng = np.random.default_rng(8)
     rows = 0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(mix, rng.normal(size=40))
     case = Places(rows)
@@ -103,15 +103,15 @@ def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_record
 
 
 @pytest.mark.parametrize(
-    "at, told", [(("train", "railcar"), "on railcar"), (("frequency", "track"), "along the whole track"),
+    "at, text", [(("train", "railcar"), "on railcar"), (("frequency", "track"), "along the whole track"),
                  (("sensor", "S1"), "in channel S1")],
 )  # fmt: skip
-def test_a_value_that_has_absorbed_all_is_the_location(at, told):
+def test_a_value_that_has_absorbed_all_is_the_location(at, text):
     """The residual is noise, at no place more than at others."""
     rows = np.random.default_rng(8).normal(size=(3, 150))
     case = Places(0.3 * rows)
     absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=at), 6.0, 15.0)
-    assert str(locate(case, fit_jointly(case), absorbed=absorbed)) == told
+    assert str(locate(case, fit_jointly(case), absorbed=absorbed)) == text
 
 
 class Bursts(Places):
@@ -143,7 +143,7 @@ def test_a_residual_like_that_of_intact_recordings_does_not_move_what_a_value_ha
 
 
 @pytest.mark.parametrize("nats, frame", [(15.0, "place"), (1e4, "train")])
-def test_what_a_value_leaves_at_one_place_outweighs_it_by_evidence_over_all_other_places(nats, frame):
+def test_the_residual_at_one_position_outweighs_an_absorbing_value_by_evidence_over_all_other_positions(nats, frame):
     rng = np.random.default_rng(8)
     case = Places(rng.normal(size=(3, 150)) + 3.0 * np.outer(Places.seen[2], rng.normal(size=150)))
     absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=("train", "railcar")), 6.0, nats)
@@ -235,7 +235,7 @@ def test_a_cause_at_two_positions_that_differs_between_impacts_is_located_betwee
     fit = fit_jointly(case)
     evidence = {(w.frame, w.level): w for w in weigh_spaces(case, fit, {"passage": 1.0, "hammer": 1.0})}
     both, zero = evidence["place", (0.0, 1.0)], evidence["place", 0.0]
-    assert set(both.by_space) == {"p", "h1", "h2"}  # of the two laws, one counts
+    assert set(both.by_space) == {"p", "h1", "h2"}  # of the two effects, one counts
     assert both.by_space["p"] == zero.by_space["p"] > evidence["place", 1.0].by_space["p"]
     found = locate(case, fit)
     assert (found.level, found.place, found.low, found.high) == ((0.0, 1.0), 0.5, 0.0, 1.0)
@@ -246,14 +246,14 @@ def test_nothing_is_located_in_noise():
     assert locate(case, fit_jointly(case)) is None
 
 
-def test_the_refused_candidate_is_heard_where_it_explains_more():
+def test_the_rejected_candidate_gives_the_localization_where_it_explains_more():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
     candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k", position=None)
-    refused = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
-    found = locate(case, fit_jointly(case), refused)
+    rejected = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
+    found = locate(case, fit_jointly(case), rejected)
     assert (found.frame, found.train, found.axle) == ("wheel", "freight", 3)
-    refused.explained = 0.1
-    assert locate(case, fit_jointly(case), refused) is None
+    rejected.explained = 0.1
+    assert locate(case, fit_jointly(case), rejected) is None
 
 
 def levels_of(rng, n_sensor=4, n=2500, rate=5000.0, scale=1.0):
@@ -279,12 +279,12 @@ def test_quiet_segments_of_noise_have_uniform_chances():
 def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
     rng = np.random.default_rng(6)
     others = [levels_of(rng) for _ in range(5)]
-    louder, p = disturbances.excess_over(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
-    assert louder == pytest.approx(6.0, abs=1.0)
+    excess, p = disturbances.excess_over(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
+    assert excess == pytest.approx(6.0, abs=1.0)
     assert p < DISTURBANCE.max_chance
     power, freedom = levels_of(rng)
-    louder, p = disturbances.excess_over((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
-    assert louder < DISTURBANCE.min_excess
+    excess, p = disturbances.excess_over((power * np.array([100.0, 1.0, 1.0, 1.0]), freedom), others)
+    assert excess < DISTURBANCE.min_excess
     assert p > DISTURBANCE.max_chance
 
 
@@ -300,7 +300,7 @@ def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():
     assert not is_significantly_worse(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
 
 
-def test_the_stated_probability_is_between_what_was_seen_and_what_the_softmax_says():
+def test_the_stated_probability_is_between_the_observed_share_and_the_softmax():
     """On the logit scale, the softmax counts for a share; the posterior goes on summing to 1."""
     settings = MismatchSettings()
     posterior = {"none": 0.2, "unknown": 0.05, "a": 0.6, "b": 0.15}
@@ -321,7 +321,7 @@ def test_another_train_makes_an_unknown_of_nothing_else():
     assert verdict.probability > judge([], 5.0, settings).probability
 
 
-def test_recordings_that_were_not_fitted_say_where_only_if_they_are_the_reason():
+def test_recordings_that_were_not_fitted_localize_only_if_they_are_the_reason():
     """What the sensors show beyond controls is in the recordings that were fitted: a force at a place, whatever shook
     the sensors in another one, and whoever came in a third."""
     rng, settings = np.random.default_rng(8), MismatchSettings()
@@ -347,28 +347,28 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
         "b": ({"S1": 1.0, "S2": 2.0}, 50.0),
         "c": ({"S1": 1.0}, 50.0),
     }
-    louder, p = disturbances.excess_over(*disturbances._shared_levels(levels, "a"))
-    assert louder == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, says nothing
+    excess, p = disturbances.excess_over(*disturbances._shared_levels(levels, "a"))
+    assert excess == pytest.approx(10.0 * np.log10(4.0))  # S3, which no other passage has, does not count
     assert p == pytest.approx(f.sf(4.0, 50.0, 50.0) ** 2)  # both sensors
     assert disturbances.excess_over(*disturbances._shared_levels(levels, "c")) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("place", "said"),
+    ("place", "text"),
     [
         (3.6, "at 3.6 m, between 3.0 and 4.2 m"),
         (0.6, "before 2.4 m, the distance is not known"),
         (9.0, "beyond 8.1 m, the distance is not known"),
     ],
 )
-def test_a_place_beyond_what_was_measured_is_not_said_to_a_metre(place, said):
+def test_a_position_beyond_the_measured_range_is_not_stated_to_a_metre(place, text):
     found = Location("place", place, 40.0, place, place - 0.6, place + 0.6, measured_range=(2.4, 8.1))
-    assert str(found) == said
+    assert str(found) == text
 
 
 @pytest.mark.parametrize(
-    ("error", "said"), [(0.3, "at 8.4 m, between 7.8 and 9.0 m, and"), (0.15, "at 8.4 m, and"), (None, "at 8.4 m, and")]
+    ("error", "text"), [(0.3, "at 8.4 m, between 7.8 and 9.0 m, and"), (0.15, "at 8.4 m, and"), (None, "at 8.4 m, and")]
 )
-def test_what_may_be_at_several_supports_is_said_with_its_interval(error, said):
+def test_a_position_at_several_possible_supports_is_stated_with_its_interval(error, text):
     fields = {"verdict": "unknown", "position_m": 8.4, "position_se_m": error, "place_low_m": 1.8, "place_high_m": 8.1}
-    assert said in title({**fields, "term_json": None})
+    assert text in title({**fields, "term_json": None})

@@ -75,7 +75,7 @@ def test_tracks_that_differ_in_their_chairs_share_a_skeleton_and_are_the_assembl
 PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 
-def heard(model, seat):
+def sensitivity_of(model, seat):
     """Of two impacts and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
     first, second = ("S", 8.0), ("S", 11.0)
     pairs = (9.1, first), (10.7, first), (10.7, second)
@@ -100,7 +100,7 @@ def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
     rng, track = np.random.default_rng(2), uniform_track(24.0)
     own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in SUPPORT_PARAMETERS}
     track = track.with_(**{field: getattr(track, field) * by for field, by in own.items()})
-    found = heard(ReceptanceModel(track, (term,)), 11.6).gradient(PAIR)
+    found = sensitivity_of(ReceptanceModel(track, (term,)), 11.6).gradient(PAIR)
     size = np.abs(found).max(axis=0).max()
 
     def changed(field, where, step):
@@ -127,7 +127,7 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
         rail = replace(track.rail, **{name: getattr(track.rail, name) * np.exp(more)})
         return ReceptanceModel(track.with_(rail=rail), ()).receptance(10.7, 12.3)
 
-    found = heard(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)[
+    found = sensitivity_of(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)[
         :, ("bending_stiffness", "shear_stiffness").index(name)
     ]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
@@ -143,7 +143,7 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
     cast = replace(track.rail, bending_stiffness=1.8 * track.rail.bending_stiffness, mass=2.5 * track.rail.mass)
     track = track.with_(stretches=(RailStretch(2.0, 4.0, cast), RailStretch(10.27, 13.17, cast)))
-    found = heard(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)
+    found = sensitivity_of(ReceptanceModel(track, ()), 12.3).rail_gradient(PAIR)
     pieces = castings_of(track, 9.98, 11.4)
     assert [c.inner for c in pieces] == [False, False, True, True]  # of seven, those that reach into the zone
     for k, c in enumerate(pieces):
@@ -157,7 +157,7 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
         column = found[:, 2 + 2 * k + ("bending_stiffness", "mass").index(name)]
         assert np.linalg.norm(column - exact) < 0.005 * np.linalg.norm(exact)
     over = ReceptanceModel(track, (physics.RailBending(9.5, 12.5, 1.3),))
-    assert np.all(heard(over, 12.3).rail_gradient(PAIR)[:, 2:][:, 2:] == 0.0)
+    assert np.all(sensitivity_of(over, 12.3).rail_gradient(PAIR)[:, 2:][:, 2:] == 0.0)
 
 
 @pytest.mark.parametrize("cast", [False, True])
@@ -176,6 +176,6 @@ def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens(cast):
         stretches = tuple(replace(s, rail=stiffer(s.rail)) for s in track.stretches)
         return ReceptanceModel(track.with_(rail=stiffer(rail), stretches=stretches), term).receptance(10.7, 12.3)
 
-    found = heard(ReceptanceModel(track, term), 12.3).rail_gradient(PAIR)[:, 1]
+    found = sensitivity_of(ReceptanceModel(track, term), 12.3).rail_gradient(PAIR)[:, 1]
     exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3
     assert np.linalg.norm(found - exact) < 0.015 * np.linalg.norm(exact)

@@ -30,15 +30,15 @@ def plan():
 
 
 @pytest.fixture(scope="module")
-def sound(plan):
+def intact(plan):
     case = TrackCase(measured_campaign(plan, (), 7))
     return case, {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
 
 
-def test_the_column_of_a_linear_channel_is_what_the_case_predicts(sound):
+def test_the_column_of_a_linear_channel_is_what_the_case_predicts(intact):
     """Of every start of every such effect, once beside a gain of the same channel; what is left is the end of the
     record, at which the case cuts the signal between channel and band."""
-    case, values = sound
+    case, values = intact
     (o,) = (o for o in case.observations if o.name == "heavy 2")
     chosen = [(c, k) for c in case.candidates if c.where.get("sensor") == "S3" for k in range(len(c.starts))]
     chosen = [(c, k) for c, k in chosen if isinstance(c.term(c.starts[k]), TransferTerm)]
@@ -54,8 +54,8 @@ def test_the_column_of_a_linear_channel_is_what_the_case_predicts(sound):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wavelength", [0.9, 0.5])
-def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(sound, wavelength):
-    case, values = sound
+def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(intact, wavelength):
+    case, values = intact
     name = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - wavelength)))]
     index = [n.name for n in case.nuisances].index(name)
     seen = [o for o in case.observations if o.name == "heavy 2"]
@@ -67,10 +67,10 @@ def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(s
 
 
 @pytest.mark.slow
-def test_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(sound):
+def test_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(intact):
     """The wheel rings on over supports of other stiffness. As if it stood at each node, the derivatives err by 0.28 at
     50 Hz; with the sidebands of the moving wheel by 0.16, which the wheels beside it leave."""
-    case, values = sound
+    case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     waves, (before,) = case.predictor.waves, case.predict(values, (), [seen])
     (jacobian,) = case.nuisance_jacobian(values, (), [seen], [before])
@@ -92,9 +92,9 @@ def test_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(sound):
         physics.UnsprungMass(2.5, "heavy"),
     ],
 )
-def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
-    """A wave of the rail and a pad, seen by S3 where, when and as loud as the term says, pressed by such wheels."""
-    case, values = sound
+def test_derivatives_of_passages_are_those_beside_the_term(intact, term):
+    """A wave of the rail and a pad, seen by S3 with the position, time and gain of the term, pressed by such wheels."""
+    case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     wave = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - 0.7)))]
     row = [s.name for s in case.aligned_passages["heavy 2"].sensors].index("S3")
@@ -104,17 +104,17 @@ def test_derivatives_of_passages_are_those_beside_the_term(sound, term):
         column = jacobian[:, [n.name for n in case.nuisances].index(name)]
         change = (case.predict({**values, name: values[name] + size}, (term,), [seen])[0] - before) / size
         a, b = (v.reshape(4, -1)[row] for v in (column, change))
-        assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.9  # as that of a sound channel
+        assert a @ b / np.sqrt((a @ a) * (b @ b)) > 0.9  # as that of an intact channel
         assert np.linalg.norm(a) == pytest.approx(np.linalg.norm(b), rel=0.25)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hangs", [False, True])
-def test_a_wave_is_as_loud_as_simulated_where_supports_differ(sound, hangs):
+def test_a_wave_has_the_simulated_level_where_supports_differ(intact, hangs):
     """Waves of 50 to 75 Hz, whitened as the fit sees it: a wheel presses by the rail that it meets, and a sleeper that
     hangs gives way. 0.93 and 14 % are met; with the rail of the middle alone it is a third less, with the hanging
     sleeper on its bed a sixth."""
-    case, values = sound
+    case, values = intact
     middle = int(np.argmin(np.abs(case.predictor.track().support - 24.0)))
     term = (physics.HangingSleeper(middle, 1.5e-3, 0.05),) if hangs else ()
     values = values if term else {**values, f"ballast_{middle}": -1.5}
@@ -142,11 +142,11 @@ def test_a_wave_is_as_loud_as_simulated_where_supports_differ(sound, hangs):
         ("pad_damper_40", 0.6, 0.4),
     ],
 )
-def test_derivatives_by_supports_are_those_of_the_simulation(sound, name, cosine, size):
+def test_derivatives_by_supports_are_those_of_the_simulation(intact, name, cosine, size):
     """Whitened, against a difference of 0.01. Stiffness and ballast damping of all supports are simulated. A mass
     presses by the second derivative of the motion at 1.8 kHz, and a wheel feels it as at rest: it says which way. The
     dampers of single supports had no derivative at all, and fits of a crossing stopped 6 nats short."""
-    case, values = sound
+    case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     before = case.predict(values, (), [seen])[0]
     jacobian = case.nuisance_jacobian(values, (), [seen], [before])[0]
@@ -160,10 +160,10 @@ def test_derivatives_by_supports_are_those_of_the_simulation(sound, name, cosine
 @pytest.mark.parametrize(
     ("name", "step", "error"), [("speed", 2e-3, 0.12), ("load", 1e-4, 0.03), ("wheels", 1e-4, 0.03)]
 )
-def test_derivatives_by_a_train_are_those_of_the_simulation(sound, name, step, error):
+def test_derivatives_by_a_train_are_those_of_the_simulation(intact, name, step, error):
     """Against central differences. That by the speed is a stretch of time; differences below 0.001 have the grid of the
     simulation in them, a third of their size."""
-    case, values = sound
+    case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     name = "wheels_heavy" if name == "wheels" else f"{name}@heavy 2"
     (before,), (after,), (sooner,) = (
@@ -176,7 +176,7 @@ def test_derivatives_by_a_train_are_those_of_the_simulation(sound, name, step, e
 
 
 @pytest.mark.slow
-def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
+def test_a_flat_is_found_on_its_wheel_with_the_position_where_it_meets_the_rail(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))
     found = flat_candidates(case, fit_jointly(case, iterations=12))
@@ -189,8 +189,8 @@ def test_a_flat_is_found_on_its_wheel_with_the_place_where_it_strikes(plan):
 
 
 @pytest.mark.slow
-def test_no_wheel_is_blamed_where_none_has_a_flat(plan, sound):
-    case, _ = sound
+def test_no_wheel_is_named_where_none_has_a_flat(plan, intact):
+    case, _ = intact
     assert flat_candidates(case, fit_jointly(case, iterations=12)) == ()
 
 
@@ -202,8 +202,8 @@ def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
     assert found.verdict.answer == "numerics" and not found.names
 
 
-def test_the_derivative_by_a_sensors_place_is_where_the_simulation_goes_when_it_is_moved(sound):
-    case, values = sound
+def test_the_derivative_by_the_position_of_a_sensor_is_that_of_the_simulation(intact):
+    case, values = intact
     observation = next(o for o in case.observations if o.name in case.aligned_passages)
     names = [n.name for n in case.nuisances]
     predicted = case.predict(values, (), [observation])
@@ -237,10 +237,10 @@ def test_all_lags_at_once_are_as_good_as_one_by_one(without_worst):
 
 
 @pytest.mark.parametrize("wrong", [0, 1])
-def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(sound, wrong):
+def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(intact, wrong):
     """Its sign reversed, four sensors are alike by (3 - 1) / 4 at most; three of them as before. Two reversed, or the
     wrong train, stay below what is asked for."""
-    case, values = sound
+    case, values = intact
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.aligned_passages["heavy 2"].sensors
     signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
@@ -268,25 +268,25 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     )
 
 
-def test_blows_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(sound):
+def test_impacts_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(intact):
     """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: what was recorded is hardly like
     itself with them, and of a wrong train they make none."""
-    case, values = sound
+    case, values = intact
     passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
     sensors = case.aligned_passages["heavy 2"].sensors
     signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
     quiet = low_pass(passage.recording, sensors)
     reference = align(passage, quiet, signals, case.predictor.solver.rate)[0]
     time = np.arange(quiet.shape[1]) / 800.0
-    struck = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
-    loud = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * struck
-    alike = np.sum(quiet * loud, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(loud, axis=1)
+    impacts = sum(np.exp(-(((time - reference - 0.02 - 0.16 * k) / 0.01) ** 2)) for k in range(3))
+    with_impacts = quiet + 8.0 * np.max(np.abs(quiet), axis=1, keepdims=True) * impacts
+    alike = np.sum(quiet * with_impacts, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(with_impacts, axis=1)
     assert np.max(np.abs(alike)) < 0.7 * ALIGNMENT.min_correlation
-    assert align(passage, loud, signals, case.predictor.solver.rate)[2] > ALIGNMENT.min_correlation
+    assert align(passage, with_impacts, signals, case.predictor.solver.rate)[2] > ALIGNMENT.min_correlation
     light = case.predictor.passage_simulator(values, (), passage)(
         passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
     )
-    assert align(passage, loud, light, case.predictor.solver.rate)[2] < ALIGNMENT.min_correlation
+    assert align(passage, with_impacts, light, case.predictor.solver.rate)[2] < ALIGNMENT.min_correlation
 
 
 def power(case, train):
@@ -300,10 +300,10 @@ def power(case, train):
 
 
 @pytest.mark.slow
-def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(sound):
+def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(intact):
     """The prior of roughness knows the wheels' mass: with twice the mass P2 comes down, by 1 / sqrt 2 where the rail is
     a spring, and what roughness does below 60 Hz grows; the other train's errors stay what they were."""
-    case, values = sound
+    case, values = intact
     fit = fit_jointly(case, values=values, iterations=1)
     assert case.with_updated_errors(fit) is case
     heavy = replace(fit, values={**fit.values, "wheels_heavy": np.log(2.0)}, covariance=1e-4 * np.eye(len(fit.values)))
@@ -318,10 +318,10 @@ def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(so
 
 
 @pytest.mark.slow
-def test_passages_roll_on_the_rail_that_the_fit_has(sound):
+def test_passages_roll_on_the_rail_that_the_fit_has(intact):
     """Impacts that an effect had bent gave the rail; with the effect in the model it is another. Passages, and
     errors of all of them, are then those of a case that was made with that rail, and impacts are as they were."""
-    case, values = sound
+    case, values = intact
     fit = fit_jointly(case, values=values, iterations=1)
     bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.predictor.rail.items()}
     assert case.with_updated_errors(replace(fit, values={**fit.values, **bent})) is case
@@ -337,7 +337,7 @@ def test_passages_roll_on_the_rail_that_the_fit_has(sound):
         assert (again is old) is (old.name in case.frf_pairs)
 
 
-def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
+def test_a_train_that_is_unlike_its_type_is_reported_and_localized(plan):
     """The heavy train came with other wheelsets than its file has: none of its passages is used, nor passed over."""
     campaign = measured_campaign(plan, (), 7)
     other = {p.train: p.vehicle for p in campaign.passages}
@@ -354,14 +354,14 @@ def test_a_train_that_looks_like_no_such_train_is_said_and_located(plan):
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
     assert TrackCase(replace(campaign, passages=tuple(one))).mismatched_trains == ()  # one passage may be another train
-    sound = [replace(p, name=f"{p.name} again") for p in campaign.passages if p.train == "heavy"][:1]
-    most = TrackCase(replace(campaign, passages=(*swapped, *sound)))
+    intact = [replace(p, name=f"{p.name} again") for p in campaign.passages if p.train == "heavy"][:1]
+    most = TrackCase(replace(campaign, passages=(*swapped, *intact)))
     assert most.mismatched_trains == (
         "heavy",
-    )  # a polygon that lifts its wheels is heard at some speeds and not at others
+    )  # a polygon that lifts its wheels shows at some speeds and not at others
 
 
-def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, monkeypatch):
+def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(intact, monkeypatch):
     """Recordings that end too early, or have too few samples, are no word on the wheels that came: no alarm."""
     plain = passage_observation.observe_passage
 
@@ -371,22 +371,22 @@ def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(sound, 
         return plain(passage, *more)
 
     monkeypatch.setattr(passage_observation, "observe_passage", cut_short)
-    case = TrackCase(sound[0].campaign, families=())
+    case = TrackCase(intact[0].campaign, families=())
     assert len([n for n in case.notes if "outside the recording" in n]) == 2
     assert case.aligned_passages and case.mismatched_trains == ()
 
 
 @pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
-def test_a_wheel_whose_blows_are_nearly_as_loud_is_sized_as_well(plan, monkeypatch, behind, offered):
+def test_a_wheel_with_impacts_nearly_as_strong_is_sized_as_well(plan, monkeypatch, behind, offered):
     """What impacts cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
     case = TrackCase(measured_campaign(plan, (), 7))
     (made, *_), radius = case.aligned_passages.values(), 0.46
     train, phases = made.conditions["train"], ((made.name, 0.5),)
     nats = {2: 20.0, 0: 20.0 - behind, 5: 20.0 - behind}
-    heard = [FlatEvidence(n, train, wheel, radius, phases) for wheel, n in nats.items()]
-    monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.flat_evidence", lambda case: heard)
+    evidence = [FlatEvidence(n, train, wheel, radius, phases) for wheel, n in nats.items()]
+    monkeypatch.setattr("turnout.mismatch.turnout.candidates.wheel_flats.flat_evidence", lambda case: evidence)
     monkeypatch.setattr(
-        "turnout.mismatch.turnout.candidates.wheel_flats._fit_flat", lambda case, fit, struck: (0.03, phases, 5.0)
+        "turnout.mismatch.turnout.candidates.wheel_flats._fit_flat", lambda case, fit, impacts: (0.03, phases, 5.0)
     )
     found = flat_candidates(case, SimpleNamespace(candidates=()))
     assert [c.where["axle"] for c in found] == offered

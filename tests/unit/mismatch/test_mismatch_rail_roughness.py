@@ -1,4 +1,4 @@
-"""Rail as rough as sound rail is, beyond the stretch of free waves, is no mismatch where the track carries far."""
+"""Rail as rough as intact rail is, beyond the stretch of free waves, is no mismatch where the track carries far."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def test_a_mass_on_the_rail_is_tried_over_sleepers_and_in_the_middle_between_the
     assert {node[x][:1] + node[x][2:] for x in between} == {("rail", track.elements_per_bay // 2)}
 
 
-def test_no_law_is_asked_more_than_a_bay_beyond_what_was_measured(lightly_damped):
+def test_no_effect_is_tested_more_than_a_bay_beyond_the_measured_range(lightly_damped):
     """What lies farther out cannot be distinguished from all that lies beyond it; it has values, no names."""
     case, _, _ = lightly_damped
     measured = case.campaign.positions()

@@ -116,18 +116,18 @@ def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere
     case, values = somewhere
     values = values | {"rail_shear": 0.02}
     predicted = case.predict(values, (), case.observations)
-    fit, told = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
+    fit, families = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
     chosen = [(c, 0) for c in case.candidates if c.term(c.starts[0]).column_type == "channel"]
     for o, old in zip(case.observations, predicted):
-        for c, found in zip(*_heard(case, fit, o, old, chosen)):
+        for c, found in zip(*_compared(case, fit, o, old, chosen)):
             (after,) = case.predict(values, (c.term(c.starts[0]),), [o])
             allowed = 0.02 if c.family == "sensor_position" else 1e-9
             assert np.linalg.norm(found - (after - old)) <= allowed * np.linalg.norm(after - old) + 1e-12, c.key
-            told.add(c.family)
-    assert {"sensor_gain", "sensor_position", "low_pass", "mount_resonance"} <= told
+            families.add(c.family)
+    assert {"sensor_gain", "sensor_position", "low_pass", "mount_resonance"} <= families
 
 
-def _heard(case, fit, observation, old, chosen):
+def _compared(case, fit, observation, old, chosen):
     """Candidates on the channel of an observation, and the columns that they are given."""
     found = _pair_channel_changes(case, fit, observation, old, chosen)
     return [c for c, k in chosen if (c.key, k) in found], found.values()

@@ -37,7 +37,7 @@ def campaign():
     return replace(measured_campaign(replace(PLAN, turnout=true), (), 7), turnout=FILED)
 
 
-def test_numbers_with_a_prior_may_be_off_where_they_can_be_heard():
+def test_values_with_a_prior_may_be_off_where_recordings_show_them():
     surface = RunningSurface(FILED, WAVES, ("main",))
     assert surface.names == (*(f"surface_0_{f}" for f in (*SPREADS[NOSE], "power")), "surface_1_depth")
     known = {n.name: n for n in surface.nuisances()}
@@ -68,7 +68,7 @@ def test_a_surface_has_the_numbers_that_it_is_given():
     assert [nose.place, nose.depth, nose.length, nose.share] == pytest.approx([25.35, 1.3e-3, 0.9, 0.55])
 
 
-def test_a_measured_profile_may_be_off_by_a_factor_and_a_place_at_the_origin_not():
+def test_a_measured_profile_may_be_off_by_a_factor_and_a_position_at_the_origin_may_not():
     profile, blade = Sections((23.0, 24.0, 25.0), (0.0, 1e-3, 0.0)), Kink(0.0, 1e-3, 1.0)
     spreads = {profile: {"places": 0.1, "dips": 0.2}, blade: {"place": 0.2}}
     surface = RunningSurface(
@@ -86,7 +86,7 @@ def test_numbers_of_a_route_that_no_train_took_are_not_asked():
 
 
 @pytest.mark.parametrize(("prior", "by", "said"), [(0.5, 0.2, True), (0.15, 0.7, True), (0.15, 0.2, False)])
-def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_the_files(prior, by, said):
+def test_a_value_is_reported_where_it_is_more_certain_than_in_the_file_or_differs_from_it(prior, by, said):
     """To 10 % and the fit's own 3: a prior of 15 % knows as much, but 0.7 of a logarithm off is another nose."""
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"share": prior}}), WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
@@ -94,7 +94,7 @@ def test_a_number_is_told_where_it_is_known_better_than_from_the_file_or_is_not_
     assert bool(list(surface.estimate(case, fit))) is said
 
 
-def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
+def test_a_reported_value_is_not_drawn_to_the_file():
     """Recordings that say 0.3 ± 0.2 under a prior of 0.5 have their posterior at 0.26 ± 0.19."""
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"length": 0.5}}), WAVES, ("main",))
     weights = np.array([0.2, 0.5]) ** -2.0
@@ -105,7 +105,7 @@ def test_what_is_told_of_a_number_is_not_drawn_to_the_file():
     assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, SURFACE.model_error))
 
 
-def test_the_search_for_the_nose_hears_no_recording_that_is_kept_back(monkeypatch):
+def test_the_search_for_the_nose_uses_no_held_out_recording(monkeypatch):
     heard = []
     monkeypatch.setattr(
         passage_alignment.PassageAligner, "correlation", lambda self, values, passage: heard.append(passage.name) or 0.5
@@ -171,7 +171,7 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
 
 
 @pytest.mark.slow
-def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track_leaves(case, certain):
+def test_a_nose_within_its_prior_is_estimated_and_leaves_the_residual_of_an_intact_track(case, certain):
     """Place, depth and length of the true nose lie within two standard errors; with the file's numbers for certain
     the same recordings are left with five times as much, and the answer was a dip."""
     fit = fit_jointly(case, iterations=15)
@@ -188,7 +188,7 @@ def test_a_nose_within_its_prior_is_found_as_it_is_and_leaves_what_a_sound_track
     assert fit.level["passage"] < case.control_level["passage"]
 
 
-def test_a_number_far_from_the_file_is_said():
+def test_a_value_far_from_the_file_is_reported():
     surface = RunningSurface(FILED, WAVES, ("main",))
     depth = next(u for u in surface.parameters if u.field == "depth")
     assert surface_sentence(depth.estimate(0.9, 0.05)) == ""

@@ -41,7 +41,7 @@ class Counted(Case):
 
 
 @pytest.mark.parametrize(("most", "count"), [(None, 10_000), (5, 4), (5, 5), (0, 0)])
-def test_a_search_may_cost_what_its_bound_says(most, count):
+def test_a_search_may_cost_as_much_as_its_bound(most, count):
     case = Counted(most)
     case.count = 7 + count
     check_limit(case, 7)
@@ -70,7 +70,7 @@ def test_what_the_fit_without_effects_costs_is_not_part_of_the_search(monkeypatc
     assert base.count > 0 and set(n_before) == {base.count}
 
 
-def test_a_search_beyond_its_bound_cannot_tell():
+def test_a_search_beyond_its_bound_has_no_answer():
     case = Counted(3)
     found = diagnose(case)
     assert found.verdict.answer == "unknown" and found.verdict.trail[0] == "search_too_long"

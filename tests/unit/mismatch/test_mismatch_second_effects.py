@@ -1,4 +1,4 @@
-"""Second effects: what a law that is exact leaves is another effect, what another law leaves may be its own shape."""
+"""Second effects: an exact effect leaves another effect, an approximate one may leave its own shape."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -45,7 +45,7 @@ class Shapes(Case):
 
 
 @pytest.mark.parametrize("exact, names", [(True, ("wave", "ramp")), (False, ("wave",))])
-def test_a_second_effect_needs_a_share_of_the_first_only_where_its_law_may_be_off(exact, names):
+def test_a_second_effect_needs_a_share_of_the_first_only_where_its_shape_may_be_off(exact, names):
     """The ramp is worth 200 ln(1 + 2.8^2 / 12) = 100 nats, the wave 200 ln(2000^2 / 3.3) = 2,800: 28 times as many."""
     assert diagnose(Shapes(exact)).names == names
 
@@ -120,36 +120,36 @@ def with_whites(case, base, candidate, size, share):
 
 
 @pytest.fixture(scope="module")
-def rolled_and_struck():
+def passages_and_impacts():
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
     return case, fit_jointly(case, iterations=0)
 
 
 @pytest.mark.parametrize(("kind", "material"), [("hammer", False), ("passage", True)])
-def test_friction_is_told_by_trains(rolled_and_struck, kind, material):
+def test_friction_is_identified_by_trains(passages_and_impacts, kind, material):
     """To impacts it is a damper: a fit in which passages gain nothing gives it no name, whatever impacts gain."""
-    case, base = rolled_and_struck
+    case, base = passages_and_impacts
     assert {c.naming.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
     better = with_whites(case, base, friction, 3000.0, {"hammer": 1.0, "passage": 1.0, kind: 0.5})
     assert bool(score_of(Search(case), base, better, friction).is_reportable) == material
 
 
-class Heard(Case):
+class SensorGainCase(Case):
     """Four impacts and four trains that a sensor reads with gains of its own, noise of 0.1; its gain is known to 2
     %, and a support, known to 10 %, adds a ramp to impacts."""
 
-    def __init__(self, blows, trains):
+    def __init__(self, impacts, trains):
         rng = np.random.default_rng(9)
-        loud = [("hammer", blows)] * 4 + [("passage", trains)] * 4
+        gains = [("hammer", impacts)] * 4 + [("passage", trains)] * 4
         self.observations = tuple(
             Observation(
                 f"{kind} {k}", f"day {k}", g * self.shape(k) + 0.1 * rng.normal(size=X.size), 0.1, data_type=kind
             )
-            for k, (kind, g) in enumerate(loud)
+            for k, (kind, g) in enumerate(gains)
         )
         self.nuisances = (Nuisance("gain_A", "-", 0.0, 0.02), Nuisance("support", "-", 0.0, 0.1))
-        struck = tuple(o.name for o in self.observations if o.data_type == "hammer")
+        hammer = tuple(o.name for o in self.observations if o.data_type == "hammer")
         gain = (Parameter("gain", "-", 1.0, (-3.0, 3.0), "shown over true", "made up 2026", (1.0, 0.3)),)
         self.candidates = (
             Candidate.of(
@@ -158,7 +158,7 @@ class Heard(Case):
                 lambda p: p["gain"],
                 ((0.8,), (1.25,)),
                 {"sensor": "A"},
-                must_not_oppose=struck,
+                must_not_oppose=hammer,
                 smallest_reportable=0.04,
                 masking_parameter="gain_A",
                 masking_sd=0.3,
@@ -177,11 +177,11 @@ class Heard(Case):
 
 
 @pytest.mark.parametrize("gain", [0.76, 1.25, -1.0])
-def test_what_blows_alone_say_of_a_gain(gain):
-    """Trains hear none; with a prior of 0.02 the fit to both stands in between, impacts alone stand at their own,
+def test_impacts_alone_test_a_gain_against_its_own_estimate(gain):
+    """Trains show none; with a prior of 0.02 the fit to both stands in between, impacts alone stand at their own,
     but for what the prior of 0.3 takes: a hundredth and more where the fit leaves much, so that noise counts
-    as louder."""
-    case = Heard(gain, 1.0)
+    more."""
+    case = SensorGainCase(gain, 1.0)
     fit = fit_jointly(case, iterations=30)
     error = 0.1 / np.sqrt(4 * X.size * 0.5)
     assert single_type_estimate(case, fit, "hammer", "gain_A", 0.3) == pytest.approx(
@@ -190,18 +190,20 @@ def test_what_blows_alone_say_of_a_gain(gain):
     assert single_type_estimate(case, fit, "passage", "gain_A", 0.3) == pytest.approx(0.0, abs=4.0 * error)
 
 
-@pytest.mark.parametrize(("blows", "trains", "material"), [(0.76, 0.76, True), (-1.0, -1.0, True), (1.0, 0.76, False)])
-def test_a_gain_that_blows_speak_against_is_none(blows, trains, material):
-    """Ballast that softens under trains makes a sensor loud in them alone. One that both hear has its name, though the
-    fit without it has bent the gain as far as its tolerance lets it, and leaves impacts no worse."""
-    case = Heard(blows, trains)
+@pytest.mark.parametrize(
+    ("impacts", "trains", "material"), [(0.76, 0.76, True), (-1.0, -1.0, True), (1.0, 0.76, False)]
+)
+def test_a_gain_that_impacts_contradict_is_none(impacts, trains, material):
+    """Ballast that softens under trains raises the level of a sensor in them alone. A gain that both show
+    has its name, though the fit without it moved the gain to the end of its tolerance, and leaves impacts no worse."""
+    case = SensorGainCase(impacts, trains)
     (gain,), base = case.candidates, fit_jointly(case)
     refit = fit_jointly(case, (gain,), [trains])
     assert bool(score_of(Search(case), base, refit, gain).is_reportable) == material
 
 
-def test_it_is_the_blows_that_a_sensor_read_that_may_speak_against_its_gain(rolled_and_struck):
-    case, _ = rolled_and_struck
+def test_only_impacts_that_a_sensor_recorded_may_contradict_its_gain(passages_and_impacts):
+    case, _ = passages_and_impacts
     gains = [c for c in case.candidates if c.family == "sensor_gain"]
     assert any(c.naming.must_not_oppose for c in gains)
     assert all(case.frf_pairs[name].channel == c.where["sensor"] for c in gains for name in c.naming.must_not_oppose)
@@ -232,7 +234,7 @@ class Passages(Case):
         (((1.9, 0.3), (0.5, 0.4), (1.9, 0.2)), False),  # nothing is above the level
         (((2.3, 0.3), (2.1, 0.4), (0.5, 0.2), (0.5, 0.2)), False),  # A shows it in two passages: of track or sensor
         (((2.3, 2.1), (0.5, 0.4), (0.5, 0.2)), False),  # both sensors show it in one: a wheel
-        (((2.3, 0.3), (0.5, 0.4)), False),  # one other passage is no witness
+        (((2.3, 0.3), (0.5, 0.4)), False),  # one other passage is too few to compare with
     ],
 )
 def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean_squares, is_lone):
@@ -249,13 +251,14 @@ def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean
         (((9.2, 2.3), (0.5, 0.4), (1.9, 0.2)), {"train": "t"}, 0.0, 0.0),  # a train may be in that recording alone
         (((9.2, 2.3), (0.5, 0.4), (1.9, 0.2)), {"sensor": "A"}, 9.0, 0.04),  # most of the evidence is in that recording
         (((9.2, 0.3), (2.4, 0.4), (1.9, 0.2)), {"sensor": "A"}, 0.0, 0.0),  # two recordings show it
-        (((9.2, 0.3), (0.5, 0.4)), {"sensor": "A"}, 0.0, 0.0),  # one other passage is no witness
+        (((9.2, 0.3), (0.5, 0.4)), {"sensor": "A"}, 0.0, 0.0),  # one other passage is too few to compare with
     ],
 )
 def test_a_name_of_track_or_sensor_need_not_explain_what_one_recording_has_alone(
     mean_squares, where, gained_there, share
 ):
-    """Wheels that leave a nose make one fast passage loud. A sensor 13 cm off, with 14 nats, lost its name to that."""
+    """Wheels that leave a nose raise the level of one fast passage. A sensor 13 cm off, with 14 nats, lost its
+    name by that."""
     case = Passages(*mean_squares)
     white = [o.data for o in case.observations]
     rest = [white[0] * np.sqrt(1.0 - 2.0 * gained_there / np.sum(white[0] ** 2)), *white[1:]]

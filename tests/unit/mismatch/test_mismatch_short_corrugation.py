@@ -45,12 +45,12 @@ def test_short_corrugation_is_found_with_its_wavelength_and_its_size(size, wavel
     assert 20.5 < found.where["place"] < 27.0
 
 
-def test_sound_rail_and_the_wheel_of_one_train_are_no_corrugation():
+def test_intact_rail_and_the_wheel_of_one_train_are_no_corrugation():
     assert looked_at(seed=8)[1] == ()
     assert looked_at(physics.OutOfRound(1, 5e-5, 1.5e-5, 20, train="heavy"))[1] == ()
 
 
-def test_one_train_alone_cannot_tell_a_rail_from_wheels():
+def test_one_train_alone_does_not_distinguish_a_rail_from_wheels():
     plan = small_plan((15.0,), hammer_positions=())
     plan = SimpleNamespace(**{**vars(plan), "trains": tuple(t for t in plan.trains if t.name == "heavy")})
     case, found = looked_at(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)
@@ -79,7 +79,7 @@ def hummed(speeds, seed=5):
     return found, ambiguous_line(case)
 
 
-def test_a_hum_is_no_corrugation_nor_can_trains_of_one_speed_tell():
+def test_a_hum_is_no_corrugation_and_trains_of_one_speed_are_not_enough():
     """At one speed the answer states the line, its frequency, what it may be, and what would decide."""
     assert hummed((28.0, 40.0, 28.4, 39.5)) == ((), None)
     found, line = hummed((28.0, 28.4, 28.2, 28.3))

@@ -33,14 +33,14 @@ def test_a_short_polygon_is_found_on_its_wheel_with_its_size(wheel, size, order,
     assert found.refit.promise > 12.0
 
 
-def test_sound_wheels_corrugation_and_hum_are_no_polygons():
+def test_round_wheels_corrugation_and_hum_are_no_polygons():
     def hummed(campaign):
-        def loud(p):
+        def with_polygon(p):
             time = np.arange(p.recording.samples.shape[1]) / p.recording.rate
             hum = np.std(p.recording.samples) * np.sin(2.0 * np.pi * 150.0 * time)
             return replace(p, recording=replace(p.recording, samples=p.recording.samples + hum))
 
-        return replace(campaign, passages=tuple(map(loud, campaign.passages)))
+        return replace(campaign, passages=tuple(map(with_polygon, campaign.passages)))
 
     assert found_in(seed=8) == ()
     assert found_in(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16)) == ()
@@ -48,7 +48,7 @@ def test_sound_wheels_corrugation_and_hum_are_no_polygons():
 
 
 def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
-    """The wheel is polygonal in one passage and round in the other; whether that one is kept back says nothing."""
+    """The wheel is polygonal in one passage and round in the other; whether that one is held out does not matter."""
     sound, worn = (
         measured_campaign(small_plan((15.0,), hammer_positions=()), terms, 7) for terms in ((), (turned(1, 6e-5, 13),))
     )
@@ -58,7 +58,7 @@ def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
     assert found_in(changed=lambda _: replace(worn, passages=passages, reserved=(other,)))
 
 
-def test_the_evidence_is_that_of_a_loudness_integrated_out():
+def test_the_evidence_is_that_of_an_amplitude_integrated_out():
     """By quadrature over what a polygon adds, N(0, LOUD²)."""
     sd, added = np.sqrt(SHORT_POLYGONS.wheel_sd**2 + SHORT_POLYGONS.sensor_sd**2 / 8), np.linspace(-40.0, 40.0, 200001)
     prior = np.exp(-0.5 * (added / SHORT_POLYGONS.polygon_sd) ** 2) / (SHORT_POLYGONS.polygon_sd * np.sqrt(2.0 * np.pi))

@@ -65,7 +65,7 @@ def test_a_name_that_lives_on_what_leads_is_dropped_and_another_effect_is_not(tr
 
 
 def test_a_name_as_good_as_what_leads_is_kept():
-    """Both explain as much of what lies half way: a law too small to act on takes nothing from one that matters."""
+    """Both explain as much of what lies half way: an effect too small to act on takes nothing from one that matters."""
     settings = MismatchSettings()
     case = Shapes(**{n: size / np.linalg.norm(SHAPES[n]) for n, size in (("wave", 6.05), ("near", 6.0))})
     ranked = case.ranked()

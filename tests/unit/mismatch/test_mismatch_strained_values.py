@@ -88,7 +88,7 @@ def test_a_prior_that_holds_a_value_back_hides_no_conflict(error):
     assert strained_value(case, fit, paid + 1e-6) is None
 
 
-def test_a_value_that_the_data_say_nothing_of_is_not_strained():
+def test_a_value_that_the_data_do_not_determine_is_not_strained():
     fit = SimpleNamespace(values={"bending": 0.1, "mass": 0.0}, covariance=np.diag([TOLERANCE**2, 0.1**2]))
     assert strained_value(Beam(0.0), fit, THRESHOLD) is None
 
@@ -109,7 +109,7 @@ def test_a_value_that_an_effect_describes_is_judged_as_that_effect():
     assert strained(case) is None
 
 
-def test_the_answer_is_unknown_and_says_why_though_the_residual_is_that_of_intact_recordings():
+def test_the_answer_is_unknown_with_its_reason_though_the_residual_is_that_of_intact_recordings():
     """Before, such a model was called as good as an intact one: its residual is noise."""
     strained_case, intact = (diagnose(Beam(sds * TOLERANCE)) for sds in (5.7, 0.5))
     assert max(strained_case.base.level.values()) < 1.2
@@ -117,7 +117,7 @@ def test_the_answer_is_unknown_and_says_why_though_the_residual_is_that_of_intac
     assert intact.verdict.answer == "none"
 
 
-def test_a_name_beside_which_such_a_value_remains_is_withdrawn_and_the_value_tells_where():
+def test_a_name_beside_which_such_a_value_remains_is_withdrawn_and_the_value_gives_the_position():
     """Wheelsets beyond their tolerance leave a little to other names, such as another contact stiffness."""
     at = ("train", "railcar")
     named, withdrawn = (diagnose(Beam(sds * TOLERANCE, bump=0.1, at=at)) for sds in (0.5, 5.7))

@@ -1,4 +1,4 @@
-"""A cause without a name at several supports, and one that is not linear, are located by hammer tests."""
+"""A cause without a name at several supports, and one that is not linear, are localized by hammer tests."""
 
 from copy import copy
 from dataclasses import replace
@@ -108,7 +108,7 @@ def test_a_small_change_of_the_whole_track_is_in_the_space_of_its_value(case, na
 
 
 @pytest.mark.parametrize("name, size", [("rail_shear", -0.6), ("pad_stiffness", 0.4)])
-def test_a_law_of_the_whole_track_that_holds_in_one_band_is_at_no_position(case, name, size):
+def test_an_effect_of_the_whole_track_that_holds_in_one_band_is_at_no_position(case, name, size):
     """No value of the base model does this, as with pads of several parameters or a rail soft in shear."""
     changed = copy(case)
     changes = changes_within(case, name, size, 400.0, 600.0)

@@ -1,4 +1,4 @@
-"""Two effects at once: refused one by one, named together; and laws that say the same with fewer numbers."""
+"""Two effects at once: rejected one by one, named together; and effects that explain the same with fewer numbers."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -57,20 +57,20 @@ def test_two_effects_of_which_either_leaves_too_much_are_both_named():
     assert all(v.answer == "named" for v in found.verdicts)
 
 
-def test_two_laws_of_one_part_do_not_vouch_for_one_another():
-    """The same, of laws that act on one part: two of them fit nearly any shape, so what is missing stays unknown."""
+def test_two_effects_of_one_part_do_not_confirm_one_another():
+    """The same, of effects on one part: two of them fit nearly any shape, so what is missing stays unknown."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), component="spring", wave=1.2, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
 
 
-def test_an_effect_that_no_name_fits_keeps_the_first_one_refused_too():
+def test_an_effect_that_no_name_fits_keeps_the_first_one_rejected_too():
     """What is left beside the best shape is a ripple, which no candidate has."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), ripple=1.5, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
     assert found.fit is found.base
 
 
-def test_what_shows_beside_a_name_and_gets_none_is_told():
+def test_a_second_effect_without_a_name_is_reported_beside_the_first():
     """A ripple that no candidate has takes nothing from the ramp, but with the ramp not all is said."""
     found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
     assert found.names == ("ramp",) and found.verdict.grade == "B"
@@ -87,7 +87,7 @@ class LocatedShapes(Shapes):
         return [ResidualSpace((o.name,), columns, levels) for o in self.observations]
 
 
-def test_the_sentence_on_a_second_effect_without_a_name_tells_the_inspector_where_it_is():
+def test_the_sentence_on_a_second_effect_without_a_name_states_where_it_is():
     found = diagnose(LocatedShapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
     assert found.names == ("ramp",)
     assert found.verdict.reason.startswith("a second effect without a name remains in channel A8: ")
@@ -120,8 +120,8 @@ def test_two_shapes_of_one_effect_stay_a_choice(monkeypatch):
 
 @pytest.mark.parametrize("wave, ramp", [(1.2, 0.8), (0.12, 2.5)])
 def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp):
-    """Nothing tells a wave from the same wave 0.01 further along, two laws of one spring. The ramp is no law of it, and
-    has its name whether it is found after or before that choice."""
+    """No data distinguish a wave from the same wave 0.01 further along, two effects of one spring. The ramp is neither,
+    and has its name whether it is found after or before that choice."""
     monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
     case = Shapes(("wave", "twin"), component="spring", wave=wave, ramp=ramp)
     case.candidates += Shapes(("ramp",)).candidates
@@ -152,7 +152,7 @@ class Trains(Shapes):
 
 
 @pytest.mark.parametrize("told, names", [(True, ("wave", "wave")), (False, ())])
-def test_wheels_of_two_trains_vouch_for_one_another(told, names):
+def test_wheels_of_two_trains_confirm_one_another(told, names):
     """No recording shows both. Two of one kind that may act on the same recordings do not."""
     found = diagnose(Trains(told))
     assert found.names == names
@@ -221,7 +221,7 @@ def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
 
 
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
-def test_a_start_that_turns_promises_what_it_is(whole, share):
+def test_a_start_that_turns_has_the_predicted_gain_of_its_direction(whole, share):
     """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""
     case = Shapes(("wave",), wave=1.0)
     projector = Projector(case, fit_jointly(case))
@@ -306,12 +306,12 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
 
 
 @pytest.mark.parametrize("known, offered, same", [
-    ({"train": "a"}, {"train": "a", "axle": 2}, False),  # heavy wheels, and a flat that strikes
+    ({"train": "a"}, {"train": "a", "axle": 2}, False),  # heavy wheels, and a wheel flat
     ({"train": "a", "axle": 1}, {"train": "a", "axle": 2}, True),  # two flats
 ])  # fmt: skip
-def test_a_wheel_known_by_its_blows_is_no_shape_of_heavy_wheels(known, offered, same):
-    """A flat strikes and all wheels of its train are heavy: two parts. A wheel out of round is told by no impacts of
-    its own, and may be what heavy wheels leave."""
+def test_a_wheel_known_by_its_impacts_is_no_shape_of_heavy_wheels(known, offered, same):
+    """A wheel has a flat and all wheels of its train are heavy: two parts. A wheel out of round has no
+    impacts that identify it, and may be what heavy wheels leave."""
 
     def of(where, sounding):
         return Candidate.of(
@@ -342,7 +342,7 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
 
 
 @pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
-def test_a_second_effect_that_blows_alone_promise_half_of_is_refitted(promised, scouted, asked):
+def test_a_second_effect_of_which_impacts_alone_predict_half_is_refitted(promised, scouted, asked):
     """What trains say of it comes on top: a soft rail of 12 nats in impacts had 20 in all. What a column promises is of
     all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate.of("soft_rail", AMOUNT, tuple, ((0.5,),))

@@ -30,7 +30,7 @@ def test_a_fall_is_one_beyond_its_standard_error(after, error, fell):
     assert Verification(1, 27.6, after, error=error).is_worse is fell
 
 
-def test_a_model_that_foretells_nothing_is_left_to_the_rules_before():
+def test_a_model_that_predicts_nothing_is_left_to_the_earlier_rules():
     """Without a prediction there is no error either: such a name was rejected when it was judged."""
     assert not Verification(1, 27.6).is_worse
 
@@ -106,7 +106,7 @@ def test_of_two_names_none_is_withdrawn():
     assert [v.answer for v in confirm(pair, WORSE, MismatchSettings())] == ["named", "named"]
 
 
-def test_nothing_is_missing_no_longer_where_what_was_never_used_is_not_foretold():
+def test_the_answer_none_is_withdrawn_where_held_out_recordings_are_not_predicted():
     settings = MismatchSettings()
     none = Verdict("none", probability=0.9, posterior={"none": 0.9, "unknown": 0.1})
     (found,) = confirm((none,), Verification(1, 27.6, reserved_excess=2.1), settings)
@@ -151,7 +151,7 @@ class Line(Case):
 
 
 @pytest.mark.parametrize(("slope", "answer"), [(2.0, "none"), (2.03, "unknown")])
-def test_a_diagnosis_says_so(slope, answer):
+def test_a_diagnosis_states_it(slope, answer):
     found = diagnose(Line(slope))
     assert found.verdict.answer == answer
     assert ("held-out" in sentence(found)) is (answer == "unknown")

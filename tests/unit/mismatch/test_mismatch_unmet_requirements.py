@@ -65,7 +65,7 @@ def test_impacts_alone_do_not_show_what_needs_trains():
 
 
 @pytest.mark.parametrize(("nats", "answer"), [(12.5, "unknown"), (11.5, "none")])
-def test_what_recordings_show_and_cannot_tell_is_unknown_from_the_evidence_of_a_name_on(nats, answer):
+def test_an_effect_that_recordings_show_and_cannot_identify_is_unknown_from_the_evidence_of_a_name_on(nats, answer):
     line = Ambiguity(nats, "the level is high", "passages at another speed", "wavelength", "0.15 m", 2.0, 6.0)
     verdict = judge([], 0.5, MismatchSettings(), ambiguity=line)
     assert verdict.answer == answer and verdict.is_ambiguous == (answer == "unknown")

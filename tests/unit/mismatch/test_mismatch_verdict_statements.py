@@ -71,16 +71,16 @@ def test_a_first_effect_is_not_credited_with_what_the_second_explains():
     like, there = case.candidates
     base = fit_jointly(case)
     first = fit_jointly(case, (like,), [0.5])
-    refused, _ = assess(search, base, [score_of(search, base, first, like)])
+    rejected, _ = assess(search, base, [score_of(search, base, first, like)])
     pair = fit_jointly(case, (like, there), [*first.psi, 0.5], first.values)
     second, _ = assess(search, first, [score_of(search, first, pair, there)])
-    assert (refused.answer, second.answer) == ("unknown", "named")
-    found = settle_pair(Findings(search, base, pair, (refused, second)))
+    assert (rejected.answer, second.answer) == ("unknown", "named")
+    found = settle_pair(Findings(search, base, pair, (rejected, second)))
     assert [v.answer for v in found.verdicts] == ["unknown"] and found.fit is base
     assert found.verdicts[0].trail[-1] == "first_stays_unknown"
 
 
-class OneLoud(Case):
+class OneChannelAbove(Case):
     """A channel at twice what it is in controls in one recording, all else at their level."""
 
     def __init__(self):
@@ -92,7 +92,7 @@ class OneLoud(Case):
 
 
 def with_squares(square, hammer):
-    """A fit that leaves these mean squares in the loud channel and in impacts."""
+    """A fit that leaves these mean squares in the raised channel and in impacts."""
     level, white = {"passage": 0.5, "hammer": hammer}, [np.full(100, np.sqrt(square))]
     psi, part = np.array([0.4]), lambda candidate: slice(0, 1)
     return SimpleNamespace(level=level, white=white, candidates=(), psi=psi, psi_se=0.1 * psi, part=part)
@@ -100,8 +100,8 @@ def with_squares(square, hammer):
 
 @pytest.mark.parametrize(("after", "answer", "grade"), [(4.0, "unknown", ""), (2.2, "named", "B"), (1.9, "named", "A")])
 def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade):
-    """A name of 13 nats that leaves the channel as loud as it was explains nothing of what was heard."""
-    search = Search(OneLoud())
+    """A name of 13 nats that leaves the level of the channel as it was explains nothing of the excess."""
+    search = Search(OneChannelAbove())
     factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
     pad = Candidate.of("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
     base, refit = with_squares(4.0, 0.5), with_squares(after, 0.45)
@@ -114,9 +114,9 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
 
 
 def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
-    """A mounting not quite of its shape leaves its channel loud; a flat beside it has nothing to do with that."""
+    """A mounting not quite of its shape leaves an excess in its channel; a flat beside it has no part in that."""
     first, both = (SimpleNamespace(**{**vars(with_squares(4.0, 0.5)), "candidates": c}) for c in ("m", "mf"))
-    assert explained_share(Search(OneLoud()), first, both) == 1.0
+    assert explained_share(Search(OneChannelAbove()), first, both) == 1.0
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
@@ -127,7 +127,7 @@ def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(plac
     assert np.max(np.abs(beside / here - 1.0)) < 1e-5
 
 
-def test_the_seat_of_a_sensor_beside_the_blow_has_the_derivative_of_its_receptance():
+def test_the_seat_of_a_sensor_beside_the_impact_has_the_derivative_of_its_receptance():
     """And on a sleeper, which the seat on the rail does not move, it is 0."""
     model, way = ReceptanceModel(uniform_track(24.0), ()), RECEPTANCE.seat_step
     difference = (model.receptance(12.2, 12.26 + way) - model.receptance(12.2, 12.26 - way)) / (2.0 * way)
@@ -233,15 +233,15 @@ def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
         p = np.convolve(rng.normal(size=820), np.hanning(9), "same")[10:-10]
         return Observation(f"p{k}", "c", np.roll(p, 2), 0.1, 0.35, "passage"), p
 
-    def blow(k):
+    def impact(k):
         p = rng.normal(size=80)
         return Observation(f"b{k}", "h", p, 0.03, 0.7, "hammer"), p
 
     passages, (reserved, simulated) = [late(k) for k in range(3)], late(9)
-    for seen in (passages, passages + [blow(k) for k in range(32)]):
+    for seen in (passages, passages + [impact(k) for k in range(32)]):
         made = predict_with_decoy([o for o, _ in seen], [p for _, p in seen], [reserved], [simulated], 4)
         assert fit_percent([reserved], made) > 85.0 > 20.0 > fit_percent([reserved], [simulated])
-    alone = [blow(1)]
+    alone = [impact(1)]
     assert predict_with_decoy([o for o, _ in alone], [p for _, p in alone], [reserved], [simulated], 4) == [simulated]
 
 
@@ -272,7 +272,7 @@ def test_a_dip_is_reported_where_it_was_fitted_and_not_where_it_was_looked_for()
     assert (row["position_m"], row["position_se_m"]) == (23.25, 0.03)
 
 
-def test_the_error_of_a_sensors_place_is_none_of_a_sleepers():
+def test_the_position_error_of_a_sensor_is_not_that_of_a_sleeper():
     found = dip(23.0, 0.25)
     hangs = Candidate.of("hanging_sleeper", physics.HangingSleeper.parameters,
                       lambda p: physics.HangingSleeper(4, **p), (), {"place": 23.4, "sleeper": 4}, "place")  # fmt: skip
@@ -305,7 +305,7 @@ def test_noise_is_not_measured_while_the_train_comes(rolled):
     assert np.all(sigma[1] < 1.3 * sigma[0])
 
 
-def test_one_sensor_cannot_tell_a_place_from_its_own_channel(rolled):
+def test_one_sensor_does_not_distinguish_a_position_from_its_own_channel(rolled):
     fit = fit_jointly(rolled, iterations=0)
     passages = [s for s in source_spaces(rolled, fit) if any(kind == "sensor" for kind, _ in s.combinations)]
     assert any(kind == "place" for s in passages for kind, _ in s.combinations)

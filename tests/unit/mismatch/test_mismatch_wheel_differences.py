@@ -79,7 +79,7 @@ class OneWheel(PhysicsTerm):
 @pytest.mark.slow
 def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
     """First mode of the second wheel against the march with that wheel's own path. As a wave's column it is that of a
-    free track: 0.99 and 5 % are met, 15 cm between the places looked at would make it half as loud again."""
+    free track: 0.99 and 5 % are met, 15 cm between the positions tested would raise it by half."""
     case = TrackCase(replace(measured_campaign(replace(PLAN, turnout=FILED), (), 7), turnout=FILED))
     fit = fit_jointly(case, iterations=6)
     o, before = next((o, p) for o, p in zip(case.observations, fit.predictions) if o.name in case.aligned_passages)

@@ -18,7 +18,7 @@ from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import PairEvidence
 from turnout.physics import Parameter
 
-SIZE = (Parameter("size", "-", 0.0, (-1.0, 1.0), "of a law", "made up 2026"),)
+SIZE = (Parameter("size", "-", 0.0, (-1.0, 1.0), "of an effect", "made up 2026"),)
 
 
 def candidate(family, place):

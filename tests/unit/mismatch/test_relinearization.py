@@ -142,7 +142,7 @@ def test_a_change_stays_and_ends_the_search(history, valley):
     assert all(a is b for a, b in zip(result.before, result.after))
 
 
-def test_a_linear_model_has_the_excess_that_its_derivatives_promise(monkeypatch):
+def test_a_linear_model_has_the_excess_that_its_derivatives_predict(monkeypatch):
     """Length, depth + load and load measured eight times: against the optimum of the three, by linear algebra."""
     rows = np.repeat([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]], 8, axis=0)
     monkeypatch.setattr(Valleys, "predict", lambda self, v, *a: [rows @ [v["length"], v["depth"], v["load"]]])

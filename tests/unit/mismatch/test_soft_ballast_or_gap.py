@@ -61,7 +61,7 @@ def test_a_damper_that_loses_less_than_the_spring_is_no_gap(question, damper_sha
 
 
 @pytest.mark.parametrize("question", ["change", "file"])
-def test_dampers_of_which_data_tell_little_do_not_decide(question):
+def test_dampers_that_data_hardly_determine_do_not_decide(question):
     assert [names_of(question, 0.5, damper_weight=0.02, seed=s) for s in range(5)] == [EITHER] * 5
 
 

@@ -34,7 +34,7 @@ def laid(places, noise=0.0, n=900, seed=0):
     return Profiles((Motion(1.0),), row[None, None], spectra, np.array([np.sum(row**2)]), length, np.zeros(1))
 
 
-def test_a_motion_that_would_turn_back_within_the_recording_hears_nothing():
+def test_a_motion_that_would_turn_back_within_the_recording_has_no_length():
     """A long quiet recording, and a train that brakes so hard that it would roll back: no metres, and no fault."""
     levels = SimpleNamespace(step=0.01, amplitude=np.abs(np.random.default_rng(0).normal(size=(1, 12_000))))
     listening = SimpleNamespace(levels=levels, positions=[3.0], begin=0.0, end=120.0)

@@ -1,4 +1,4 @@
-"""Trains over a crossing's nose: each wheel causes an impact there, louder to all sensors than the wheels beside it."""
+"""Trains over a crossing's nose: each wheel causes an impact there, stronger at all sensors than their own wheels."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ PLACES, NOSE = (0.0, 2.3, 4.1, 7.4), 3.2  # m
 STRANGER = np.array([0.0, 1.9, 11.2, 13.1, 19.7, 21.8, 33.0, 35.4])
 
 
-def banging(rng, offsets, speed, direction, loud=6.0):
-    """Bursts that follow the wheels, and at each sensor a burst ``loud`` times as strong while a wheel is at the nose,
+def with_impacts(rng, offsets, speed, direction, strength=6.0):
+    """Bursts that follow the wheels, and at each sensor a burst ``strength`` times as strong for a wheel at the nose,
     ringing for 15 ms, all of it at the same moment; and (n_sensor, n_axle) when the wheels pass the sensors."""
     recording = rolling_noise(rng, offsets, speed, PLACES, direction)
     samples, time = recording.samples.copy(), np.arange(recording.samples.shape[1]) / RATE
@@ -22,25 +22,25 @@ def banging(rng, offsets, speed, direction, loud=6.0):
     for t in every[-1]:
         ring = np.where(time >= t, np.exp(-np.maximum(time - t, 0.0) / 0.015), 0.0)
         for i, x in enumerate(PLACES):
-            samples[i] += loud * np.exp(-abs(x - NOSE) / 15.0) * ring * rng.standard_normal(time.size)
+            samples[i] += strength * np.exp(-abs(x - NOSE) / 15.0) * ring * rng.standard_normal(time.size)
     return recording_of(samples, PLACES), every[:-1]
 
 
 @pytest.mark.parametrize(("direction", "speed"), [(1, 26.0), (-1, 26.0), (1, 44.0), (-1, 52.0)])
 def test_a_known_train_with_nose_impacts_is_found_with_its_speed_and_direction(direction, speed):
-    recording, times = banging(np.random.default_rng(round(speed) + direction), IC3, speed, direction)
+    recording, times = with_impacts(np.random.default_rng(round(speed) + direction), IC3, speed, direction)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert (passage.type.type, passage.n_axle, passage.status) == ("IC3", 8, "accepted")
     assert passage.direction == ("facing" if direction > 0 else "trailing")
     # axles 0.4 m off at either end of 53 m would be 1.5 %
     assert passage.speed.speed == pytest.approx(speed, rel=0.01)
-    heard = np.array([passage.at_sensor[c.name] for c in recording.channels])
+    at_sensors = np.array([passage.at_sensor[c.name] for c in recording.channels])
     # a wheel's length on the rail either side: what an axle is placed by spreads over 0.4 m in the recording
-    assert np.abs(heard - times).max() * speed < 0.8
+    assert np.abs(at_sensors - times).max() * speed < 0.8
 
 
 def test_a_train_without_template_with_nose_impacts_is_counted_with_a_doubt():
-    recording, _ = banging(np.random.default_rng(3), STRANGER, 33.0, 1)
+    recording, _ = with_impacts(np.random.default_rng(3), STRANGER, 33.0, 1)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert passage.type.type == UNKNOWN
     assert "axles_uncertain" in {f.reason for f in passage.findings}
@@ -50,7 +50,7 @@ def test_a_train_without_template_with_nose_impacts_is_counted_with_a_doubt():
 def test_a_known_train_that_leaves_a_higher_peak_than_its_weakest_axle_is_doubted(seed):
     """Four axles carry little information: impacts at the nose look like a locomotive at 58 m/s instead of 44."""
     locomotive = Pattern("locomotive", (Group((Vehicle("unit", 18.0, (2.7, 5.7, 12.3, 15.3)),), 1, 1),))
-    recording, _ = banging(np.random.default_rng(seed), np.array([0.0, 3.0, 9.6, 12.6]), 44.0, 1)
+    recording, _ = with_impacts(np.random.default_rng(seed), np.array([0.0, 3.0, 9.6, 12.6]), 44.0, 1)
     passage = analyse(recording, sensors_for(recording), [*PATTERNS, locomotive], PassageSettings())
     assert passage.type.type == "locomotive" and passage.speed.speed > 55.0  # wrong, and therefore doubted
     assert "axles_uncertain" in {f.reason for f in passage.findings}

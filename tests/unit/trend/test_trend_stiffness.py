@@ -68,7 +68,7 @@ def both_bands(pad, ballast, seed, turnouts=2, weeks=120, start=80, **more):
 
 
 @pytest.mark.parametrize("pad, ballast, component", [(1.0, 0.88, "ballast"), (0.88, 1.0, "pad")])
-def test_no_alarm_of_a_fleet_blames_the_wrong_component(settings, pad, ballast, component):
+def test_no_alarm_of_a_fleet_names_the_wrong_component(settings, pad, ballast, component):
     charts = evaluate(both_bands(pad, ballast, 5, turnouts=40), None, settings)
     status = chart_status(charts, settings)
     status = describe_flagged(status, candidates(charts, status, settings), settings)

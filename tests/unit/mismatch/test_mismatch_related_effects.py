@@ -1,4 +1,4 @@
-"""Laws of one part: refitted side by side, distinguished where they can be, and odd only against their like."""
+"""Effects of one part: refitted side by side, distinguished where they can be, compared only with their like."""
 
 from types import SimpleNamespace
 
@@ -76,7 +76,7 @@ def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
     assert not is_within_spread(case, refit, candidate("local_pad"))
 
 
-def test_laws_of_the_leading_parts_are_refitted_from_their_best_starts():
+def test_effects_of_the_leading_parts_are_refitted_from_their_best_starts():
     there = {"sleeper": 9, "place": 5.4}
     leader, gap = candidate("local_ballast", component="ballast"), candidate("hanging_sleeper", component="ballast")
     other, far = candidate("sensor_gain", {"sensor": "S1"}), candidate("hanging_sleeper", there, component="ballast")
@@ -117,7 +117,7 @@ def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_exp
         (10.0, -2.1, 0.5, "unknown"),
     ],
 )
-def test_a_name_that_one_condition_speaks_against_is_none(gain, worst, excess, said):
+def test_a_name_that_one_condition_contradicts_is_none(gain, worst, excess, said):
     """``gain`` and ``worst`` in thresholds: half of one is chance, a fifth of the gain is not."""
     settings = MismatchSettings()
     fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]), part=first)
@@ -141,25 +141,25 @@ def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
 ):
     """Impacts that come once a turn are a flat's, though the waveform in the band, which takes the angle to the
     millimetre, stays as it was: 30 nats less ln 20 are more than a threshold of 12, and 13 less ln 20 are not. A
-    channel's ceiling, or a line above the band, is no such evidence. A gain of less than 30 less ln 20, 27.004, means
+    channel's limit, or a line above the band, is no such evidence. A gain of less than 30 less ln 20, 27.004, means
     that the fit has become worse: by more than a margin of 6, which its numbers cost, that speaks against it; the
-    loudest channel alone, which it may leave louder, does not."""
+    strongest channel alone, whose level it may raise, does not."""
     where = {"train": "railcar", "axle": 1}
     flat = candidate("wheel_flat", where, external_evidence=aside, n_scanned=scanned, evidence_suffices=sounding)
     verdict = answer(score(flat, gain, 0.08, 0.01, explained=explained))
     assert verdict.answer == said and f"{explained:.0%}" in verdict.reason
 
 
-def test_what_explains_too_little_leaves_the_lead_to_what_other_data_tell():
-    """A gain in a sensor that a flat keeps louder than intact turnouts: both are said, and asked together."""
+def test_a_candidate_that_explains_too_little_does_not_lead_against_other_data():
+    """A gain in a sensor that a flat keeps above the control level: both are named, and tested together."""
     flat = candidate(
         "wheel_flat", {"train": "railcar", "axle": 1}, external_evidence=43.6, n_scanned=20, evidence_suffices=True
     )
     gain = candidate("sensor_gain", {"sensor": "A1"})
     found = [score(gain, 150.0, 0.7, 0.01, explained=0.02), score(flat, 37.6, 0.08, 0.01, explained=0.01)]
     assert answer(*found).names == ("wheel_flat", "sensor_gain")
-    told_by_fit = [score(gain, 150.0, 0.7, 0.01, explained=0.9), found[1]]
-    assert answer(*told_by_fit).names == ("sensor_gain",)
+    separated_by_fit = [score(gain, 150.0, 0.7, 0.01, explained=0.9), found[1]]
+    assert answer(*separated_by_fit).names == ("sensor_gain",)
     assert answer(found[0]).answer == "unknown"
 
 
