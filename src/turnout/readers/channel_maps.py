@@ -1,29 +1,23 @@
-"""Channels of the layout assigned to rows of a file, with their units."""
+"""Channels of the layout assigned to rows of a file."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-import numpy as np
-
 from turnout.counts import first_texts
 from turnout.errors import ReadError
+from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.entries import UnreadObject
-from turnout.readers.lazy import Column
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
-from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
-from turnout.readers.stated_quantities import contradicting_quantity, quantity_entries
-from turnout.readers.stated_scales import remedy as scale_remedy
-from turnout.readers.stated_sensitivities import sensitivity_entries, sensitivity_problem
-from turnout.readers.stated_units import contradicting_unit, is_meaningless, key_of_units
+from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_quantities import quantity_entries
+from turnout.readers.stated_sensitivities import sensitivity_entries
+from turnout.readers.stated_units import key_of_units
 from turnout.readers.time_axes import is_axis_name
 from turnout.records import Channel, RawChannel
-from turnout.units import IGNORED, conversion, to_si
-
-FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
+from turnout.units import IGNORED
 
 
 @dataclass(frozen=True)
@@ -109,7 +103,6 @@ def channel_mappings(
 
 
 MAX_LISTED = 12  # channels that a message names
-CORRECT_SOURCE = "Correct 'source' of this channel in the layout"
 
 
 def _name_list(names: Sequence[str]) -> str:
@@ -199,27 +192,11 @@ def _sensor_rows(record: RawRecord, channels: Sequence[RawChannel], where: str, 
 
 
 def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str, source: Source) -> ChannelMapping:
-    place, file_unit = f"{where}, channel {raw.name!r}", record.units[index]
+    place = f"{where}, channel {raw.name!r}"
     if (dtype := record.samples[index].dtype).kind not in "fiu":
         problem = f"its samples are {kind_of(dtype)}, no real numbers"
         raise source.error(place, problem, "Export them as whole or floating-point numbers", reason="channel_missing")
-    try:
-        conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
-    except ValueError as error:
-        remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
-        raise source.error(place, str(error), remedy, reason="unit_unknown") from error
-    if (statement := record.undecided.get(index)) and not (raw.unit or "").endswith("!"):
-        raise source.error(place, statement, scale_remedy(file_unit), reason="scale_unknown")
-    is_overruled = (raw.unit or "").endswith("!")
-    if not is_overruled:
-        _check_stated_units(record, index, raw, place, source)
-    if raw.sensitivity is not None and not is_overruled:
-        stated = record.entries, raw.sensitivity, raw.sensitivity_unit, raw.quantity, record.names, index
-        if problem := sensitivity_problem(*stated):
-            remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
-            raise source.error(place, problem, remedy, reason="scale_unknown")
-    if record.audio and not is_overruled:
-        _check_full_scale(record, index, raw.unit or "", place, source)
+    conversion_to_si = checked_conversion(record, index, raw, place, source)
     sign = -1 if raw.sign < 0 else 1
     channel = Channel(
         name=raw.name,
@@ -231,105 +208,6 @@ def _channel_mapping(index: int, record: RawRecord, raw: RawChannel, where: str,
         resolution=raw.resolution,
     )
     return ChannelMapping(index, channel, sign * conversion_to_si.scale, sign * conversion_to_si.offset)
-
-
-def _check_full_scale(record: RawRecord, index: int, unit: str, place: str, source: Source) -> None:
-    """ReadError if the numbers of an audio file are fractions of a full scale that nothing states, or are none."""
-    is_stated = bool(FULL_SCALE_UNIT.match(unit))
-    if record.audio == "whole" and not is_stated and is_meaningless(record.units[index]):
-        problem = f"its whole numbers are fractions of full scale, and nothing says what full scale is in {unit!r}"
-        remedy = f"Set it in the layout, such as 'unit: 10 {unit}'; 'unit: 1 {unit}' if full scale is one"
-        raise source.error(place, problem, remedy, reason="scale_unknown")
-    if record.audio == "floating" and is_stated and (largest := _largest(record.samples[index])) > 1.0:
-        problem = f"its numbers reach {largest:.4g}, so they are no fractions of the full scale {unit!r}"
-        remedy = "The logger wrote physical numbers: set the unit in the layout without a number, such as 'unit: V'"
-        raise source.error(place, problem, remedy, reason="out_of_scale")
-
-
-def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: str, source: Source) -> None:
-    """ReadError if the metadata or the name of a channel state another unit or quantity than the one in use."""
-    unit_in_use = record.units[index] if not is_meaningless(record.units[index]) else raw.unit or ""
-    if quantity := contradicting_quantity(record, index, raw.quantity, unit_in_use):
-        problem = f"the file says that its quantity is {quantity}, the layout {raw.quantity} in {unit_in_use!r}"
-        remedy = f"{CORRECT_SOURCE}; if the layout is right, set 'unit: {unit_in_use}!' for this channel"
-        raise source.error(place, problem, remedy, reason="unit_unknown")
-    rival = contradicting_unit(record, index, raw.unit, raw.quantity, lambda unit: _is_usable(unit, raw))
-    if not rival:
-        return
-    holder = "the layout" if is_meaningless(record.units[index]) else "its unit"
-    problem = f"its metadata or its name {record.names[index]!r} say {rival!r}, {holder} {unit_in_use!r}"
-    choices = " or ".join(f"'unit: {unit}!'" for unit in (rival, unit_in_use) if _is_usable(unit, raw))
-    remedy = f"Find out which is right; then set it in the layout as {choices or 'a unit with !'}"
-    raise source.error(place, problem, remedy, reason="unit_unknown")
-
-
-def _is_usable(unit: str, raw: RawChannel) -> bool:
-    """Whether numbers in a unit can become the quantity of the channel, by its sensitivity if it has one."""
-    try:
-        to_si(raw.quantity, unit, raw.sensitivity, raw.sensitivity_unit)
-    except ValueError:
-        return False
-    return True
-
-
-def _largest(column: Column) -> float:
-    """Largest absolute number of a column that is finite."""
-    blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
-    return max((float(np.fmax(np.nanmax(block), -np.nanmin(block))) for block in blocks), default=0.0)
-
-
-def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
-    """Unit of the raw numbers, from the file and the layout.
-
-    Both must agree if both state one; "V!" in a layout overrules the file. If the file states counts, the layout gives
-    the value of one count: a voltage, or a unit with a factor. The layout overrules meaningless labels.
-
-    Parameters
-    ----------
-    file_unit : str
-        Unit that the file states, "" without one.
-    layout_unit : str or None
-        Unit that the layout states, or None.
-
-    Returns
-    -------
-    str
-        The unit that holds, which may have a factor.
-
-    Raises
-    ------
-    ValueError
-        If no unit is stated, the units differ, or the file's unit is not known.
-
-    Examples
-    --------
-    >>> resolve_unit("Newtons", None), resolve_unit("EU", "mV"), resolve_unit("g", "V!"), resolve_unit("count", "0.5 N")
-    ('Newtons', 'mV', 'V', '0.5 N')
-    """
-    if layout_unit is None:
-        if not file_unit:
-            raise ValueError("neither the file nor the layout says the unit")
-        return file_unit
-    if layout_unit.endswith("!"):
-        return layout_unit[:-1]
-    stated = conversion(layout_unit)
-    if is_meaningless(file_unit):
-        return layout_unit
-    try:
-        written = conversion(file_unit)
-    except ValueError:
-        raise ValueError(
-            f"the file says {file_unit!r}, which is not known, the layout {layout_unit!r} "
-            f"('unit: {layout_unit}!' if the layout is right)"
-        ) from None
-    of_a_count = stated.dimension == "voltage" or layout_unit.lstrip(" [+-.")[:1].isdigit()
-    same = stated.dimension == written.dimension and abs(stated.scale - written.scale) <= 1e-9 * abs(stated.scale)
-    if not same and not (written.dimension == "count" and of_a_count):
-        raise ValueError(
-            f"the file says {file_unit!r}, the layout {layout_unit!r} "
-            f"('unit: {file_unit}' if the file is right, 'unit: {layout_unit}!' if the layout is)"
-        )
-    return layout_unit
 
 
 class Assignments:

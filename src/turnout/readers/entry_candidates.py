@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
+from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.other_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_units import SECONDS, RateUnit, rate_unit, words_of
@@ -29,7 +30,6 @@ from turnout.readers.source import CONDITIONS, SIMULATED_CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
 from turnout.readers.statements import USUAL_RATES, statements_of_value
-from turnout.readers.time_numbers import EPOCHS
 from turnout.readers.time_texts import looks_dated
 from turnout.units import Conversion
 
@@ -38,14 +38,9 @@ RATE_OR_SCALE, SCALE_OR_OFFSET = "rate, scale or offset", "scale or offset"
 AMPLITUDES = frozenset(("force", "acceleration", "voltage", "count"))
 ORDINATES = AMPLITUDES | {"velocity", "displacement", "strain"}
 MAX_TEXT = 1000  # characters of a text that are searched
-MAX_FACTOR = 10_000  # a larger whole number is a code, unless people choose it as a rate or a converter has it
-YEARS = (1990, 2061)
-ROUND_RATE = 100.0  # Hz: people choose multiples of it
-MAX_CHANCE = 0.1  # share of all numbers of so many digits that are the inverse of a round rate by chance
 MIN_PER_SECOND = 1000.0  # a name that ends with seconds may mean a number per second from here on: "ndata_sec"
 MIN_LIMIT = 0.01  # a smaller number is no count, limit or size
 RATES_IN_TEXT = (2000.0, 1e6)  # Hz: round numbers in a text that may be a rate
-MIN_LARGEST = 127  # of a converter of 8 bits
 MAX_WORDS = 12  # of a text that says what was done to the samples
 MAX_LABEL = 3  # words of a quantity with its unit
 MAX_SIZE = 40  # characters of a candidate that are shown
@@ -181,7 +176,7 @@ def _of_other_subject(text: str) -> Iterator[Candidate]:
     is_sampled = SAMPLING.search(text.casefold()) is not None
     for match in QUANTITY.finditer(text):
         unit = rate_unit(match[2]) if match[2] else None
-        is_step = unit is not None and unit.is_step and _is_inverse_of_rate(match[1], float(unit.scale))
+        is_step = unit is not None and unit.is_step and is_inverse_of_rate(match[1], float(unit.scale))
         if unit and (unit.is_sampling or is_step or (is_sampled and not unit.is_step)):
             yield from _of_rate(match[0], match[1], unit, is_weak=True)
     if BARE_NUMBER.fullmatch(text):
@@ -198,22 +193,9 @@ def _is_compared(name: str, text: str) -> bool:
 
 def _numbers_of_other(number: str) -> Iterator[Candidate]:
     """A number that its name explains, unless it is the rate in disguise, or a step."""
-    yield Candidate(RATE, number, True, number=_value(number), is_of_other=True)
-    if _is_inverse_of_rate(number, 1.0):
+    yield Candidate(RATE, number, True, number=number_value(number), is_of_other=True)
+    if is_inverse_of_rate(number, 1.0):
         yield from _of_rate(number, number, RateUnit(True, Fraction(1)), is_weak=True)
-
-
-def _is_inverse_of_rate(number: str, scale: float) -> bool:
-    """Whether a time is that of one sample by its digits: they are the inverse of a round rate, "78.125" µs."""
-    n_digit = len(re.sub(r"[eE].*|\D", "", number).strip("0"))
-    tolerance = 10.0 ** (1 - n_digit)  # relative, of a rounded number
-    times = [float(reading.value) * scale for reading in readings(number)]
-    for rate in (1.0 / time for time in times if time > 0.0):
-        step, n_step = ROUND_RATE / rate, rate / ROUND_RATE
-        is_close = tolerance <= MAX_CHANCE * step and abs(n_step - round(n_step)) * step <= tolerance
-        if is_close and USUAL_RATES[0] <= rate <= USUAL_RATES[1]:
-            return True
-    return False
 
 
 def _of_value(name: str, text: str, subject: int) -> Iterator[Candidate]:
@@ -315,7 +297,7 @@ def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Cand
         return  # by other modules
     if "_".join(words_of(name)) in CONDITIONS:
         return  # the condition itself: a speed, a temperature
-    value = _value(number)
+    value = number_value(number)
     quantity = QUANTITY.fullmatch(f"{number} {unit}") if rate_unit(unit) or HARMLESS_UNIT.fullmatch(unit) else None
     is_counted = unit.casefold() in SECONDS and value >= MIN_PER_SECOND
     if quantity and not is_counted:
@@ -323,41 +305,14 @@ def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Cand
         return
     if value == 1.0 and any(map(INVERTED.fullmatch, words_of(name))):
         yield Candidate(SCALE, number)
-    if value in (0.0, 1.0) or (WHOLE_NUMBER.fullmatch(number) and _is_code(value)):
+    if value in (0.0, 1.0) or (WHOLE_NUMBER.fullmatch(number) and is_code(value)):
         return
     if subject == WEAK and LENGTH.search(" ".join(words_of(name))):
         yield Candidate(DURATION, number, True, number=value, seconds=(value, value / 1000.0))
     if subject == WEAK and abs(value) >= MIN_LIMIT:
         yield from _numbers_of_other(number)
         return
-    yield Candidate(RATE_OR_SCALE, number, True, _rates_of_number(number), value)
-
-
-def _is_code(value: float) -> bool:
-    """Whether a whole number is a time stamp, a year or a code rather than a setting."""
-    is_epoch = any(EPOCHS[0] <= value / scale <= EPOCHS[1] for scale in (1.0, 1e3, 1e6, 1e9))
-    return is_epoch or ((YEARS[0] <= value <= YEARS[1] or value > MAX_FACTOR) and not _is_round(int(value)))
-
-
-def _is_round(value: int) -> bool:
-    """Whether a whole number is one that people choose as a factor or a rate, or the largest one of a converter."""
-    return (value >= MIN_LARGEST and value & (value + 1) == 0) or value % 50 == 0 or value % 16 == 0
-
-
-def _rates_of_number(number: str) -> tuple[Interval, ...]:
-    """Rates that a number without unit may mean: in Hz and kHz, or a step in s, ms and µs."""
-    units = ((False, 1), (True, 1), (False, 1000), (True, Fraction(1, 1000)), (True, Fraction(1, 10**6)))
-    return tuple(
-        interval
-        for is_step, scale in units
-        for reading in readings(number)
-        if (interval := reading.interval(Fraction(scale), is_step))
-    )
-
-
-def _value(number: str) -> float:
-    printed = readings(number)
-    return float(printed[0].value) if printed else 0.0
+    yield Candidate(RATE_OR_SCALE, number, True, rates_of_number(number), value)
 
 
 def _of_state(name: str, text: str) -> Iterator[Candidate]:
@@ -375,7 +330,7 @@ def _of_state(name: str, text: str) -> Iterator[Candidate]:
 
 def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = False) -> Iterator[Candidate]:
     """Candidates of a number with its unit, in a text or alone."""
-    number, unit, value = match[1], match[2] or "", _value(match[1])
+    number, unit, value = match[1], match[2] or "", number_value(match[1])
     if value == 0.0:
         return
     stated = RateUnit(False, Fraction(1000)) if unit in ("k", "ks", "kS") else rate_unit(unit) if unit else None
@@ -385,7 +340,7 @@ def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = 
     elif not unit:
         is_round = value.is_integer() and (value % 100 == 0 or value % 1024 == 0)
         if is_round and RATES_IN_TEXT[0] <= value <= RATES_IN_TEXT[1]:
-            yield Candidate(RATE, number, True, _rates_of_number(number), value)
+            yield Candidate(RATE, number, True, rates_of_number(number), value)
     elif subject == NONE:
         amplitude = known_unit(unit)
         if LEVEL_UNIT.fullmatch(unit):

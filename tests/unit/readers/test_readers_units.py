@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from turnout.readers.channel_maps import resolve_unit
+from turnout.readers.channel_units import resolve_unit
 from turnout.units import conversion, to_si
 
 G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
