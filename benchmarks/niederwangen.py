@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from turnout.trend.drift import adjusted_p_values
-from turnout.trend.sparse_campaigns import (
+from benchmarks.sparse_campaigns import (
     Block,
     deviance,
     find_splits,
@@ -22,6 +21,7 @@ from turnout.trend.sparse_campaigns import (
     steps,
     verdicts,
 )
+from turnout.trend.drift import adjusted_p_values
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 DIRECTIONS = ("vertical", "lateral")

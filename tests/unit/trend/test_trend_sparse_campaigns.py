@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import statsmodels.api as sm
-
-from turnout.trend.sparse_campaigns import (
+from benchmarks.sparse_campaigns import (
     Block,
     design,
     deviance,
