@@ -1,7 +1,8 @@
 """Columns of text with the time of day of each sample, with or without a date, as loggers print them."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from datetime import date
 
 import numpy as np
 
@@ -10,14 +11,20 @@ from turnout.readers.texts import decode_text
 
 DATE = r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2})"
 CLOCK = r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d{1,12})?)(?: ?([AaPp])\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?"
-STAMP = re.compile(rf" *(?:(?:{DATE})[T ,_]+)?{CLOCK} *")
+# As CLOCK, behind a date or a count of days; or minutes and seconds, which without decimals may be hours and minutes.
+STAMP = re.compile(
+    rf" *(?:(?P<date>{DATE})[T ,_]+|(?P<days>\d{{1,5}}) days? )?"
+    r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d{1,12})?)(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+    r"(?:(?P<zone>Z| ?UTC)| ?(?P<sign>[+-])(?P<zone_hour>\d{2}):?(?P<zone_minute>\d{2}))? *"
+)
+MINUTES = re.compile(r" *(?P<minute>\d{1,2}):(?P<second>\d{2}[.,]\d{1,12}) *")
 DATE_ALONE = re.compile(rf" *(?:{DATE}) *")
 DAY = 86400.0  # s
-LONGEST_STEP_BACK = DAY / 2  # s: a larger one is midnight
+HOUR = 3600.0  # s
 
 
 def is_clock(text: str) -> bool:
-    """Whether a text is a time of day with seconds, with or without a date before it.
+    """Whether a text is a time of day with seconds, with or without a date before it, or minutes and seconds.
 
     Parameters
     ----------
@@ -31,10 +38,12 @@ def is_clock(text: str) -> bool:
 
     Examples
     --------
-    >>> [is_clock(text) for text in ("10:00:00.00005", "13.05.2026 10:00:00,5", "2026-05-13T10:00:00Z", "10:00", "3")]
-    [True, True, True, False, False]
+    >>> [is_clock(text) for text in ("10:00:00.00005", "13.05.2026 10:00:00,5", "2026-05-13T10:00:00Z", "00:10.5")]
+    [True, True, True, True]
+    >>> is_clock("10:00"), is_clock("3")
+    (False, False)
     """
-    return bool(STAMP.fullmatch(text))
+    return bool(STAMP.fullmatch(text) or MINUTES.fullmatch(text))
 
 
 def is_clock_or_date(text: str) -> bool:
@@ -56,7 +65,8 @@ def is_clock_or_date(text: str) -> bool:
 def seconds_of_clock(texts: Sequence[str]) -> np.ndarray:
     """Seconds of times of day, counted from the first of them.
 
-    The date is not read: where the time of day falls by more than half a day, the next day begins.
+    Dates, counts of days and time zones in the texts count. Without a date the next day begins where the time of day
+    falls by more than half a day; of minutes and seconds, the next hour where they fall by more than half an hour.
 
     Parameters
     ----------
@@ -66,7 +76,7 @@ def seconds_of_clock(texts: Sequence[str]) -> np.ndarray:
     Returns
     -------
     (n,) array of float
-        NaN where a text is none. [s]
+        NaN where a text is none, as at 10:61:00. [s]
 
     Examples
     --------
@@ -74,16 +84,94 @@ def seconds_of_clock(texts: Sequence[str]) -> np.ndarray:
     array([0. , 0.5, nan, 1.5])
     >>> seconds_of_clock(["05/13/2026 12:59:59 PM", "05/13/2026 01:00:00 PM"])
     array([0., 1.])
+    >>> seconds_of_clock(["2026-10-25T02:59:59.5+02:00", "2026-10-25T02:00:00+01:00"])
+    array([0. , 0.5])
     """
-    fields = [match.groups() if (match := STAMP.fullmatch(str(text))) else ("nan", "0", "0", None) for text in texts]
-    hours, minutes, seconds, halves = zip(*fields)
-    hour = np.array([float(h) % 12 + 12 * (half in "pP") if half else float(h) for h, half in zip(hours, halves)])
-    second = np.array([float(s.replace(",", ".")) for s in seconds])
-    time = 3600.0 * hour + 60.0 * np.array(minutes, dtype=float) + second
+    matches = [STAMP.fullmatch(text) or MINUTES.fullmatch(text) for text in texts]
+    fields = [match.groupdict() if match else {} for match in matches]
+    time = np.array([_seconds_of_day(field) for field in fields])
+    dates = [field.get("date") for field in fields]
     is_read = np.isfinite(time)
-    steps = np.diff(time[is_read], prepend=time[is_read][:1])
-    time[is_read] += DAY * np.cumsum(steps < -LONGEST_STEP_BACK)
-    return time - time[is_read][0] if is_read.any() else time
+    if not is_read.any():
+        return time
+    if all(date for date, is_one in zip(dates, is_read) if is_one):
+        days = _day_numbers([date or "" for date in dates])
+        return DAY * (days - days[is_read][0]) + (time - time[is_read][0])
+    if all("days" not in field or field["days"] is None for field in fields):
+        period = DAY if any(field.get("hour") for field in fields) else HOUR
+        steps = np.diff(time[is_read], prepend=time[is_read][:1])
+        time[is_read] += period * np.cumsum(steps < -period / 2)
+    return time - time[is_read][0]
+
+
+def _seconds_of_day(field: dict[str, str | None]) -> float:
+    """Seconds since midnight of UTC if a zone is stated, with the days that are counted; NaN if no clock shows them."""
+    if not field:
+        return np.nan
+    hour, minute = int(field.get("hour") or 0), int(field["minute"] or 0)
+    second = float((field["second"] or "").replace(",", "."))
+    if half := field.get("half"):
+        hour = hour % 12 + 12 * (half in "pP") if 1 <= hour <= 12 else 24
+    is_of_day = bool(half or field.get("date") or field.get("zone") or field.get("sign"))
+    if minute > 59 or second >= 61.0 or (is_of_day and hour > 23):  # a leap second is the second 60
+        return np.nan
+    offset = 60.0 * (60 * int(field.get("zone_hour") or 0) + int(field.get("zone_minute") or 0))
+    seconds = DAY * int(field.get("days") or 0) + HOUR * hour + 60.0 * minute + second
+    return seconds + (offset if field.get("sign") == "-" else -offset)
+
+
+# Year, month and day of the three numbers of a date, in the order in which they are written.
+NOTATIONS: tuple[Callable[[int, int, int], tuple[int, int, int]], ...] = (
+    lambda a, b, c: (a, b, c),
+    lambda a, b, c: (c, b, a),
+    lambda a, b, c: (c, a, b),
+)
+
+
+def _day_numbers(dates: Sequence[str]) -> np.ndarray:
+    """Number of the day of each date, in the notation in which they are closest together; NaN for other texts."""
+    if len(set(dates) - {""}) == 1:
+        return np.zeros(len(dates))
+    numbers = {date: tuple(map(int, re.split("[-/.]", date))) for date in dict.fromkeys(dates) if date}
+    best = {date: np.nan for date in numbers}
+    least = np.inf
+    for notation in NOTATIONS:
+        try:
+            days = {text: date(*notation(*parts)).toordinal() for text, parts in numbers.items()}
+        except ValueError:
+            continue
+        if (span := max(days.values()) - min(days.values())) < least:
+            best, least = days, span
+    return np.array([best[text] if text else np.nan for text in dates], dtype=float)
+
+
+def with_dates(columns: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The columns of a table, with the dates of a column that changes before the times of day beside it.
+
+    Parameters
+    ----------
+    columns : sequence of (n,) array
+        The columns as they are in the file.
+
+    Returns
+    -------
+    list of (n,) array
+        They are unchanged where there is more than one column of times of day or of dates.
+
+    Examples
+    --------
+    >>> dates, times = np.array(["13.05.2026", "14.05.2026"]), np.array(["23:59:59", "00:00:00"])
+    >>> with_dates([dates, times])[1]
+    array(['13.05.2026 23:59:59', '14.05.2026 00:00:00'], dtype=object)
+    """
+    columns = list(columns)
+    texts = {i: _text(c[0]) for i, c in enumerate(columns) if len(c) and c.dtype.kind in "OUST"}
+    dates = [i for i, text in texts.items() if DATE_ALONE.fullmatch(text)]
+    clocks = [i for i, text in texts.items() if (stamp := STAMP.fullmatch(text)) and not stamp["date"]]
+    if len(dates) == len(clocks) == 1 and len(set(map(_text, columns[dates[0]]))) > 1:
+        pairs = zip(columns[dates[0]], columns[clocks[0]])
+        columns[clocks[0]] = np.array([f"{_text(day)} {_text(clock)}" for day, clock in pairs], dtype=object)
+    return columns
 
 
 def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray:
@@ -106,7 +194,7 @@ def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray
     Raises
     ------
     ReadError
-        If a later value is no time of day.
+        If a value is no time of day.
     """
     if column.ndim != 1 or len(column) < 2 or column.dtype.kind not in "OUST" or not is_clock(_text(column[0])):
         return column
@@ -117,6 +205,8 @@ def with_durations(column: np.ndarray, where: str, source: Source) -> np.ndarray
     if not np.isfinite(seconds).all():
         k = int(np.argmin(np.isfinite(seconds)))
         problem = f"the time of sample {k} is {texts[k][:60]!r}, that of the first is {texts[0][:60]!r}"
+        if k == 0:
+            problem = f"the time of its first sample, {texts[0][:60]!r}, is none that a clock shows"
         raise source.error(where, problem, "Export the record again from the logger", reason="not_finite")
     return np.round(seconds * 1e9).astype("timedelta64[ns]")
 

@@ -10,7 +10,8 @@ from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
-SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "µs": 1e-6, "us": 1e-6, "ns": 1e-9}
+# Units that say alone that a column is the time. "min" and "d" may be a minimum and a distance.
+UNITS_OF_TIME_ALONE = ("", "s", "sec", "ms", "µs", "us", "ns")
 
 
 def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
@@ -38,7 +39,7 @@ def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
     >>> time_column(["T", "t", "force"], ["°C", "s", "N"]), time_column(["T", "force"], ["°C", "N"])
     (1, None)
     """
-    by_unit = [i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in SECONDS_PER_UNIT]
+    by_unit = [i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in UNITS_OF_TIME_ALONE]
     is_named = [name.strip().lower() in TIME_WORDS for name in names]
     by_name = [i for i, unit in enumerate(units) if is_named[i] and not _is_of_other_quantity(names[i], unit)]
     sure = [i for i in by_name if names[i].strip() != "T"]
@@ -62,7 +63,7 @@ def seconds_per_number(unit: str, source: Source) -> float:
     Parameters
     ----------
     unit : str
-        Unit of the time column as it is written; "" means seconds.
+        Unit of the time column as it is written, such as "ms", "Sekunden" or "min"; "" means seconds.
     source : Source
         The text file.
 
@@ -76,10 +77,13 @@ def seconds_per_number(unit: str, source: Source) -> float:
     ReadError
         For an unknown unit of time.
     """
-    if _plain_unit(unit) not in SECONDS_PER_UNIT:
-        remedy = f"Export the time in one of {', '.join(SECONDS_PER_UNIT)[2:]}"
+    if not unit.strip():
+        return 1.0
+    time_unit = rate_unit(unit)
+    if time_unit is None or not time_unit.is_step:
+        remedy = "Export the time in s, ms, µs, ns, min or h, or as the time of day with seconds"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
-    return SECONDS_PER_UNIT[_plain_unit(unit)]
+    return float(time_unit.scale)
 
 
 def _plain_unit(unit: str) -> str:
@@ -129,7 +133,7 @@ def _are_units(cells: Sequence[str], share: float) -> bool:
 def _is_unit(cell: str) -> bool:
     """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
     bare = cell.strip("[]() ")
-    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in SECONDS_PER_UNIT:
+    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in UNITS_OF_TIME_ALONE:
         return True
     try:
         return not bare[0].isdigit() and bool(conversion(bare))

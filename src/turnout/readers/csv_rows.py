@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from turnout.readers.clock_texts import is_clock_or_date, with_durations
+from turnout.readers.clock_texts import is_clock_or_date, with_dates, with_durations
 from turnout.readers.csv_cells import (
     MISSING_VALUES,
     MarkStatistics,
@@ -91,8 +91,9 @@ def _columns_of(
 ) -> list[Column]:
     """The columns of a table as arrays, whose marks are no marks for thousands."""
     columns: list[Column] = []
-    for i, column in enumerate(table.columns):
-        numbers = with_durations(column.to_numpy(zero_copy_only=False), f"column {names[i] or i + 1!r}", source)
+    cells = with_dates([column.to_numpy(zero_copy_only=False) for column in table.columns])
+    for i, column in enumerate(cells):
+        numbers = with_durations(column, f"column {names[i] or i + 1!r}", source)
         check_thousands(numbers, i, names[i], data, offset, separator, source)
         columns.append(numbers)
     return columns

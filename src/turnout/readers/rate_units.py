@@ -18,12 +18,14 @@ SECONDS = set(
 )
 TIME_UNITS = {
     **dict.fromkeys(SECONDS, Fraction(1)),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds", "millisekunden"), Fraction(1, 10**3)),
-    **dict.fromkeys(("µs", "us", "usec", "µsec", "microsecond", "microseconds", "mikrosekunden"), Fraction(1, 10**6)),
+    **dict.fromkeys(("ms", "msec", "millisec", "millisecond", "milliseconds", "millisekunden"), Fraction(1, 10**3)),
+    **dict.fromkeys(
+        ("µs", "us", "usec", "µsec", "microsec", "microsecond", "microseconds", "mikrosekunden"), Fraction(1, 10**6)
+    ),
     **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), Fraction(1, 10**9)),
     **dict.fromkeys(("ps",), Fraction(1, 10**12)),
-    **dict.fromkeys(("min", "minute", "minutes", "minuten"), Fraction(60)),
-    **dict.fromkeys(("h", "hour", "hours", "stunden"), Fraction(3600)),
+    **dict.fromkeys(("min", "mins", "minute", "minutes", "minuten"), Fraction(60)),
+    **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "stunden"), Fraction(3600)),
     **dict.fromkeys(("d", "day", "days", "tage"), Fraction(86400)),
 }
 PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}

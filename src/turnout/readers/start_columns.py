@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 
-from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE, STAMP
+from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import words_of
 from turnout.readers.rate_words import is_time_name
@@ -15,6 +15,7 @@ from turnout.readers.source import RawRecord
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
 from turnout.readers.time_numbers import time_of_number
 
+TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
 DATED = re.compile(rf" *({DATE})[T ,_]+{CLOCK} *")
 ZONE = re.compile(r"(?:(Z|UTC)|([+-])(\d{2}):?(\d{2})) *$")
 
@@ -46,7 +47,7 @@ def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime
     dated = [cell for cell in cells if DATED.fullmatch(cell)]
     if not dated:
         dates = [cell for cell in cells if DATE_ALONE.fullmatch(cell)]
-        clocks = [cell for cell in cells if STAMP.fullmatch(cell)]
+        clocks = [cell for cell in cells if TIME_OF_DAY.fullmatch(cell)]
         dated = [f"{dates[0]} {clocks[0]}"] if len(dates) == len(clocks) == 1 else []
     if not dated:
         return None, ""

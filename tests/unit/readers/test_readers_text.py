@@ -1,6 +1,8 @@
 """Numbers as people print them: decimal commas, rounded steps, units of time, one separator too many."""
 
+import re
 from dataclasses import replace
+from datetime import datetime, timedelta
 
 import nptdms
 import numpy as np
@@ -225,7 +227,22 @@ def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
     assert error.reason == "unit_unknown" and "furlong" in error.problem
 
 
-@pytest.mark.parametrize(("unit", "second"), [("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("\u03bcs", 1e6), ("us", 1e6)])
+@pytest.mark.parametrize(
+    ("unit", "second"),
+    [
+        ("s", 1.0),
+        ("ms", 1e3),
+        ("µs", 1e6),
+        ("\u03bcs", 1e6),
+        ("us", 1e6),
+        ("Sekunden", 1.0),
+        ("msec", 1e3),
+        ("min", 1 / 60),
+        ("h", 1 / 3600),
+        ("hours", 1 / 3600),
+        ("d", 1 / 86400),
+    ],
+)
 def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     sound(tmp_path, "a.csv", f"time [{unit}];force;acc\n" + rows)
@@ -324,11 +341,69 @@ def test_a_spreadsheet_is_named_whatever_it_is_called(kind, name, format, tmp_pa
 
 def test_a_time_column_in_another_unit_is_rejected(tmp_path):
     rows = "".join(f"{k / 72e6:.12g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
-    (tmp_path / "a.csv").write_text("time [h];force;acc\n" + rows)
+    (tmp_path / "a.csv").write_text("time [weeks];force;acc\n" + rows)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
-    expected = "a.csv, the time column: its unit 'h' is not known. Export the time in one of s, sec, ms, µs, us, ns."
-    assert str(caught.value) == expected and caught.value.reason == "unit_unknown"
+    expected = "a.csv, the time column: its unit 'weeks' is not known. Export the time in s, ms, µs, ns, min or h, or"
+    assert str(caught.value) == f"{expected} as the time of day with seconds."
+    assert caught.value.reason == "unit_unknown"
+
+
+MONDAY_NOON = datetime(2026, 10, 26, 12)
+
+
+def clock_rows(stamp, n=50, step=timedelta(microseconds=50), start=MONDAY_NOON):
+    """A text of n samples with the time of day, or a date and a time of day, of each."""
+    rows = "".join(f"{stamp(start + k * step, k)};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X[:n]))
+    return "time;force;acc\n" + rows
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda time, k: f"{time:%H:%M:%S.%f}",
+        lambda time, k: f"{time:%M:%S.%f}",
+        lambda time, k: f"0 days {time:%H:%M:%S.%f}",
+        lambda time, k: f"{time.isoformat(timespec='microseconds')}+02:00",
+        lambda time, k: f"{time:%d/%m/%Y %I:%M:%S.%f %p}",
+        # summer time ends between two samples
+        lambda time, k: (
+            time.isoformat(timespec="microseconds") + "+02:00"
+            if k < 20
+            else (time - timedelta(hours=1)).isoformat(timespec="microseconds") + "+01:00"
+        ),
+    ],
+)
+@pytest.mark.parametrize("start", [MONDAY_NOON, MONDAY_NOON - timedelta(microseconds=1500)])
+def test_a_time_of_day_gives_the_rate(stamp, start, tmp_path):
+    sound(tmp_path, "a.csv", clock_rows(stamp, start=start))
+
+
+@pytest.mark.parametrize("start", [datetime(2026, 5, 4, 23, 59, 59, 999000), datetime(2026, 5, 31, 23, 59, 59, 999000)])
+@pytest.mark.parametrize("date", ["%Y-%m-%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d.%m.%y"])
+@pytest.mark.parametrize("separator", [" ", ";"])
+def test_midnight_is_no_gap_and_a_day_is_one(start, date, separator, tmp_path):
+    """A date counts in whatever order it is written, in the cell of the time of day and in one of its own."""
+    head = "date;time" if separator == ";" else "time"
+    text = clock_rows(lambda time, k: f"{time:{date}}{separator}{time:%H:%M:%S.%f}", start=start)
+    (tmp_path / "a.csv").write_text(text.replace("time", head, 1))
+    (recording,) = read("a.csv", tmp_path, NAMED).recordings
+    assert recording.rate == 20000.0 and recording.n_sample == 50
+    for days in (2, -1):
+        late = timedelta(days=days)
+        text = clock_rows(lambda time, k: f"{time + (k > 30) * late:{date}}{separator}{time:%H:%M:%S.%f}")  # noqa: B023
+        (tmp_path / "b.csv").write_text(text.replace("time", head, 1))
+        result = read("b.csv", tmp_path, NAMED)
+        error = result.errors[0]
+        assert not result.recordings
+        assert re.search("time jumps from 0.0015 s|clock runs backwards", error.problem)
+
+
+@pytest.mark.parametrize("stamp", ["10:61:00.5", "24:00:00+01:00", "13:00:00 PM", "10:00:61.5"])
+def test_a_time_that_no_clock_shows_is_an_error(stamp, tmp_path):
+    (tmp_path / "a.csv").write_text(clock_rows(lambda time, k: f"{time:%H:%M:%S.%f}" if k != 9 else stamp))
+    with pytest.raises(ReadError, match=f"sample 9 is '{re.escape(stamp)}'"):
+        read("a.csv", tmp_path, NAMED)
 
 
 @pytest.mark.parametrize("rate", RATES)
