@@ -133,11 +133,11 @@ def _day_numbers(dates: Sequence[str]) -> np.ndarray:
     if len(set(dates) - {""}) == 1:
         return np.zeros(len(dates))
     numbers = {date: tuple(map(int, re.split("[-/.]", date))) for date in dict.fromkeys(dates) if date}
-    best = {date: np.nan for date in numbers}
+    best: dict[str, float] = dict.fromkeys(numbers, np.nan)
     least = np.inf
     for notation in NOTATIONS:
         try:
-            days = {text: date(*notation(*parts)).toordinal() for text, parts in numbers.items()}
+            days = {text: float(date(*notation(*parts)).toordinal()) for text, parts in numbers.items()}
         except ValueError:
             continue
         if (span := max(days.values()) - min(days.values())) < least:

@@ -2,8 +2,9 @@
 
 libsndfile reads a truncated file without an error. Therefore the file size is compared with the chunk sizes in the
 header. Integers (16, 24 bit) are read as fractions of full scale, -1 to 1: set ``unit: 10 V`` in the layout if full
-scale is 10 V; a unit without a number is an error. Floating-point numbers above 1 are no fractions: a layout with such
-a unit rejects them. Metadata in a JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
+scale is 10 V; a unit without a number is an error. Of 24 valid bits in 32, full scale is that of the valid bits, be
+they the high or the low ones. Floating-point numbers above 1 are no fractions: a layout with such a unit rejects them.
+Metadata in a JSON comment are used (``channels``, ``units``, ``started_at``, conditions).
 """
 
 import json
@@ -22,12 +23,13 @@ from turnout.readers.array_names import channel_names
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.metadata_names import START_NAMES, UNIT_NAMES
-from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements
 
 UNKNOWN_LENGTH = 0xFFFFFFFF
-UNCOMPRESSED = (1, 3, 0xFFFE)  # PCM, float, extensible
+PCM, EXTENSIBLE = 1, 0xFFFE
+UNCOMPRESSED = (PCM, 3, EXTENSIBLE)  # 3: float
 
 
 def read_raw(source: Source) -> RawFile:
@@ -52,6 +54,8 @@ def read_raw(source: Source) -> RawFile:
         if truncation := find_truncation(raw, source.size):
             raise source.error("the header", truncation, COPY_AGAIN, reason="truncated")
         further = _further_chunks(raw, source.size) if source.head[:4] in (b"RIFF", b"RF64") else {}
+        with source.parsed_by("libsndfile"):
+            n_empty, is_stated = _empty_bits(source.head, raw)
         raw.seek(0)
         with source.parsed_by("libsndfile"), soundfile.SoundFile(raw.fileno(), closefd=False) as file:
             if not file.subtype.startswith(LOSSLESS):
@@ -59,9 +63,11 @@ def read_raw(source: Source) -> RawFile:
                 raise source.error("the header", problem, "Let the logger write PCM or floating-point numbers")
             rate, comment, is_float = file.samplerate, file.comment, file.subtype in FLOAT_SUBTYPES
             texts = {name: text for name, text in file.copy_metadata().items() if text}
-            frames = Frames(source.path, file.frames, file.channels)
+            frames = Frames(source.path, file.frames, file.channels, 2.0**n_empty if is_stated else 1.0)
             samples = (
-                LazyMatrix(frames, transposed=True) if source.lazy else file.read(dtype="float64", always_2d=True).T
+                LazyMatrix(frames, transposed=True)
+                if source.lazy
+                else file.read(dtype="float64", always_2d=True).T * frames.scale
             )
     if samples.shape[1] != frames.shape[0]:
         problem = f"ends after {samples.shape[1]} of {frames.shape[0]} samples"
@@ -87,6 +93,10 @@ def read_raw(source: Source) -> RawFile:
         audio="floating" if is_float else "whole",
     )
     remarks = []
+    if n_empty and not is_stated:
+        problem = f"none of its numbers needs the highest {n_empty} of 32 bits: they may be codes of a converter"
+        remedy = f"If they are, multiply full scale in the layout by {2**n_empty}, such as 'unit: {10 * 2**n_empty} V'"
+        remarks.append(source.error("the samples", problem, remedy, reason="entry_unknown"))
     if comment.lstrip().startswith("{") and not _is_json(comment):
         problem = (
             f"its comment {comment.strip()[:40]!r} begins like JSON and cannot be decoded: names and times are lost"
@@ -101,11 +111,15 @@ LOSSLESS = ("PCM", *FLOAT_SUBTYPES)
 
 @dataclass(frozen=True)
 class Frames:
-    """``n_frame`` frames of ``n_channel`` channels of an audio file; it is sliced like an array (frame, channel)."""
+    """``n_frame`` frames of ``n_channel`` channels of an audio file; it is sliced like an array (frame, channel).
+
+    ``scale`` converts fractions of the range of the stored numbers to fractions of full scale.
+    """
 
     path: Path
     n_frame: int
     n_channel: int
+    scale: float = 1.0
     dtype = np.dtype(float)
 
     @property
@@ -117,7 +131,7 @@ class Frames:
         start, stop, _ = selection.indices(self.n_frame)
         with soundfile.SoundFile(self.path) as file:
             file.seek(start)
-            return file.read(stop - start, dtype="float64", always_2d=True)
+            return file.read(stop - start, dtype="float64", always_2d=True) * self.scale
 
 
 def find_truncation(file: BinaryIO, size: int) -> str:
@@ -160,6 +174,36 @@ def find_truncation(file: BinaryIO, size: int) -> str:
         return f"the file ends after {size} bytes, before its samples"
     expected_size = 8 + long_sizes.get(b"RIFF", struct.unpack_from("<I", head, 4)[0])
     return f"it ends after {size} of {expected_size} bytes" if expected_size > size + 1 else ""
+
+
+N_CONVERTER_BITS = 24  # of most converters, whose numbers are stored in 32 bits
+
+
+def _empty_bits(head: bytes, file: BinaryIO) -> tuple[int, bool]:
+    """Number of high bits that whole numbers leave empty, and whether the header states as many.
+
+    The header may state fewer valid bits than a sample has, 24 of 32. They have to be the high ones. A logger that
+    puts them into the low ones writes numbers with set bits there, none of which needs a high bit. So do the codes of a
+    converter in 32 bits, of which the header says nothing.
+    """
+    position = head.find(b"fmt ", 12)
+    if head[:4] not in (b"RIFF", b"RF64") or position < 0 or len(head) < position + 34:
+        return 0, False
+    tag, _, _, _, _, n_bit, _, n_valid = struct.unpack_from("<HHIIHHHH", head, position + 8)
+    code = struct.unpack_from("<H", head, position + 32)[0] if tag == EXTENSIBLE else tag
+    is_stated = tag == EXTENSIBLE and 0 < n_valid < n_bit
+    n_valid = n_valid if is_stated else N_CONVERTER_BITS
+    if code != PCM or n_bit not in (16, 24, 32) or n_valid >= n_bit:
+        return 0, False
+    uses_low_bits = False
+    file.seek(0)
+    with soundfile.SoundFile(file.fileno(), closefd=False) as sound:
+        for block in sound.blocks(BLOCK_SIZE, dtype="int32", always_2d=True):
+            numbers = block >> (32 - n_bit)  # libsndfile fills 32 bits from the top
+            if np.any(numbers >= 1 << (n_valid - 1)) or np.any(numbers < -(1 << (n_valid - 1))):
+                return 0, False
+            uses_low_bits |= bool(np.any(numbers & ((1 << (n_bit - n_valid)) - 1)))
+    return (n_bit - n_valid, is_stated) if uses_low_bits else (0, False)
 
 
 FURTHER_CHUNKS = (b"iXML", b"bext")  # of field recorders: XML, and the broadcast extension (EBU Tech 3285)

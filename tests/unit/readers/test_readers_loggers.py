@@ -338,6 +338,44 @@ def test_bytes_inserted_into_audio_are_found(tmp_path):
     assert samples_of(path, description).shape == (1, 2, 500)
 
 
+def as_whole_wav(path, numbers, n_byte, n_valid=None):
+    """Whole numbers of n_byte bytes each; with n_valid, the header states how many of their bits are valid."""
+    n = numbers.shape[1]
+    fmt = struct.pack("<HHIIHH", 1 if n_valid is None else 0xFFFE, n, 25600, 25600 * n * n_byte, n * n_byte, 8 * n_byte)
+    if n_valid is not None:
+        fmt += struct.pack("<HHIH", 22, n_valid, 0, 1) + bytes.fromhex("000000001000800000aa00389b71")
+    data = b"".join(int(k).to_bytes(n_byte, "little", signed=True) for k in numbers.ravel())
+    body = b"WAVEfmt " + struct.pack("<I", len(fmt)) + fmt + b"data" + struct.pack("<I", len(data)) + data
+    path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
+
+
+@pytest.mark.parametrize(("n_byte", "n_valid"), [(4, 24), (4, 20), (3, 20), (2, 12)])
+@pytest.mark.parametrize("is_lazy", [False, True])
+def test_valid_bits_may_be_the_high_or_the_low_ones(n_byte, n_valid, is_lazy, tmp_path):
+    fractions = np.random.default_rng(8).uniform(-0.9, 0.9, size=(300, 2))
+    numbers = np.round(fractions * 2 ** (n_valid - 1)).astype(int)
+    channels = (RawChannel("force", 0, "force", unit="22000 N"), RawChannel("rail", 1, "acceleration", unit="1 m/s²"))
+    split = {"max_duration": 3600.0, "max_whole_file_size": 0} if is_lazy else {}
+    for shift in (0, 8 * n_byte - n_valid):
+        as_whole_wav(tmp_path / "a.wav", numbers << shift, n_byte, n_valid)
+        result = read("a.wav", tmp_path, RawDescription(channels), **split)
+        assert not result.errors
+        np.testing.assert_allclose(result.recordings[0].samples[1], fractions[:, 1], atol=2.0**-n_valid)
+        np.testing.assert_allclose(result.recordings[0].samples[0], 22000 * fractions[:, 0], atol=22000 * 2.0**-n_valid)
+
+
+def test_codes_of_a_converter_in_32_bits_are_reported(tmp_path):
+    numbers = np.random.default_rng(8).integers(-(2**22), 2**22, size=(300, 2))
+    channels = (RawChannel("force", 0, "force", unit="1 N"), RawChannel("rail", 1, "acceleration", unit="1 m/s²"))
+    as_whole_wav(tmp_path / "a.wav", numbers, 4)
+    result = read("a.wav", tmp_path, RawDescription(channels))
+    assert [error.reason for error in result.errors] == ["entry_unknown"] and len(result.recordings) == 1
+    assert "by 256" in result.errors[0].remedy
+    for other in (numbers << 8, numbers << 7):  # 24 bits in the high ones; more than 24 bits
+        as_whole_wav(tmp_path / "a.wav", other, 4)
+        assert not read("a.wav", tmp_path, RawDescription(channels)).errors
+
+
 def wav_with(tmp_path, tag, content):
     """Two channels at 25600 Hz, with a further chunk before the samples."""
     samples = np.random.default_rng(3).normal(size=(2, 200)) * [[0.5], [0.1]]
