@@ -35,6 +35,7 @@ from turnout.trend.update import update
 HELP = sorted((ROOT / "src" / "turnout" / "cli").glob("*.py"))
 QUERY = re.compile(r'(?:turnout query|-c) "((?:from|select) [^"]*)"')
 INLINE_QUERY = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
+VIEWS = re.compile(r"\bviews? (`\w+`(?:(?:,| and) `\w+`)*)")
 NO_CODE = ("text", "mermaid")  # outputs, tables, drawings
 NOT_RUN = 2  # blocks that cannot run; a new one needs a reason as good
 BLOCKS = blocks()
@@ -182,6 +183,14 @@ def test_queries_within_the_text(page, registry):
     text = page.read_text(encoding="utf-8")
     for query in QUERY.findall(text) + INLINE_QUERY.findall(text):
         registry.execute(f"explain {query}")  # binds every table, column and macro
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_views_within_the_text_can_be_read_without_arguments(page, registry):
+    """A macro with arguments is called a macro, and shown with its parentheses."""
+    for views in VIEWS.findall(page.read_text(encoding="utf-8")):
+        for name in re.findall(r"`(\w+)`", views):
+            registry.execute(f"explain from {name}")
 
 
 @pytest.mark.parametrize("module", HELP, ids=lambda p: p.stem)

@@ -22,7 +22,15 @@ with everything as (
         path || coalesce(', ' || place, '') || ': ' || coalesce(found, '')
     from quarantine_open where not is_remark
 )
-select e.*, r.meaning as reason
+select
+    e.*,
+    coalesce(
+        r.meaning,
+        case e.reason_code  -- states of a fit, which are no reasons of a recording
+            when 'null_explains' then 'random models fit as well'
+            when 'not_an_impulse' then 'the wheels do not act as impulses'
+        end
+    ) as reason
 from everything e left join reasons r using (reason_code);
 
 -- columns of rejected
