@@ -225,6 +225,39 @@ def to_si(quantity: str, unit: str, sensitivity: float | None = None, sensitivit
     raise ValueError(f"a sensitivity in {sensitivity_unit!r} does not lead from {unit!r} to {SI[quantity]!r}")
 
 
+def volts_per_unit(quantity: str, sensitivity: float, sensitivity_unit: str) -> float | None:
+    """Sensitivity of a sensor in volts per SI unit of what it measures.
+
+    Parameters
+    ----------
+    quantity : str
+        A key of ``SI``.
+    sensitivity : float
+        The sensitivity.
+    sensitivity_unit : str
+        Its unit, such as "mV/N" or "N/V".
+
+    Returns
+    -------
+    float or None
+        None if the unit is none between volts and this quantity.
+
+    Examples
+    --------
+    >>> volts_per_unit("force", 0.23, "mV/N"), volts_per_unit("force", 4000.0, "N/V"), volts_per_unit("force", 2, "N")
+    (0.00023, 0.00025, None)
+    """
+    try:
+        numerator, denominator = _split_fraction(sensitivity_unit)
+    except ValueError:
+        return None
+    ratio = sensitivity * numerator.scale / denominator.scale
+    dimensions = (numerator.dimension, denominator.dimension)
+    if dimensions == ("voltage", quantity):
+        return ratio
+    return 1.0 / ratio if dimensions == (quantity, "voltage") and ratio else None
+
+
 def _split_fraction(unit: str) -> tuple[Conversion, Conversion]:
     """Numerator and denominator of a unit: "mV/(m/s²)" -> voltage, acceleration; "m/s²/V" -> acceleration, voltage."""
     text = unit.strip()

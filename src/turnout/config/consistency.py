@@ -7,9 +7,10 @@ from zoneinfo import available_timezones
 from turnout.config.document import Branch, merge_branches
 from turnout.config.file_names import file_key, name_problem
 from turnout.config.filename_pattern import compile_pattern
-from turnout.config.schema import suggestion
+from turnout.config.schema import number_text, suggestion
 from turnout.config.settings_schema import settings_keys
 from turnout.errors import ConfigError
+from turnout.units import SI, volts_per_unit
 
 # (quantity, unit, sensitivity, sensitivity_unit) -> conversion, as turnout.units.to_si
 ToSi = Callable[[str, str, float | None, str], Any]
@@ -93,6 +94,7 @@ def _channel_errors(tree: Branch, to_si: ToSi | None) -> Iterator[ConfigError]:
     for name, channel in tree["channels"].items():
         if to_si:
             yield from _unit_errors(name, channel, to_si)
+        yield from _range_errors(channel)
         limit, step = _value(channel, "limit"), _value(channel, "resolution")
         if limit and step and step >= limit:
             problem = f"resolution is {step}, and limit is {limit}"
@@ -106,6 +108,45 @@ def _channel_errors(tree: Branch, to_si: ToSi | None) -> Iterator[ConfigError]:
             problem = f"channel {name} reads {source.value!r}, as {sources[source.value]} does"
             yield source.place.error(problem, "Give each channel its own source")
         sources[source.value] = name
+
+
+# Ranges of sensors in the SI unit of their quantity: from one step of the most sensitive one to the largest range. They
+# catch a prefix too many and a slipped decimal point, of which the other checks see nothing.
+SENSOR_RANGES = {
+    "force": (1e-3, 1e7),  # N, of a small hammer and of a press
+    "acceleration": (1e-6, 2e6),  # m/s², of a seismometer and of a shock sensor
+    "velocity": (1e-9, 1e3),  # m/s, of a geophone and of a laser
+    "displacement": (1e-10, 1e2),  # m, of a capacitive sensor and of a rope
+    "strain": (1e-10, 1.0),  # m/m
+}
+# Sensitivities in V per SI unit: of a bridge without amplifier, and of the most sensitive sensors.
+SENSITIVITIES = {
+    "force": (1e-9, 10.0),
+    "acceleration": (1e-7, 100.0),
+    "velocity": (1e-3, 1e6),
+    "displacement": (1e-2, 1e8),
+    "strain": (1e-2, 1e8),
+}
+
+
+def _range_errors(channel: Branch) -> Iterator[ConfigError]:
+    """Errors of a limit, a resolution and a sensitivity that no sensor of the quantity has."""
+    quantity = channel["quantity"].value
+    low, high = SENSOR_RANGES.get(quantity, (0.0, float("inf")))
+    for key in ("limit", "resolution"):
+        value = _value(channel, key)
+        if value is not None and (value > high or (key == "limit" and value < low)):
+            least = "above 0 and up" if key == "resolution" else f"from {number_text(low)}"
+            remedy = f"No sensor of {quantity} has it: write a number {least} to {number_text(high)} {SI[quantity]}"
+            yield channel[key].place.error(f"{key} is {value:g} {SI[quantity]}", remedy)
+    sensitivity, unit = _value(channel, "sensitivity"), _value(channel, "sensitivity_unit") or ""
+    if not sensitivity or quantity not in SENSITIVITIES:
+        return
+    ratio, (low, high) = volts_per_unit(quantity, sensitivity, unit), SENSITIVITIES[quantity]
+    if ratio is not None and not low <= ratio <= high:
+        problem = f"sensitivity is {sensitivity:g} {unit}, which is {ratio:.3g} V per {SI[quantity]}"
+        remedy = f"No sensor of {quantity} has it: correct the number, or the prefix in sensitivity_unit (mV, V)"
+        yield channel["sensitivity"].place.error(problem, remedy)
 
 
 def _value(channel: Branch, key: str) -> Any:

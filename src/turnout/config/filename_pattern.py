@@ -59,6 +59,8 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = (), f
                 raise ValueError(f"unknown field {token} in the pattern. {suggestion(name, fields)}")
             expression += f"(?P={name})" if name in names else f"(?P<{name}>{fields[name]})"
             names.add(name)
+        elif brace := re.search(r"[{}]", token):
+            raise ValueError(f"a {brace[0]!r} without its pair, in {token!r}")
         else:
             expression += re.escape(token)
     if missing := [f"{{{name}}}" for name in REQUIRED_FIELDS[branch] if name not in names]:

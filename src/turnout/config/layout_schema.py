@@ -25,7 +25,7 @@ PASSAGE_CHANNEL = {
     "section": Key("text", "section it watches", required=True, pattern=LABEL),
 }
 # Minimum rates: below them a recording shows no mode of the track. They also catch a rate written in kHz.
-# Maximum rates: no converter for these sensors is faster. They catch a rate in mHz or with a digit too many.
+# Maximum rates: no converter for these sensors is faster. They catch a rate with a digit too many.
 MAX_RATE = 10_000_000
 MAX_COUNT = 10**12  # records, or samples of a record: above it a typing error
 HAMMER_RATE = Key("number", "samples per second", unit="Hz", minimum=250, maximum=MAX_RATE, nullable=True)

@@ -1,6 +1,5 @@
 """Types of configuration keys, and the check of a tree of YAML against them."""
 
-import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -112,6 +111,49 @@ def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to 
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
 
 
+def quotation(value: Any) -> str:
+    """A wrong value as a message quotes it, cut where it is long.
+
+    Parameters
+    ----------
+    value : any
+        The value as it was written.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> quotation("20 kHz"), quotation(10**400)[-5:]
+    ("'20 kHz'", '0 ...')
+    """
+    text = repr(value)
+    return text if len(text) <= MAX_QUOTED else text[:MAX_QUOTED] + " ..."
+
+
+def number_text(value: float) -> str:
+    """A limit as a message states it: in digits, with marks for thousands from a million on.
+
+    Parameters
+    ----------
+    value : float
+        The limit.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> number_text(10_000_000), number_text(250), number_text(0.004), number_text(1e-9)
+    ('10,000,000', '250', '0.004', '1e-09')
+    """
+    return f"{value:,.0f}" if abs(value) >= 1e6 else f"{value:g}"
+
+
 def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
     """Compare a value with its key.
 
@@ -138,26 +180,28 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         return None
     if key.many:
         if not isinstance(value, tuple):
-            return repr(value), "Write a list, [a, b]"
+            return quotation(value), "Write a list, [a, b]"
         single = Key(**{**key.__dict__, "many": False})
         return next((p for v in value if (p := value_problem(single, v))), None)
     if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
-        return repr(value), f"Write {_expected_text(key)}"
-    if isinstance(value, float) and not math.isfinite(value):
-        return repr(value), f"Write {_expected_text(key)}"
+        return quotation(value), f"Write {_expected_text(key)}"
+    if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
+        return quotation(value), f"Write {_expected_text(key)}"
     if key.choices and value not in key.choices:
-        return repr(value), suggestion(str(value), key.choices)
+        return quotation(value), suggestion(str(value), key.choices)
     if key.pattern and isinstance(value, str) and not re.fullmatch(key.pattern, value):
-        return repr(value), f"Write {_expected_text(key)}"
+        return quotation(value), f"Write {_expected_text(key)}"
     if not isinstance(value, (int, float)):
         return None
     if _is_in_range(key, value):
         return None
-    return repr(value), f"Write {_expected_text(key)}{_hint_at_other_unit(key, value)}"
+    return quotation(value), f"Write {_expected_text(key)}{_hint_at_other_unit(key, value)}"
 
 
 PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
 PREFIXES = (("m", 1e-3), ("k", 1e3))
+LARGEST_NUMBER = 1e300  # beyond it a whole number is no floating-point number
+MAX_QUOTED = 60  # characters of a wrong value that a message quotes
 
 
 def _is_in_range(key: Key, value: float) -> bool:
@@ -180,7 +224,7 @@ def _hint_at_other_unit(key: Key, value: float) -> str:
         return f" ({value:g} % are {value / 100.0:g})"
     if key.unit in PLAIN_UNITS:
         for prefix, factor in PREFIXES:
-            if _is_in_range(key, value * factor):
+            if not (prefix == "m" and key.unit == "Hz") and _is_in_range(key, value * factor):
                 return f" ({value:.9g} {prefix}{key.unit} are {value * factor:.9g} {key.unit})"
     return ""
 
@@ -223,7 +267,7 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
                 yield value.place.error(f"{name} is {problem[0]}", problem[1])
         elif isinstance(value, Leaf):
             if value.value is not None or whole:
-                yield value.place.error(f"{name} is {value.value!r}", "Write 'name: value' lines below it")
+                yield value.place.error(f"{name} is {quotation(value.value)}", "Write 'name: value' lines below it")
         elif isinstance(rule, Group):
             yield from check(rule.spec, value, whole and not rule.fragment)
         else:
@@ -240,7 +284,7 @@ def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Ite
             remedy = f"Write a name of {PATTERN_TEXTS[rule.pattern]}"
             yield tree.key_places[label].error(f"{label!r} under {name!r}", remedy)
         elif isinstance(value, Leaf):
-            yield value.place.error(f"{label} is {value.value!r}", "Write 'name: value' lines below it")
+            yield value.place.error(f"{label} is {quotation(value.value)}", "Write 'name: value' lines below it")
         else:
             yield from check(rule.spec, value, whole)
     if whole and not tree:
@@ -255,13 +299,13 @@ def _expected_text(key: Key) -> str:
     text = TYPE_TEXTS.get(key.value_type, "a name, or a number counted from 0")
     unit = f" {key.unit}" if key.unit not in ("", None, "-", "1") else ""
     if key.above is not None:
-        text += f" above {key.above:g}{unit}"
+        text += f" above {number_text(key.above)}{unit}"
     elif key.minimum is not None and key.maximum is not None:
-        text += f" from {key.minimum:g} to {key.maximum:g}{unit}"
+        text += f" from {number_text(key.minimum)} to {number_text(key.maximum)}{unit}"
     elif key.minimum is not None:
-        text += f" of at least {key.minimum:g}{unit}"
+        text += f" of at least {number_text(key.minimum)}{unit}"
     elif key.maximum is not None:
-        text += f" of at most {key.maximum:g}{unit}"
+        text += f" of at most {number_text(key.maximum)}{unit}"
     elif unit:
         text += f" in{unit}"
     return text

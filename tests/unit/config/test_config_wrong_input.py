@@ -74,27 +74,27 @@ WRONG = {
     ),
     "rate of the table in kHz": (
         row("t3\tmain\t\t\t51.2"),
-        "hammer_rate_hz is 51.2. Write a number from 250 to 1e+07 Hz",
+        "hammer_rate_hz is 51.2. Write a number from 250 to 10,000,000 Hz",
     ),
     "rate of the table with digits too many": (
         row("t3\tmain\t\t\t51200000"),
-        "hammer_rate_hz is 51200000.0. Write a number from 250 to 1e+07 Hz",
+        "hammer_rate_hz is 51200000.0. Write a number from 250 to 10,000,000 Hz",
     ),
     "rate with digits too many": (
         layout("rate: 20000", "rate: 20000000"),
-        "line 9, column 9: rate is 20000000. Write a number from 250 to 1e+07 Hz",
+        "line 9, column 9: rate is 20000000. Write a number from 250 to 10,000,000 Hz",
     ),
     "samples beyond any file": (
         layout("rate: 20000", "rate: 20000\n  samples: 10000000000000"),
-        "samples is 10000000000000. Write a whole number from 1 to 1e+12",
+        "samples is 10000000000000. Write a whole number from 1 to 1,000,000,000,000.",
     ),
     "rate in kHz": (
         layout("rate: 20000", "rate: 12.8"),
-        "line 9, column 9: rate is 12.8. Write a number from 250 to 1e+07 Hz",
+        "line 9, column 9: rate is 12.8. Write a number from 250 to 10,000,000 Hz",
     ),
     "rate of passages in kHz": (
         layout('  files: "passages/', '  rate: 51.2\n  files: "passages/'),
-        "line 16, column 9: rate is 51.2. Write a number from 100 to 1e+07 Hz",
+        "line 16, column 9: rate is 51.2. Write a number from 100 to 10,000,000 Hz",
     ),
     "limit in kN": (
         layout("source: force, ", "source: force, limit: 22, "),
@@ -104,6 +104,27 @@ WRONG = {
     "step as large as the limit": (
         layout("source: rail, ", "source: rail, limit: 500, resolution: 800, "),
         "line 14, column 50: resolution is 800, and limit is 500. Write one step of the converter",
+    ),
+    "limit beyond any sensor": (
+        layout("source: rail, ", "source: rail, limit: 1e12, "),
+        "limit is 1e+12 m/s². No sensor of acceleration has it: write a number from 1e-06 to 2,000,000 m/s²",
+    ),
+    "step beyond any sensor": (
+        layout("source: force, ", "source: force, resolution: 1e9, "),
+        "resolution is 1e+09 N. No sensor of force has it: write a number above 0 and up to 10,000,000 N",
+    ),
+    "sensitivity in V for mV": (
+        layout("sensitivity: 0.23, sensitivity_unit: mV/N", "sensitivity: 230, sensitivity_unit: V/N"),
+        "sensitivity is 230 V/N, which is 230 V per N. No sensor of force has it",
+    ),
+    "sensitivity upside down": (
+        layout("unit: m/s²", "unit: V, sensitivity: 1e9, sensitivity_unit: g/V"),
+        "which is 1.02e-10 V per m/s². No sensor of acceleration has it",
+    ),
+    "number without end": (layout("rate: 20000", "rate: " + "9" * 400), "9 .... Write a number from 250"),
+    "field of a pattern without its brace": (
+        layout("{section}_{test}.{ext}", "{section}_{test.{ext}"),
+        "a '{' without its pair, in '_{test.'. Write a pattern like hammer/",
     ),
     "too many cells": (row("t3\tmain\t\t\t\tx"), "line 4, column 12: 6 cells under 5 columns"),
     "raw folder outside": (row("t3\tmain\t../t3"), "line 4, column 9: raw is '../t3', outside the raw root"),
@@ -409,8 +430,9 @@ def test_a_wrong_campaign_is_said_with_column_value_and_what_to_write(tmp_path, 
             "position is 24600. Write a number from -10000 to 10000 m (24600 mm are 24.6 m)",
         ),
         ("position: 24.6", "position: 24,6", "unknown key '6'. If it belongs to the number before it, write a point"),
-        ("rate: 20000", "rate: 25.6", "rate is 25.6. Write a number from 250 to 1e+07 Hz (25.6 kHz are 25600 Hz)"),
-        ("rate: 20000", "rate: -5", "rate is -5. Write a number from 250 to 1e+07 Hz."),
+        ("rate: 20000", "rate: 25.6", "rate is 25.6. Write a number from 250 to 10,000,000 Hz (25.6 kHz are 25600 Hz)"),
+        ("rate: 20000", "rate: 1e9", "rate is 1000000000.0. Write a number from 250 to 10,000,000 Hz."),
+        ("rate: 20000", "rate: -5", "rate is -5. Write a number from 250 to 10,000,000 Hz."),
     ],
 )
 def test_a_number_in_another_unit_is_recognised(tmp_path, written, instead, words):
