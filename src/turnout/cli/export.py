@@ -13,6 +13,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
                 raise RegistryError(
                     f"{name} cannot be written to {folder}: {reason}. Free disk space or give write permission."
                 ) from None
-            print(f"{path}: {n} rows")
+            print(f"{path}: {count_of(n, 'row')}")
     return 0
 
 

@@ -14,6 +14,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry, at_least_one
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -86,7 +87,7 @@ def _print_changes(changes: Mapping[str, tuple[int, int]], verb: str, registry: 
     from turnout.registry.generation import load
 
     for folder, (files, rows) in sorted(changes.items()):
-        print(f"{folder}: {files} files with {rows} rows {verb}")
+        print(f"{folder}: {count_of(files, 'file')} with {count_of(rows, 'row')} {verb}")
     if not changes:
         print("Nothing to do.")
     if incomplete := load(registry).incomplete:
