@@ -86,9 +86,9 @@ def run(args: argparse.Namespace) -> int:
     for decision in _open_decisions(configuration.folder / "layouts"):
         print(f"  {decision}")
     raw = Path(args.raw or "raw")
-    if not raw.is_dir() and args.raw:
+    if not raw.is_dir() and (args.raw or raw.exists()):
         problem = "it is a file" if raw.exists() else "no such folder"
-        raise ConfigError(args.raw, "--raw", problem, "Write the folder that holds the folders of the turnouts")
+        raise ConfigError(str(raw), "--raw", problem, "Write the folder that holds the folders of the turnouts")
     if not raw.is_dir():
         print(f"{raw}: no such folder, file names not checked.")
         return 1 if faults or args.read else 0

@@ -18,6 +18,7 @@ NOTE_FILES = ("campaigns.csv", "trains.csv")
 COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator")
 TRAIN_COLUMNS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 2000)}
+WHOLE_NUMBERS = ("n_axles",)
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
@@ -90,6 +91,7 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
         Rows as text in the order of the file, and an error for each row that cannot be used.
     """
     trains: list[Cells] = []
+    passed: set[tuple[datetime, str]] = set()
 
     def add_train(cells: Cells) -> None:
         text = cells["passed_at_utc"]
@@ -99,6 +101,10 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
             _in_range(cells.get(column, ""), column, low, high)
         if (track := cells.get("track", "")) not in ("", "main", "diverging"):
             raise _CellError("track", f"track is {track!r}", "Write main or diverging, or nothing")
+        key = (parse_utc(text), track)
+        if key in passed:  # of two rows nothing says which one is right
+            raise _CellError("passed_at_utc", f"a train at {text} for the second time", "Keep one of them")
+        passed.add(key)
         trains.append(cells)
 
     errors = _read_rows(path, name, TRAIN_COLUMNS, 1, add_train, allow_others=True)
@@ -204,8 +210,9 @@ def _in_range(text: str, column: str, low: float, high: float) -> float | None:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not low <= value <= high:
+    is_whole = column in WHOLE_NUMBERS
+    if not low <= value <= high or (is_whole and value % 1.0):
         unit = " °C" if column.endswith("_c") else ""
-        remedy = f"Write a number from {low} to {high}{unit}, or nothing where it was not noted"
+        remedy = f"Write a {'whole ' * is_whole}number from {low} to {high}{unit}, or nothing where it was not noted"
         raise _CellError(column, f"{column} is {text!r}", remedy)
     return value

@@ -119,9 +119,9 @@ def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """
     last = len(lines) - 1
     for i in range(last, 0, -1):
-        if _are_units(lines[i], 0.5 if i == last or _are_names(lines[i - 1]) else 1.0):
+        if _are_units(lines[i], 0.5 if i == last or are_names(lines[i - 1]) else 1.0):
             return i - 1, i
-    return next((i for i in range(last, -1, -1) if _are_names(lines[i])), last), None
+    return next((i for i in range(last, -1, -1) if are_names(lines[i])), last), None
 
 
 def _are_units(cells: Sequence[str], share: float) -> bool:
@@ -141,8 +141,24 @@ def _is_unit(cell: str) -> bool:
         return False
 
 
-def _are_names(cells: Sequence[str]) -> bool:
-    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30"."""
+def are_names(cells: Sequence[str]) -> bool:
+    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30".
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of a line above the numbers.
+
+    Returns
+    -------
+    bool
+        True for names of columns.
+
+    Examples
+    --------
+    >>> are_names(["time", "force"]), are_names(["Force [N]", "x"]), are_names(["Messung", "Gleis 3"])
+    (True, True, False)
+    """
     if any(cell[:1].isdigit() for cell in cells):
         return False
     in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]

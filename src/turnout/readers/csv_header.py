@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from turnout.readers.csv_cells import (
     BLANK,
+    DECIMAL_COMMA_REMEDY,
     NO_ROW_REMEDY,
     SEPARATORS,
     THOUSANDS_MARK,
@@ -17,7 +18,7 @@ from turnout.readers.csv_cells import (
     is_number,
     is_row,
 )
-from turnout.readers.csv_columns import NAME_WITH_UNIT, names_and_units
+from turnout.readers.csv_columns import NAME_WITH_UNIT, are_names, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
@@ -118,6 +119,7 @@ def _complete_head(
         texts = [words for words in texts if len(words) == len(cells)]
     texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
+    _check_width(texts, cells, separator, len(head_lines), source)
     names, units, further = names_and_units(texts, cells)
     if further:
         problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
@@ -205,6 +207,20 @@ def _check_row_above(
         word = next(cell for cell, is_of_number in zip(row, numbers) if cell and not is_of_number)
         problem = f"{word[:60]!r} is no number, in the first row of samples"
         raise source.error(f"line {len(lines)}", problem, NO_ROW_REMEDY)
+
+
+def _check_width(
+    texts: Sequence[Sequence[str]], cells: Sequence[str], separator: str, n_line: int, source: Source
+) -> None:
+    """ReadError if commas separate more cells of a row than there are names: some of them are decimal marks."""
+    names = [name for name in texts[-1] if name] if texts else []
+    if separator != "," or not len(names) < len(cells) <= 2 * len(names) or any(len(t) >= len(cells) for t in texts):
+        return
+    if are_names(texts[-1]) and all(cell.lstrip("+-").isdecimal() for cell in cells):
+        problem = (
+            f"the rows have {len(cells)} cells and {len(names)} names stand above them: commas are decimal marks, too"
+        )
+        raise source.error(f"line {n_line + 1}", problem, DECIMAL_COMMA_REMEDY)
 
 
 CLOCK_TIME = re.compile(r"(?<!\d)\d{1,2}:\d{2}:\d{2}(?!\d)")

@@ -353,3 +353,10 @@ def test_files_of_tracks_and_vehicles_are_checked(project, capsys, change):
     path.write_text(content.replace(old, new, 1))
     assert main(["check"]) == 1
     assert VALUES[change] in capsys.readouterr().out
+
+
+def test_a_file_in_place_of_the_recordings_is_named(project, capsys):
+    shutil.rmtree(project / "raw")
+    (project / "raw").write_text("")
+    assert main(["check"]) == 2
+    assert "raw, --raw: it is a file. Write the folder" in capsys.readouterr().err

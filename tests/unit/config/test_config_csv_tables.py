@@ -99,7 +99,8 @@ def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(
         ("passed_at_utc,train_type\n2024-05-13T10:00,IC3,x\n", "line 2, column 22: more cells than columns"),
         ("passed_at_utc,speed_kmh\n2024-05-13T10:00,16O\n", "column 18: speed_kmh is '16O'. Write a number from 1"),
         ("passed_at_utc,axle_load_t\n2024-05-13T10:00,22500\n", "axle_load_t is '22500'. Write a number from 0.1"),
-        ("passed_at_utc,n_axles\n2024-05-13T10:00,-8\n", "n_axles is '-8'. Write a number from 1 to 2000"),
+        ("passed_at_utc,n_axles\n2024-05-13T10:00,-8\n", "n_axles is '-8'. Write a whole number from 1 to 2000"),
+        ("passed_at_utc,n_axles\n2024-05-13T10:00,8.5\n", "n_axles is '8.5'. Write a whole number from 1 to 2000"),
         ("passed_at_utc,track\n2024-05-13T10:00,left\n", "track is 'left'. Write main or diverging, or nothing"),
     ],
 )
@@ -108,6 +109,15 @@ def test_trains_that_cannot_be_used_are_said(tmp_path, text, said):
     path.write_text(text)
     trains, errors = read_trains(path, "t1/trains.csv")
     assert trains == () and len(errors) == 1 and said in str(errors[0])
+
+
+def test_a_train_that_is_listed_twice_counts_once(tmp_path):
+    path = tmp_path / "trains.csv"
+    rows = "2024-05-13T10:00,main,8\n2024-05-13T10:00,diverging,16\n2024-05-13T10:00:00Z,main,12\n"
+    path.write_text("passed_at_utc,track,n_axles\n" + rows)
+    trains, errors = read_trains(path, "t1/trains.csv")
+    assert [train["n_axles"] for train in trains] == ["8", "16"]
+    assert "line 4, column 1: a train at 2024-05-13T10:00:00Z for the second time. Keep one" in str(errors[0])
 
 
 def test_trains_may_have_further_columns(tmp_path):

@@ -151,6 +151,16 @@ def test_decimal_commas_between_commas_are_explained(tmp_path):
     assert "where the decimal mark is a comma, export with semicolons or tabs between columns" in str(caught.value)
 
 
+def test_decimal_commas_between_commas_are_explained_where_all_numbers_have_them(tmp_path):
+    rows = "".join(f"{k / 20000:.5f},{a:.4f},{b:.4f}\n".replace(".", ",") for k, (a, b) in enumerate(X))
+    (tmp_path / "a.csv").write_text("time [s],force [N],acc [m/s²]\n" + rows, encoding="utf-8")
+    with pytest.raises(
+        ReadError, match="line 2: the rows have 6 cells and 3 names stand above them: commas are"
+    ) as caught:
+        read("a.csv", tmp_path, NAMED)
+    assert "semicolons or tabs" in caught.value.remedy
+
+
 def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):
     rows = "".join(f"{1 + k // 20};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text(f"rate: 20000\nAnzahl Messwerte: 50\nrecord;force;acc\n{rows}")
