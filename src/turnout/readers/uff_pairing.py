@@ -4,8 +4,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from typing import Any
+
+import numpy as np
 
 from turnout.readers.source import Source
 from turnout.readers.time_texts import parse_uff_time
@@ -133,6 +135,7 @@ def pair_sets(named: Sequence[UffDataset], nameless: Sequence[UffDataset], sourc
         for key, dataset in zip(keys, named):
             groups[n_taken[key]][key] = dataset
             n_taken[key] += 1
+        _check_sizes(groups, channels, source)
     stamp_of, node_of = dict(zip(map(id, named), stamps)), dict(zip(map(id, named), nodes))
     contradictions = (_contradiction(group, stamp_of, node_of, is_by_order=not labels) for group in groups)
     problems = {k: text for k, text in enumerate(contradictions) if text}
@@ -205,6 +208,52 @@ def _check_order(
     numbers = ", ".join(f"{n} of channel {channel_name(key)!r}" for key, n in list(counts.items())[:MAX_LISTED])
     problem = f"{numbers} come in no regular order, and neither numbers, times nor nodes say which belong together"
     raise source.error("the sets", problem, PAIRING_REMEDY)
+
+
+MIN_SIZED_RECORDS = 8  # with fewer, sizes may fit another order by chance
+MAX_SIZED_RECORDS = 100  # no test has more impacts, and the search grows with their square
+MIN_MOVED_RECORDS = 3  # that a lost set moves; fewer are not told from impacts that differ
+MIN_SIZE_SPREAD = 0.05  # of the logarithm of energies: below it all impacts are alike, and their order shows nothing
+# Spread of the ratios of sizes in the order of the file, in units of that with two sets lost. Of 400 tests of 8 intact
+# impacts one exceeds it if responses do not depend on the force at all, and none if they do.
+MIN_SPREAD_RATIO = 4.0
+
+
+def _check_sizes(
+    groups: Sequence[dict[ChannelKey, UffDataset]], channels: Sequence[ChannelKey], source: Source
+) -> None:
+    """ReadError if the sizes of the sets show that one of each of two channels was lost, with others between them.
+
+    A harder impact has a larger response. If set i of one channel and set j of another are lost, the order stays
+    regular, and the sets between them belong to the neighbouring impact.
+    """
+    records = [group for group in groups if len(group) == len(channels)]  # a last one may be incomplete
+    if len(channels) < 2 or not MIN_SIZED_RECORDS <= len(records) <= MAX_SIZED_RECORDS:
+        return
+    sizes = {key: np.array([_log_energy(record[key]) for record in records]) for key in channels}
+    for a, b in combinations(channels, 2):
+        x, y, n = sizes[a], sizes[b], len(records)
+        if not np.isfinite(x).all() or not np.isfinite(y).all():
+            continue
+        spread = {(i, j): float(np.std(np.delete(y, j) - np.delete(x, i))) for i in range(n) for j in range(n)}
+        of_order = min(spread[k, k] for k in range(n))
+        (i, j), least = min(spread.items(), key=lambda item: item[1])
+        is_moved = of_order > MIN_SIZE_SPREAD and least * MIN_SPREAD_RATIO < of_order
+        if is_moved and abs(i - j) >= MIN_MOVED_RECORDS:
+            problem = (
+                f"the sizes of the sets fit if set {i + 1} of channel {channel_name(a)!r} and set {j + 1} of channel "
+                f"{channel_name(b)!r} have lost their partners; neither numbers, times nor nodes show the right ones"
+            )
+            raise source.error("the sets", problem, PAIRING_REMEDY)
+
+
+def _log_energy(dataset: UffDataset) -> float:
+    """Logarithm of the energy of a set; NaN for one that is damaged, empty or left in the file."""
+    data = dataset.data
+    if dataset.damage or not isinstance(data, np.ndarray) or not data.size or data.dtype.kind not in "fiu":
+        return np.nan
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.log(np.var(data.astype(float))))
 
 
 def _contradiction(

@@ -278,6 +278,28 @@ def test_sets_in_regular_order_need_no_times(line_3, order, hammer_test, in_si, 
     assert _impacts(result, hammer_test) == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize(("lost_force", "lost_rail"), [(0, 8), (8, 0), (2, 7), (None, None), (4, 4)])
+@pytest.mark.parametrize("seed", range(5))
+def test_sizes_show_that_two_lost_sets_moved_the_others(lost_force, lost_rail, seed, hammer_test, in_si, tmp_path):
+    """Nine impacts of different strength, channel after channel; one force and the response to another one are lost."""
+    rng = np.random.default_rng(seed)
+    scatter = np.exp(0.01 * rng.normal(size=(9, 2, 1)))
+    shape = rng.normal(size=(2, 301)) * [[100.0], [30.0]]
+    strengths = rng.uniform(5.0, 10.0, size=9)
+    impacts = [replace(hammer_test[0], samples=shape * a * b) for a, b in zip(strengths, scatter)]
+    sets = _sets_without_numbers(impacts, tmp_path, ["NONE"] * 18)
+    forces = [one for k, one in enumerate(sets[::2]) if k != lost_force]
+    rails = [one for k, one in enumerate(sets[1::2]) if k != lost_rail]
+    data = "".join(forces + rails).encode()
+    if lost_force == lost_rail:
+        result = _read_bytes(tmp_path / "a.uff", data, in_si)
+        assert len(result.recordings) == (9 if lost_rail is None else 8)
+        return
+    with pytest.raises(ReadError, match="have lost their partners") as caught:
+        _read_bytes(tmp_path / "a.uff", data, in_si)
+    assert "field 3 of record 6" in caught.value.remedy
+
+
 def test_a_contradiction_forbids_the_order_for_records_that_no_time_confirms(hammer_test, in_si, tmp_path):
     """Impacts 1 and 2 have no times, the rail of 3 and the force of 4 are lost: 3 and 4 would be one record."""
     sets = _sets_without_numbers(hammer_test, tmp_path, [*["NONE"] * 4, *STAMPS[4:]])
