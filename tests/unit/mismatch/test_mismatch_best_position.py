@@ -94,6 +94,25 @@ def test_a_neighbour_of_another_length_is_another_effect():
     assert at_best_position(Search(case), base, leader).candidate.where == {"place": 3.6}
 
 
+def test_a_leader_takes_the_next_length_as_it_takes_the_next_position(monkeypatch):
+    """Bumps of three lengths at each position; the true one is at 4.2 m, the longest."""
+    case = Dented(4.2)
+    lengths = {1: 0.3, 3: 0.6, 5: WIDTH}
+    case.candidates = tuple(
+        Candidate.of(
+            "bump", SIZE, lambda p, x=x, n=n: p | {"place": x, "width": lengths[n]}, ((1.0,),),
+            {"place": x, "sleepers": n}, n_scanned=27,
+        )
+        for x in POSITIONS for n in lengths
+    )  # fmt: skip
+    monkeypatch.setattr(case, "shape", lambda depth, place, width: depth * np.exp(-(((X - place) / width) ** 2)))
+    base = fit_jointly(case)
+    (candidate,) = (c for c in case.candidates if c.where == {"place": 3.6, "sleepers": 1})
+    leader = score_of(Search(case), base, fit_jointly(case, (candidate,), [1.0]), candidate)
+    moved = at_best_position(Search(case), base, leader)
+    assert moved.candidate.where == {"place": 4.2, "sleepers": 5}
+
+
 def test_each_position_is_tried_once_even_if_a_fit_to_convergence_has_less_evidence(monkeypatch):
     case, tried = Dented(4.2), []
     base, leader = leader_at(case, 3.0)

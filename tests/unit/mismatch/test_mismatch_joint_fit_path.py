@@ -90,7 +90,7 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
     """A name needs 12 nats; from half of them on the fit goes on to its end."""
     score, asked = SimpleNamespace(gain=gain, is_reportable=True, family="a"), []
     monkeypatch.setattr(
-        refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, candidate=SimpleNamespace(key="a"))]
+        refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key="a"))]
     )
     monkeypatch.setattr(refit, "_score_task", lambda *a: score)
     monkeypatch.setattr(refit, "polish", lambda *a: asked.append(a) or score)
@@ -107,7 +107,7 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
 def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, beside, begun):
     """Of two leaders; beside a name what is left is that one's shape as well."""
     scores = {f: SimpleNamespace(gain=g, is_reportable=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
-    entries = [SimpleNamespace(rival=False, candidate=SimpleNamespace(key=f)) for f in "ba"]
+    entries = [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key=f)) for f in "ba"]
     asked = []
     monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
     monkeypatch.setattr(refit, "_score_task", lambda search, fit, entry, *a: scores[entry.candidate.key])

@@ -119,13 +119,14 @@ def gain_with_wide_prior(m: float, s: float, tau: float, wide_sd: float) -> tupl
 class RefitTask:
     """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
 
-    ``cheap_gain`` is the gain from the cheap observations alone [nats]. A ``rival`` is refitted only if another effect
-    of its component gains something.
+    ``promise`` is the gain that it was selected for, and ``cheap_gain`` that from the cheap observations alone [nats].
+    A ``rival`` is refitted only if another effect of its component gains something.
     """
 
     candidate: Candidate
     start: np.ndarray
     values: dict[str, float]
+    promise: float = 0.0
     cheap_gain: float = 0.0
     rival: bool = False
 
@@ -172,7 +173,7 @@ def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> li
     chosen = [e for rank, e in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or e.gain > min_gain]
     tasks = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
     tasks = [(with_fitted_start(e, by_family), rival) for e, rival in tasks]
-    return [RefitTask(*e[1:], prescreen_gains.get(e.candidate.key, 0.0), rival) for e, rival in tasks]
+    return [RefitTask(*e[1:], e.gain, prescreen_gains.get(e.candidate.key, 0.0), rival) for e, rival in tasks]
 
 
 def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[Entry]:

@@ -14,10 +14,14 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.candidate_search import RefitTask
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
+
+
+SITE_COORDINATES = ("place", "sleepers")  # along which a site has neighbours: its position [m] and its length
 
 
 def polish(search: Search, fit: Fit, score: Score) -> Score:
@@ -45,8 +49,8 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     """A leader fitted to convergence at the best position that is reached by steps to a better neighbour.
 
     The position was chosen by the cheap observations, or by columns of one size. It is a parameter like others, but
-    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. Each
-    position is tried once.
+    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. So is the
+    length of a stretch. Each site is tried once.
 
     Parameters
     ----------
@@ -92,21 +96,57 @@ def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> S
 
 
 def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
-    """The candidates that differ from this one by the next position before and behind. [] if it has no position."""
-    position = candidate.position
-    if position is None:
+    """The candidates that differ from this one by the next position before and behind, or by the next length.
+
+    [] if it has no position.
+    """
+    if candidate.position is None:
         return []
-    alike = (c for c in case.candidates if c.family == candidate.family and _is_same_but_for_position(c, candidate))
-    others = [(c.position, c) for c in alike if c.position is not None]
-    before = max((x for x in others if x[0] < position), key=lambda x: x[0], default=None)
-    behind = min((x for x in others if x[0] > position), key=lambda x: x[0], default=None)
-    return [x[1] for x in (before, behind) if x is not None]
+    alike = [c for c in case.candidates if c.family == candidate.family and c.position is not None]
+    neighbours = []
+    for key in SITE_COORDINATES:
+        at = {c.where[key]: c for c in alike if _is_same_but_for(key, c, candidate)}
+        before = [x for x in at if x < candidate.where[key]]
+        behind = [x for x in at if x > candidate.where[key]]
+        neighbours += [at[x] for x in (*sorted(before)[-1:], *sorted(behind)[:1])]
+    return neighbours
 
 
-def _is_same_but_for_position(first: Candidate, second: Candidate) -> bool:
-    """Whether two candidates of one effect have the same length, wavelength and so on."""
-    a, b = ({k: v for k, v in c.where.items() if k not in ("place", "sleeper")} for c in (first, second))
-    return a == b
+def _is_same_but_for(key: str, first: Candidate, second: Candidate) -> bool:
+    """Whether two candidates of one effect have this coordinate and differ at most in it, and so in the sleeper."""
+    a, b = ({k: v for k, v in c.where.items() if k not in (key, "sleeper")} for c in (first, second))
+    return a == b and key in first.where and key in second.where
+
+
+def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None:
+    """Score of a candidate fitted to convergence from priors of all nuisances that can mask it.
+
+    Parameters
+    ----------
+    search : Search
+    fit : Fit
+        Without the candidate.
+    task : RefitTask
+        The candidate and its start.
+
+    Returns
+    -------
+    Score or None
+        None if the simulation fails.
+    """
+    candidates = (*fit.candidates, task.candidate)
+    psi = np.concatenate([fit.psi, task.start])
+    values = fit.values | search.prior_values() | task.values
+
+    def compute() -> Fit | None:
+        try:
+            return search.converge(search.fit(candidates, psi, values))
+        except SimulationError:
+            return None
+
+    key = f"{search.label}:priors:{task.candidate.key}:{tuple(np.round(psi, 12))}"
+    refit = search.stored_fit(key, compute, candidates)
+    return None if refit is None else score_of(search, fit, refit, task.candidate)
 
 
 def restart_leader(search: Search, fit: Fit, score: Score) -> Score:

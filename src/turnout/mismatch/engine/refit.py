@@ -5,7 +5,7 @@ Fits are stored by key.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from turnout.mismatch.engine.candidate_search import Entry, RefitTask, prescreen
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
-from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader
+from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader, start_from_priors
 from turnout.mismatch.engine.single_witness import single_sensor, single_witness
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -81,8 +81,34 @@ def _rank_families(search: Search, fit: Fit, prescreened: Sequence[Entry]) -> li
         best_gain, previous = max(best_gain, score.gain), scores.get(score.family)
         if previous is None or score.gain > previous.gain:
             scores[score.family] = score
+    restarted = _restart_unkept_promise(search, fit, tasks, scores)
+    if restarted is not None:
+        scores[restarted.family] = restarted
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     return _refine_leaders(search, fit, ranked) if search.case.expensive and ranked else ranked
+
+
+def _restart_unkept_promise(
+    search: Search, fit: Fit, tasks: Sequence[RefitTask], scores: Mapping[str, Score]
+) -> Score | None:
+    """Best score of the families that promised a name but gained none. None without such a family.
+
+    A base fit that imitates an effect has local minima. Where no refit gains a name, each such family starts again with
+    all nuisances that can mask it at their priors. The best one moves along the track.
+    """
+    threshold = search.settings.threshold
+    gains = {s.family: s.gain for s in scores.values()}
+    has_name = any(s.is_reportable and s.gain > threshold for s in scores.values())
+    if not search.case.expensive or fit.candidates or has_name:
+        return None
+    unkept = [t for t in tasks if not t.rival and t.promise > threshold >= gains.get(t.candidate.family, -np.inf)]
+    restarted = [start_from_priors(search, fit, task) for task in unkept]
+    best = max((s for s in restarted if s is not None), key=lambda s: s.gain, default=None)
+    if best is None:
+        return None
+    best = at_best_position(search, fit, best)
+    former = scores.get(best.family)
+    return best if former is None or best.gain > former.gain else None
 
 
 def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score]:

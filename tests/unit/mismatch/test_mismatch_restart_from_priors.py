@@ -1,0 +1,103 @@
+"""A family that promises a name is fitted again from the priors where its refit from the base fit gains none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.engine import refit
+from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import RefitTask
+from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.nuisance import Nuisance
+from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.refit import _rank_families
+from turnout.mismatch.engine.search import Search
+from turnout.physics import Parameter
+
+WAVE, OTHER_WAVE, BARRIER = (np.sin(np.linspace(0.0, x, 200)) for x in (7.0, 22.0, 31.0))
+SIZE = (Parameter("height", "-", 0.0, (-9.0, 9.0), "size", "made up 2026", (0.0, 3.0)),)
+IMITATION = 3.0  # of the nuisance: there it changes the recordings nearly as the effect does
+
+
+class Imitated(Case):
+    """A wave of height 1, and a nuisance that imitates it behind a barrier: from 0 to 3 the fit first gets worse."""
+
+    def __init__(self, expensive=True):
+        rng = np.random.default_rng(11)
+        self.expensive = expensive
+        self.nuisances = (Nuisance("stiffness", "-", 0.0, 0.5),)
+        self.candidates = (
+            Candidate.of("wave", SIZE, lambda p: p, ((0.1,),), {}),
+            Candidate.of("other wave", SIZE, lambda p: p | {"other": True}, ((0.1,),), {}),
+        )
+        self.observations = tuple(
+            Observation(f"o{k}", f"day {k}", WAVE + 0.2 * rng.normal(size=WAVE.size), 0.2) for k in range(4)
+        )
+
+    def predict(self, values, terms, observations):
+        x = values["stiffness"]
+        made = 0.98 * x / IMITATION * WAVE + 4.0 * np.sin(np.pi * x / IMITATION) ** 2 * BARRIER
+        for term in terms:
+            made = made + term["height"] * (OTHER_WAVE if "other" in term else WAVE)
+        return [made for _ in observations]
+
+
+def ranked(monkeypatch, case, promises=(20.0, 0.0), fit=None):
+    """(base fit, scores by family) of tasks with these promises."""
+    base = fit or fit_jointly(case, values={"stiffness": IMITATION})
+    tasks = [RefitTask(c, np.array([0.1]), {}, p) for c, p in zip(case.candidates, promises)]
+    monkeypatch.setattr(refit, "shortlist", lambda *a: tasks)
+    return base, {s.family: s for s in _rank_families(Search.of(case), base, ())}
+
+
+def test_a_base_fit_that_imitates_the_effect_stays_there():
+    """The test is of no use otherwise."""
+    base = fit_jointly(Imitated(), values={"stiffness": IMITATION})
+    assert base.values["stiffness"] == pytest.approx(IMITATION, abs=0.3)
+
+
+def test_a_promise_that_no_refit_keeps_begins_again_from_the_priors(monkeypatch):
+    _, scores = ranked(monkeypatch, Imitated())
+    wave = scores["wave"]
+    assert wave.estimates[0][0] == pytest.approx(1.0, abs=4.0 * wave.estimates[1][0])
+    assert wave.fit.values["stiffness"] == pytest.approx(0.0, abs=0.5)
+
+
+@pytest.mark.parametrize("promise", [0.0, 11.0])
+def test_a_promise_below_a_name_does_not(monkeypatch, promise):
+    """Restarts cost many simulations; without any effect no promise comes near a name."""
+    _, scores = ranked(monkeypatch, Imitated(), (promise, 0.0))
+    assert scores["wave"].fit.values["stiffness"] == pytest.approx(IMITATION, abs=0.3)
+
+
+def test_a_restart_that_gains_less_changes_nothing(monkeypatch):
+    """The wave that is not there promises much: its restart ends with the nuisance at 0 and the wave unexplained."""
+    base, before = ranked(monkeypatch, Imitated(), (0.0, 0.0))
+    _, after = ranked(monkeypatch, Imitated(), (0.0, 20.0), base)
+    assert after["other wave"].gain == before["other wave"].gain
+
+
+def test_none_begins_again_where_another_effect_gains_a_name(monkeypatch):
+    case, begun = Imitated(), []
+    monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
+    score_task = refit._score_task
+    monkeypatch.setattr(refit, "_score_task", lambda *a: replace(score_task(*a), gain=20.0))
+    monkeypatch.setattr(refit, "_refine_leaders", lambda search, fit, scores: scores)
+    ranked(monkeypatch, case)
+    assert begun == []
+    monkeypatch.setattr(refit, "_score_task", lambda *a: replace(score_task(*a), gain=3.0))
+    ranked(monkeypatch, case)
+    assert [t.candidate.family for t in begun] == ["wave"]
+
+
+def test_none_begins_again_beside_an_effect_or_in_a_cheap_case(monkeypatch):
+    """Beside another effect what is left is also an error in its shape; a cheap case starts everywhere anyway."""
+    begun = []
+    monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
+    case = Imitated()
+    beside = fit_jointly(case, case.candidates[1:], [0.0], {"stiffness": IMITATION})
+    ranked(monkeypatch, case, fit=beside)
+    ranked(monkeypatch, Imitated(expensive=False))
+    assert begun == []
