@@ -6,7 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.mismatch.engine.localization import location_of_ambiguity
 from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout import wheel_impacts as module
 from turnout.mismatch.turnout.defect_priors import IMPACTS
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.wheel_impacts import (
@@ -15,7 +17,7 @@ from turnout.mismatch.turnout.wheel_impacts import (
     _signal,
     impact_levels,
     impact_signals,
-    impacts_at_position,
+    wheel_impacts,
 )
 from turnout.simulate.wheel_path import Corrugation, Kink
 
@@ -51,17 +53,31 @@ def test_impacts_of_many_wheels_are_located(position, direction):
     assert levels.evidence() > 12.0 and abs(levels.position() - position) < 0.5
 
 
-def test_a_part_that_rattles_under_one_train_alone_is_located():
+def test_impacts_of_one_train_alone_belong_to_the_train():
+    """A part may rattle under one train only, and a flat is heard while other wheels of its train are there."""
     levels = impact_levels(visit(2, lambda t, k: (5.3, slice(None)) if k == 2 else None))
-    assert levels.evidence() > 12.0 and abs(levels.position() - 5.3) < 0.5
+    assert levels.evidence() < 0.0 and levels.evidence_of_train() > 12.0 and levels.train == "a"
+    assert abs(levels.position() - 5.3) < 0.5
+    both = impact_levels(visit(2, lambda t, k: (5.3, slice(None)) if k in (2, 3) else None))
+    assert both.evidence() > 12.0
+
+
+def test_a_flat_as_far_from_other_wheels_as_it_rolls_in_a_turn_is_of_its_train():
+    """Each of its impacts comes while the other wheels of the train are at the positions of former ones."""
+
+    def of_flat(train, k):
+        return (3.1, slice(None)) if train == "a" else None
+
+    levels = impact_levels(visit(3, of_flat))
+    assert levels.evidence() < 0.0 < levels.evidence_of_train() and levels.train == "a"
 
 
 def test_intact_track_a_flat_and_a_faulty_channel_are_no_impacts_at_a_position():
-    assert max(impact_levels(visit(seed)).evidence() for seed in range(8)) < 0.0
+    assert max(impact_levels(visit(seed)).evidence_of_train() for seed in range(8)) < 0.0
     flat = impact_levels(visit(3, lambda t, k: (3.0 + 1.1 * k, slice(2, 3)) if t == "a" else None))
-    assert flat.evidence() < 3.0
+    assert flat.evidence_of_train() < 3.0
     channel = impact_levels(visit(4, lambda t, k: (4.1, slice(None)), channel=1))
-    assert channel.evidence() < 3.0
+    assert channel.evidence_of_train() < 3.0
 
 
 def test_fewer_wheels_than_must_agree_give_no_level():
@@ -114,7 +130,7 @@ def with_recording(aligned, **changes):
 def test_a_case_reports_impacts_and_intact_track_has_none():
     """Recordings of our own simulator, with its roughness; the band of a slower recorder ends too low."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
-    assert impacts_at_position(case) is None and case.ambiguity() is None
+    assert wheel_impacts(case) is None and case.ambiguity() is None
     passages = case.fitted_passages()
     position = float(np.mean([s.place for s in passages[0].sensors])) + 0.3
     case.fitted_passages = lambda: [with_impacts(p, position) for p in passages]
@@ -123,3 +139,13 @@ def test_a_case_reports_impacts_and_intact_track_has_none():
     assert abs(0.5 * (found.low + found.high) - position) < 0.6
     case.fitted_passages = lambda: [with_recording(p, rate=2000.0) for p in passages]
     assert impact_signals(case) == [] and 2.0 * IMPACTS.low_frequency > 2000.0
+
+
+def test_impacts_of_one_train_alone_are_located_on_the_train(monkeypatch):
+    levels = impact_levels(visit(2, lambda t, k: (5.3, slice(None)) if k == 2 else None))
+    monkeypatch.setattr(module, "impact_levels", lambda signals: levels)
+    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    location = location_of_ambiguity(case)
+    assert str(location) == "on a" and location.place is None and location.nats > 12.0
+    ambiguity = case.ambiguity()
+    assert "wheels of a cause impacts" in ambiguity.words and "near 5.3 m" in ambiguity.measurement

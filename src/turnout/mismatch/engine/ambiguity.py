@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Ambiguity:
-    """Something between ``low`` and ``high`` [m] with several explanations that the recordings cannot distinguish.
+    """Something with several explanations that the recordings cannot distinguish.
 
     Attributes
     ----------
@@ -21,8 +21,8 @@ class Ambiguity:
         What it may be fixed to.
     level : str
         At which value of that.
-    low, high : float
-        Where it shows. [m]
+    low, high : float or None
+        Where it shows [m]; None of a train.
     """
 
     nats: float
@@ -30,5 +30,5 @@ class Ambiguity:
     measurement: str
     frame: str
     level: str
-    low: float
-    high: float
+    low: float | None = None
+    high: float | None = None

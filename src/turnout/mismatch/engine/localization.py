@@ -127,7 +127,11 @@ def location_of_ambiguity(case: Case) -> Location | None:
         None if there is nothing of the kind.
     """
     u = case.ambiguity()
-    return None if u is None else Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
+    if u is None:
+        return None
+    if u.low is None or u.high is None:
+        return Location(u.frame, u.level, u.nats, train=u.level if u.frame == "train" else None)
+    return Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
 
 
 def locate_change(case: Case, fit: Fit) -> Location | None:

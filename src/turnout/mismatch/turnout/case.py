@@ -31,7 +31,7 @@ from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
 from turnout.mismatch.turnout.unmet_requirements import UnmetRequirement, unmet_requirements
 from turnout.mismatch.turnout.unproven_panels import reservation
-from turnout.mismatch.turnout.wheel_impacts import impacts_at_position
+from turnout.mismatch.turnout.wheel_impacts import wheel_impacts
 from turnout.mismatch.turnout.wheel_roughness import log_mass_ratios
 from turnout.mismatch.turnout.worn_nose import worn_noses
 from turnout.physics import RailCorrugation
@@ -256,7 +256,7 @@ class TrackCase(PredictedCase):
         from turnout.mismatch.turnout.candidates.short_corrugation import ambiguous_line
 
         has_corrugation = self.families is None or RailCorrugation.name in self.families
-        possible = (impacts_at_position(self), ambiguous_line(self) if has_corrugation else None)
+        possible = (wheel_impacts(self), ambiguous_line(self) if has_corrugation else None)
         return max((a for a in possible if a is not None), key=lambda a: a.nats, default=None)
 
     def tolerated_effects(self, fit: Fit) -> tuple[Candidate, ...]:

@@ -7,9 +7,11 @@ the energy of a bin of time at a sensor,
 .. math:: \ln E = a_{passage} + b_{sensor} + g(\text{distance of the nearest wheel}) + e
 
 by medians, so that each passage is compared with the rest of itself, and each sensor with itself. A wheel at a position
-counts with the quieter one of the two sensors next to it: a fault of a channel is in one. A flat belongs to one wheel,
-and its impacts are anywhere: the level of a position is what the fifth loudest wheel exceeds there, each in its loudest
-passage. Bins in which any wheel is near a joint, a nose or a blade of the track file do not count at any position.
+counts with the quieter one of the two sensors next to it: a fault of a channel is in one. The level of a position is
+what the fifth loudest wheel exceeds there, each in its loudest passage. A flat belongs to one wheel, and its impacts
+are anywhere, also while other wheels of its train are at a position. So impacts belong to a position if wheels of
+several trains cause them, whichever train is left out, else to the train. Bins in which any wheel is near a joint, a
+nose or a blade of the track file do not count at any position.
 """
 
 from __future__ import annotations
@@ -56,28 +58,40 @@ class ImpactSignal:
 
 @dataclass(frozen=True)
 class ImpactLevels:
-    """Levels over those of rolling: ``common`` (n,) that several wheels exceed, ``mean`` (n,) of all wheels.
+    """Levels over those of rolling: ``common`` (n,) that several wheels exceed, whichever train is left out.
 
-    ``positions`` (n,) along the track [m].
+    ``of_all`` (n,) is the same with all trains, ``mean`` (n,) that of all wheels. ``positions`` (n,) along the track
+    [m]. Without ``train`` the loudest level is least.
     """
 
     positions: np.ndarray
     common: np.ndarray
+    of_all: np.ndarray
     mean: np.ndarray
+    train: str
 
     def evidence(self) -> float:
-        """Evidence for impacts at one of the positions, all equally probable before. [nats]"""
-        z, ratio = np.maximum(self.common - IMPACTS.level, 0.0), (IMPACTS.impact_sd / IMPACTS.level_sd) ** 2
-        nats = 0.5 * (z / IMPACTS.level_sd) ** 2 * ratio / (1.0 + ratio) - 0.5 * np.log1p(ratio)
-        return float(np.logaddexp.reduce(nats) - np.log(nats.size))
+        """Evidence for impacts at one of the positions. [nats]"""
+        return _evidence(self.common)
+
+    def evidence_of_train(self) -> float:
+        """Evidence for impacts of the wheels of any trains, even of one alone. [nats]"""
+        return _evidence(self.of_all)
 
     def position(self) -> float:
         """Where the mean of all wheels is loudest. [m]"""
         return float(self.positions[np.argmax(self.mean)])
 
 
-def impacts_at_position(case: TrackCase) -> Ambiguity | None:
-    """Impacts that the wheels of all fitted passages cause at one position.
+def _evidence(levels: np.ndarray) -> float:
+    """Evidence for impacts at one of the positions, all equally probable before, by their ``levels`` (n,). [nats]"""
+    z, ratio = np.maximum(levels - IMPACTS.level, 0.0), (IMPACTS.impact_sd / IMPACTS.level_sd) ** 2
+    nats = 0.5 * (z / IMPACTS.level_sd) ** 2 * ratio / (1.0 + ratio) - 0.5 * np.log1p(ratio)
+    return float(np.logaddexp.reduce(nats) - np.log(nats.size))
+
+
+def wheel_impacts(case: TrackCase) -> Ambiguity | None:
+    """Impacts that the wheels of all fitted passages cause at one position, or those of one train alone.
 
     Parameters
     ----------
@@ -90,17 +104,33 @@ def impacts_at_position(case: TrackCase) -> Ambiguity | None:
         None without enough wheels and sensors, in the panel of a switch, or where intact track is likelier.
     """
     levels = impact_levels(impact_signals(case))
-    if levels is None or not levels.evidence() > 0.0:  # nan where a channel has none
+    if levels is None:
         return None
+    if levels.evidence() > 0.0:  # nan where a channel has none
+        return _at_position(levels)
+    return _of_train(levels) if levels.evidence_of_train() > 0.0 else None
+
+
+def _at_position(levels: ImpactLevels) -> Ambiguity:
     position = levels.position()
-    decibels = 10.0 / np.log(10.0) * float(np.max(levels.common))
-    words = (
-        f"wheels cause impacts there, {decibels:.0f} dB louder than rolling above "
-        f"{1e-3 * IMPACTS.low_frequency:.1f} kHz. It may be {EXPLANATIONS}"
-    )
+    words = f"wheels cause impacts there, {_loudness(levels.common)}. It may be {EXPLANATIONS}"
     measurement = "the running surface there, and look for loose parts of fastenings and guard rail"
     low, high = position - IMPACTS.position_error, position + IMPACTS.position_error
     return Ambiguity(levels.evidence(), words, measurement, "place", f"{position:.2f} m", low, high)
+
+
+def _of_train(levels: ImpactLevels) -> Ambiguity:
+    words = (
+        f"wheels of {levels.train} cause impacts, {_loudness(levels.of_all)}, and those of no other train. It may be a "
+        f"defect of a wheel, or a part that rattles under this train alone"
+    )
+    measurement = f"the wheels of {levels.train}, and look for loose parts near {levels.position():.1f} m"
+    return Ambiguity(levels.evidence_of_train(), words, measurement, "train", levels.train)
+
+
+def _loudness(levels: np.ndarray) -> str:
+    decibels = 10.0 / np.log(10.0) * float(np.max(levels))
+    return f"{decibels:.0f} dB louder than rolling above {1e-3 * IMPACTS.low_frequency:.1f} kHz"
 
 
 def impact_signals(case: TrackCase) -> list[ImpactSignal]:
@@ -156,8 +186,22 @@ def impact_levels(signals: Sequence[ImpactSignal]) -> ImpactLevels | None:
             loudest[key] = np.maximum(loudest.get(key, row), row)
     if len(loudest) < IMPACTS.min_wheels:
         return None
-    common = np.sort(np.array(list(loudest.values())), axis=0)[-IMPACTS.min_wheels]
-    return ImpactLevels(grid, common, np.concatenate(levels).mean(axis=0))
+    common = {
+        train: _level_of_fifth([row for (other, _), row in loudest.items() if other != train], grid.size)
+        for train in sorted({train for train, _ in loudest})
+    }
+    return ImpactLevels(
+        grid,
+        np.min(list(common.values()), axis=0),
+        _level_of_fifth(list(loudest.values()), grid.size),
+        np.concatenate(levels).mean(axis=0),
+        min(common, key=lambda train: float(np.max(common[train]))),
+    )
+
+
+def _level_of_fifth(rows: Sequence[np.ndarray], n_position: int) -> np.ndarray:
+    """(n_position,) levels that as many wheels exceed as must agree, or all if they are fewer; 0, rolling, of none."""
+    return np.sort(rows, axis=0)[-min(IMPACTS.min_wheels, len(rows))] if rows else np.zeros(n_position)
 
 
 def _signal(aligned: AlignedPassage, top: float, stretches: Iterable[tuple[float, float]]) -> ImpactSignal:
