@@ -240,7 +240,7 @@ class NameEvidence:
     ``free_share`` is the share of the gain on held-out recordings that all names miss, and free laws reach.
     ``strained`` is the value that no tolerance explains in that fit, in words; "" if there is none. ``local_change`` is
     the evidence that single components differ between kinds of recordings beside all names, less what errors in the
-    shape of names at a position may leave. It counts beyond the ``threshold`` of a name. [nats]
+    shape of names at a position or in a channel may leave. It counts beyond the ``threshold`` of a name. [nats]
     """
 
     score: Score

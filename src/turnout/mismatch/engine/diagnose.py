@@ -251,8 +251,9 @@ def grade_names(findings: Findings) -> Findings:
     free_share = free_law_share(search, findings.base, fit)
     value = strained_value(search.case, fit, search.settings.threshold)
     strained = str(value) if value is not None and value.nuisance.at is not None else ""
-    at_positions = sum(v.scores[0].gain for v in findings.verdicts if v.scores and v.scores[0].has_position)
-    shape_errors = THRESHOLDS.shape_error_share * at_positions
+    leaders = [v.scores[0] for v in findings.verdicts if v.scores]
+    local_gain = sum(s.gain for s in leaders if s.has_position or s.candidate.frame == "sensor")
+    shape_errors = THRESHOLDS.shape_error_share * local_gain
     local_change = local_change_evidence(search.case, fit) - shape_errors
     for verdict in findings.verdicts:
         is_refuted = verdict.answer == "a_or_b" and (strained or free_share > THRESHOLDS.max_free_law_share)
