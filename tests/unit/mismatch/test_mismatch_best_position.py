@@ -85,7 +85,7 @@ def test_a_leader_at_its_best_position_or_without_one_stays(position):
     assert at_best_position(Search(case), base, leader) is leader
 
 
-def test_a_neighbour_of_another_length_is_another_effect():
+def test_an_effect_with_a_length_is_no_neighbour_of_one_without():
     """A long bump at the true position, and one as long as the leader beside it."""
     case = Dented(4.2)
     long_one = replace(case.candidates[4].site, where={"place": 4.2, "sleepers": 3})

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.mismatch.engine import refit
+from turnout.mismatch.engine import candidate_search, refit
 from turnout.mismatch.engine.candidate import Candidate
-from turnout.mismatch.engine.candidate_search import RefitTask
+from turnout.mismatch.engine.candidate_search import Entry, RefitTask, shortlist
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
@@ -101,3 +101,21 @@ def test_none_begins_again_beside_an_effect_or_in_a_cheap_case(monkeypatch):
     ranked(monkeypatch, case, fit=beside)
     ranked(monkeypatch, Imitated(expensive=False))
     assert begun == []
+
+
+def test_rivals_begin_again_together(monkeypatch):
+    """Two effects that act alike: a name for one of them would be wrong where only that one began again."""
+    case = Imitated()
+    case.candidates = (case.candidates[0], Candidate.of("twin", SIZE, lambda p: p, ((0.1,),), {}))
+    _, scores = ranked(monkeypatch, case, (20.0, 15.0))
+    assert scores["twin"].gain == pytest.approx(scores["wave"].gain, abs=0.5) and scores["twin"].gain > 10.0
+
+
+def test_a_promise_is_that_of_the_entry_which_was_chosen(monkeypatch):
+    """Another entry of the candidate, fitted to few recordings, gives the start, not the promise."""
+    case = Imitated()
+    base, wave = fit_jointly(case, values={"stiffness": IMITATION}), case.candidates[0]
+    entry = Entry(18.0, wave, np.array([0.1]), {})
+    monkeypatch.setattr(candidate_search, "_screened_entries", lambda *a: [entry])
+    (task,) = shortlist(Search.of(case), base, [Entry(3.0, wave, np.array([0.7]), {"stiffness": 0.4})])
+    assert task.promise == 18.0 and task.start == [0.7] and task.values == {"stiffness": 0.4}

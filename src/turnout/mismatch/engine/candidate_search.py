@@ -172,8 +172,8 @@ def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> li
     min_gain = THRESHOLDS.min_promise_share * max((entry.gain for entry in selected), default=0.0)
     chosen = [e for rank, e in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or e.gain > min_gain]
     tasks = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
-    tasks = [(with_fitted_start(e, by_family), rival) for e, rival in tasks]
-    return [RefitTask(*e[1:], e.gain, prescreen_gains.get(e.candidate.key, 0.0), rival) for e, rival in tasks]
+    fitted = [(with_fitted_start(e, by_family), e.gain, rival) for e, rival in tasks]
+    return [RefitTask(*e[1:], gain, prescreen_gains.get(e.candidate.key, 0.0), rival) for e, gain, rival in fitted]
 
 
 def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[Entry]:

@@ -119,7 +119,7 @@ def _is_same_but_for(key: str, first: Candidate, second: Candidate) -> bool:
 
 
 def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None:
-    """Score of a candidate fitted to convergence from priors of all nuisances that can mask it.
+    """Score of a candidate fitted to convergence from the priors of all shared nuisances that can mask it.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None
     fit : Fit
         Without the candidate.
     task : RefitTask
-        The candidate and its start.
+        The candidate and its start. Its nuisance values are not used.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None
     """
     candidates = (*fit.candidates, task.candidate)
     psi = np.concatenate([fit.psi, task.start])
-    values = fit.values | search.prior_values() | task.values
+    values = fit.values | search.prior_values()
 
     def compute() -> Fit | None:
         try:

@@ -81,34 +81,32 @@ def _rank_families(search: Search, fit: Fit, prescreened: Sequence[Entry]) -> li
         best_gain, previous = max(best_gain, score.gain), scores.get(score.family)
         if previous is None or score.gain > previous.gain:
             scores[score.family] = score
-    restarted = _restart_unkept_promise(search, fit, tasks, scores)
-    if restarted is not None:
-        scores[restarted.family] = restarted
+    for score in _restart_unkept_promises(search, fit, tasks, scores):
+        if score.family not in scores or score.gain > scores[score.family].gain:
+            scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
     return _refine_leaders(search, fit, ranked) if search.case.expensive and ranked else ranked
 
 
-def _restart_unkept_promise(
+def _restart_unkept_promises(
     search: Search, fit: Fit, tasks: Sequence[RefitTask], scores: Mapping[str, Score]
-) -> Score | None:
-    """Best score of the families that promised a name but gained none. None without such a family.
+) -> list[Score]:
+    """Scores of the tasks that promised a name while their family gained none, fitted again from the priors.
 
-    A base fit that imitates an effect has local minima. Where no refit gains a name, each such family starts again with
-    all nuisances that can mask it at their priors. The best one moves along the track.
+    A base fit that imitates an effect has local minima. [] if any refit gains a name, or beside another effect. The
+    best one moves along the track.
     """
     threshold = search.settings.threshold
     gains = {s.family: s.gain for s in scores.values()}
     has_name = any(s.is_reportable and s.gain > threshold for s in scores.values())
     if not search.case.expensive or fit.candidates or has_name:
-        return None
+        return []
     unkept = [t for t in tasks if not t.rival and t.promise > threshold >= gains.get(t.candidate.family, -np.inf)]
-    restarted = [start_from_priors(search, fit, task) for task in unkept]
-    best = max((s for s in restarted if s is not None), key=lambda s: s.gain, default=None)
-    if best is None:
-        return None
-    best = at_best_position(search, fit, best)
-    former = scores.get(best.family)
-    return best if former is None or best.gain > former.gain else None
+    restarted = [s for s in (start_from_priors(search, fit, task) for task in unkept) if s is not None]
+    if not restarted:
+        return []
+    best, *others = sorted(restarted, key=lambda s: -s.gain)
+    return [at_best_position(search, fit, best), *(replace(s, fit=s.fit.without_jacobian()) for s in others)]
 
 
 def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score]:

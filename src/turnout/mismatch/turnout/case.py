@@ -252,7 +252,7 @@ class TrackCase(PredictedCase):
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
 
     def ambiguity(self) -> Ambiguity | None:
-        """Impacts at one position, or a line in the level of all passages; the likelier one, None without any."""
+        """Impacts of wheels, or a line in the level of all passages; the likelier one, None without any."""
         from turnout.mismatch.turnout.candidates.short_corrugation import ambiguous_line
 
         has_corrugation = self.families is None or RailCorrugation.name in self.families

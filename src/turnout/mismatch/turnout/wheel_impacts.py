@@ -1,4 +1,4 @@
-r"""Impacts that wheels cause at one position: something there rattles, is loose, or is a short defect of the surface.
+r"""Impacts that wheels cause at one position, or those of one train: a loose part, a short defect, or a bad wheel.
 
 Waves of the surface shorter than the contact patch do not move a wheel, so that rolling causes little above some
 1.7 kHz. Steel that collides with steel does, for a millisecond, whenever a wheel passes. No law of it is needed. With E
@@ -58,25 +58,26 @@ class ImpactSignal:
 
 @dataclass(frozen=True)
 class ImpactLevels:
-    """Levels over those of rolling: ``common`` (n,) that several wheels exceed, whichever train is left out.
+    """Levels over those of rolling, logarithms of energy, at ``positions`` (n,) along the track [m].
 
-    ``of_all`` (n,) is the same with all trains, ``mean`` (n,) that of all wheels. ``positions`` (n,) along the track
-    [m]. Without ``train`` the loudest level is least.
+    ``of_all`` (n,) is what several wheels exceed, ``common`` (n,) the same whichever train is left out, and ``own``
+    train -> (n,) the same for the wheels of this train alone. ``mean`` (n,) is that of all wheels.
     """
 
     positions: np.ndarray
     common: np.ndarray
     of_all: np.ndarray
+    own: dict[str, np.ndarray]
     mean: np.ndarray
-    train: str
 
     def evidence(self) -> float:
-        """Evidence for impacts at one of the positions. [nats]"""
-        return _evidence(self.common)
-
-    def evidence_of_train(self) -> float:
-        """Evidence for impacts of the wheels of any trains, even of one alone. [nats]"""
+        """Evidence for impacts of wheels, of any trains, at one of the positions. [nats]"""
         return _evidence(self.of_all)
+
+    def train(self) -> str | None:
+        """The train whose wheels alone cause the impacts. None if several trains cause them at one position."""
+        loudest = max(self.own, key=lambda train: float(np.max(self.own[train])))
+        return loudest if _evidence(self.common) <= 0.0 < _evidence(self.own[loudest]) else None
 
     def position(self) -> float:
         """Where the mean of all wheels is loudest. [m]"""
@@ -104,32 +105,31 @@ def wheel_impacts(case: TrackCase) -> Ambiguity | None:
         None without enough wheels and sensors, in the panel of a switch, or where intact track is likelier.
     """
     levels = impact_levels(impact_signals(case))
-    if levels is None:
+    if levels is None or not levels.evidence() > 0.0:  # nan where a channel has none
         return None
-    if levels.evidence() > 0.0:  # nan where a channel has none
-        return _at_position(levels)
-    return _of_train(levels) if levels.evidence_of_train() > 0.0 else None
+    train = levels.train()
+    return _at_position(levels) if train is None else _of_train(levels, train)
 
 
 def _at_position(levels: ImpactLevels) -> Ambiguity:
     position = levels.position()
-    words = f"wheels cause impacts there, {_loudness(levels.common)}. It may be {EXPLANATIONS}"
+    words = f"wheels cause impacts there, {_loudness(levels)}. It may be {EXPLANATIONS}"
     measurement = "the running surface there, and look for loose parts of fastenings and guard rail"
     low, high = position - IMPACTS.position_error, position + IMPACTS.position_error
     return Ambiguity(levels.evidence(), words, measurement, "place", f"{position:.2f} m", low, high)
 
 
-def _of_train(levels: ImpactLevels) -> Ambiguity:
-    words = (
-        f"wheels of {levels.train} cause impacts, {_loudness(levels.of_all)}, and those of no other train. It may be a "
-        f"defect of a wheel, or a part that rattles under this train alone"
-    )
-    measurement = f"the wheels of {levels.train}, and look for loose parts near {levels.position():.1f} m"
-    return Ambiguity(levels.evidence_of_train(), words, measurement, "train", levels.train)
+def _of_train(levels: ImpactLevels, train: str) -> Ambiguity:
+    others = "and those of no other train" if len(levels.own) > 1 else "and no other train was fitted"
+    near = f"near {levels.position():.1f} m"
+    words = f"wheels of {train} cause impacts, {_loudness(levels)}, {others}. It may be a defect of a wheel, or {near} "
+    measurement = f"the wheels of {train}, and look for loose parts {near}"
+    return Ambiguity(levels.evidence(), words + EXPLANATIONS, measurement, "train", train)
 
 
-def _loudness(levels: np.ndarray) -> str:
-    decibels = 10.0 / np.log(10.0) * float(np.max(levels))
+def _loudness(levels: ImpactLevels) -> str:
+    """The loudest level over that of rolling, in words."""
+    decibels = 10.0 / np.log(10.0) * float(np.max(levels.of_all))
     return f"{decibels:.0f} dB louder than rolling above {1e-3 * IMPACTS.low_frequency:.1f} kHz"
 
 
@@ -186,16 +186,16 @@ def impact_levels(signals: Sequence[ImpactSignal]) -> ImpactLevels | None:
             loudest[key] = np.maximum(loudest.get(key, row), row)
     if len(loudest) < IMPACTS.min_wheels:
         return None
-    common = {
-        train: _level_of_fifth([row for (other, _), row in loudest.items() if other != train], grid.size)
-        for train in sorted({train for train, _ in loudest})
-    }
+    by_train: dict[str, list[np.ndarray]] = {}
+    for (train, _), row in sorted(loudest.items(), key=lambda item: item[0]):
+        by_train.setdefault(train, []).append(row)
+    without = [[row for other in by_train if other != train for row in by_train[other]] for train in by_train]
     return ImpactLevels(
         grid,
-        np.min(list(common.values()), axis=0),
+        np.min([_level_of_fifth(rows, grid.size) for rows in without], axis=0),
         _level_of_fifth(list(loudest.values()), grid.size),
+        {train: _level_of_fifth(rows, grid.size) for train, rows in by_train.items()},
         np.concatenate(levels).mean(axis=0),
-        min(common, key=lambda train: float(np.max(common[train]))),
     )
 
 
