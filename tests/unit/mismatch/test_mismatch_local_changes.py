@@ -100,11 +100,12 @@ def test_an_effect_of_the_whole_track_is_no_name_where_a_change_of_one_support_r
 
 
 @pytest.mark.parametrize("place, gain, answer", [(2, 50.0, "named"), (5, 50.0, "unknown"), (5, 1e4, "named")])
-@pytest.mark.parametrize("where", [{"place": 3.0}, {"sensor": "A1"}])
-def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(where, place, gain, answer):
+@pytest.mark.parametrize(
+    "where, frame", [({"place": 3.0}, "place"), ({"sensor": "A1"}, "sensor"), ({"sensor": "A1"}, "clock")]
+)
+def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(where, frame, place, gain, answer):
     """One support is stiffer than all. The effect at ``place`` explains it, or not; strong evidence leaves as much."""
     case = Supports([0.5 + 0.45 * (j == 2) for j in range(N_SUPPORT)])
-    frame = next(iter(where))
     local = Candidate.of("local", SIZE, lambda values: values | {"support": place}, ((0.5,),), where, frame=frame)
     case.candidates = (*case.candidates, local)
     fit = fit_jointly(case, case.candidates, np.array([0.5, 0.1]))

@@ -252,7 +252,7 @@ def grade_names(findings: Findings) -> Findings:
     value = strained_value(search.case, fit, search.settings.threshold)
     strained = str(value) if value is not None and value.nuisance.at is not None else ""
     leaders = [v.scores[0] for v in findings.verdicts if v.scores]
-    local_gain = sum(s.gain for s in leaders if s.has_position or s.candidate.frame == "sensor")
+    local_gain = sum(s.gain for s in leaders if s.has_position or "sensor" in s.candidate.where)
     shape_errors = THRESHOLDS.shape_error_share * local_gain
     local_change = local_change_evidence(search.case, fit) - shape_errors
     for verdict in findings.verdicts:
