@@ -235,9 +235,10 @@ def _check_sizes(
         x, y, n = sizes[a], sizes[b], len(records)
         if not np.isfinite(x).all() or not np.isfinite(y).all():
             continue
-        spread = {(i, j): float(np.std(np.delete(y, j) - np.delete(x, i))) for i in range(n) for j in range(n)}
-        of_order = min(spread[k, k] for k in range(n))
-        (i, j), least = min(spread.items(), key=lambda item: item[1])
+        others = np.array([np.delete(np.arange(n), k) for k in range(n)])  # (n, n - 1) without set k
+        spread = np.std(y[others][None] - x[others][:, None], axis=2)  # (n, n) without set i of a and set j of b
+        of_order, least = np.min(np.diag(spread)), np.min(spread)
+        i, j = np.unravel_index(np.argmin(spread), spread.shape)
         is_moved = of_order > MIN_SIZE_SPREAD and least * MIN_SPREAD_RATIO < of_order
         if is_moved and abs(i - j) >= MIN_MOVED_RECORDS:
             problem = (

@@ -119,3 +119,12 @@ def test_a_promise_is_that_of_the_entry_which_was_chosen(monkeypatch):
     monkeypatch.setattr(candidate_search, "_screened_entries", lambda *a: [entry])
     (task,) = shortlist(Search.of(case), base, [Entry(3.0, wave, np.array([0.7]), {"stiffness": 0.4})])
     assert task.promise == 18.0 and task.start == [0.7] and task.values == {"stiffness": 0.4}
+
+
+def test_the_best_of_those_that_begin_again_moves_along_the_track(monkeypatch):
+    """The others keep the sites that they promised for."""
+    moved = []
+    monkeypatch.setattr(refit, "_refine_leaders", lambda search, fit, scores: scores)
+    monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: moved.append(s.family) or s)
+    ranked(monkeypatch, Imitated(), (20.0, 20.0))
+    assert moved == ["wave"]

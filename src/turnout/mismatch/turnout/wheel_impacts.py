@@ -9,9 +9,9 @@ the energy of a bin of time at a sensor,
 by medians, so that each passage is compared with the rest of itself, and each sensor with itself. A wheel at a position
 counts with the quieter one of the two sensors next to it: a fault of a channel is in one. The level of a position is
 what the fifth loudest wheel exceeds there, each in its loudest passage. A flat belongs to one wheel, and its impacts
-are anywhere, also while other wheels of its train are at a position. So impacts belong to a position if wheels of
-several trains cause them, whichever train is left out, else to the train. Bins in which any wheel is near a joint, a
-nose or a blade of the track file do not count at any position.
+are anywhere, also while other wheels of its train are at a position. So impacts belong to a train if its wheels alone
+have that level, and those of the other trains have none anywhere; else they belong to the position. Bins in which any
+wheel is near a joint, a nose or a blade of the track file do not count at any position.
 """
 
 from __future__ import annotations
