@@ -91,6 +91,44 @@ def _plain_unit(unit: str) -> str:
 
 
 NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
+BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(((?:[^()]|\([^()]*\))*)\))\s*")
+
+
+def name_and_unit(cell: str) -> tuple[str, str]:
+    """Name and unit of a column: the unit is the known one in brackets, else what brackets at the end hold.
+
+    Brackets at the end are no part of the name, nor is a slash before them, which stands for a division.
+
+    Parameters
+    ----------
+    cell : str
+        Name of a column as it is written.
+
+    Returns
+    -------
+    tuple of (str, str)
+        "" as unit if none is stated.
+
+    Examples
+    --------
+    >>> name_and_unit("force [kN]"), name_and_unit("a/(m/s²)"), name_and_unit("Force [N] (ch 1)")
+    (('force', 'kN'), ('a', 'm/s²'), ('Force [N] (ch 1)', 'N'))
+    """
+    for match in reversed([*BRACKETS.finditer(cell)]):
+        unit = next(text for text in match.groups() if text is not None).strip()
+        if _is_known(unit):
+            return cell[: match.start()].rstrip("/ ") if match.end() == len(cell) else cell, unit
+    match_at_end = NAME_WITH_UNIT.match(cell)
+    return (match_at_end[1], match_at_end[2]) if match_at_end else (cell, "")
+
+
+def _is_known(unit: str) -> bool:
+    """Whether a unit is known: of a sensor, or of time."""
+    try:
+        return bool(conversion(unit))
+    except ValueError:
+        time_unit = rate_unit(unit)
+        return time_unit is not None and time_unit.is_step
 
 
 def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
@@ -161,7 +199,7 @@ def are_names(cells: Sequence[str]) -> bool:
     """
     if any(cell[:1].isdigit() for cell in cells):
         return False
-    in_brackets = [match[2] for cell in cells if (match := NAME_WITH_UNIT.match(cell)) and match[1]]
+    in_brackets = [unit for name, unit in map(name_and_unit, cells) if name]
     return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
 
 
@@ -201,7 +239,6 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     names = lines[name_line]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
-    for i, name in enumerate(names):
-        if match := NAME_WITH_UNIT.match(name):
-            names[i], units[i] = match[1], match[2]
+    for i, (name, (bare, unit)) in enumerate(zip(names, map(name_and_unit, names))):
+        names[i], units[i] = bare, unit if unit or bare != name else units[i]
     return Columns(names, units, further)

@@ -18,7 +18,7 @@ from turnout.readers.csv_cells import (
     is_number,
     is_row,
 )
-from turnout.readers.csv_columns import NAME_WITH_UNIT, are_names, names_and_units
+from turnout.readers.csv_columns import are_names, name_and_unit, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
@@ -320,7 +320,7 @@ def entries_of_lines(
 def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether these cells are the names of the columns, with or without units."""
     cells = [cells[0].lstrip("#% "), *cells[1:]]
-    bare = [match[1] if (match := NAME_WITH_UNIT.match(cell)) else cell for cell in cells]
+    bare = [name_and_unit(cell)[0] for cell in cells]
     return len(names) > 1 and list(bare[: len(names)]) == list(names)
 
 

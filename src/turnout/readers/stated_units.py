@@ -1,7 +1,7 @@
 """Units that a file states in its metadata or in the names of its channels, by general rules for all formats.
 
-A unit stands where the format defines it, under a word for a unit ("Einheit", "y_unit", "EU"), in brackets behind the
-name of a channel, or as the last word of that name ("rail_g"). A unit of the layout must agree with it.
+A unit stands where the format defines it, under a word for a unit ("Einheit", "y_unit", "EU"), in brackets in the name
+of a channel, or as a word of that name ("rail_g", "rail_g_2"). A unit of the layout must agree with it.
 """
 
 import re
@@ -27,7 +27,9 @@ OTHER_UNITS = re.compile(
 )
 # Units of the same channel at another place of its measuring chain.
 CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())
-UNIT_IN_NAME = re.compile(r"[\[({<]([^\[\](){}<>]+)[\])}>]\s*$")
+# In brackets anywhere in a name, of which the last one may be cut off.
+UNIT_IN_NAME = re.compile(r"[\[({<|]\s*([^\[\](){}<>|]+?)\s*(?:[\])}>|]|$)")
+SEPARATORS = re.compile(r"[\s_./:;,=|@*\"'-]+")  # of the words of a name
 LEVEL = re.compile(r"dB")
 
 
@@ -197,8 +199,8 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
     Returns
     -------
     tuple of (list of str, list of str)
-        Units of the channel: of its entries and in brackets behind its name. Then those of its measuring chain, of
-        no channel in particular, and the last word of its name.
+        Units of the channel: of its entries and in brackets in its name. Then those of its measuring chain, of no
+        channel in particular, and the words of its name.
     """
     name, n = record.names[index], len(record.names)
     certain: list[str] = []
@@ -214,11 +216,12 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
             (certain if not in_chain and is_meaningless(record.units[index]) else possible).append(texts[index])
         else:
             possible.extend(texts)
-    if match := UNIT_IN_NAME.search(name):
-        if not re.match(r"\s*[+-]?[\d.]", match[1]) and (known_unit(match[1]) or LEVEL.match(match[1])):
-            certain.append(match[1])
-    elif unit := _last_word(name, record.names):
-        possible.append(unit)
+    in_brackets = [u for u in UNIT_IN_NAME.findall(name) if not re.match(r"[+-]?[\d.]", u)]
+    in_brackets = [u for u in in_brackets if known_unit(u) or LEVEL.match(u)]
+    certain.extend(in_brackets)
+    if not in_brackets:
+        bare, *names = (UNIT_IN_NAME.sub("", of_channel).strip() for of_channel in (name, *record.names))
+        possible.extend(_units_in_words(bare, names))
     return [u for u in certain if not is_meaningless(u)], [u for u in possible if not is_meaningless(u)]
 
 
@@ -233,6 +236,12 @@ def _texts(value: Any) -> list[str]:
     return [text for text in texts if (unit := rate_unit(text)) is None or not unit.is_step]
 
 
+def _units_in_words(name: str, names: Sequence[str]) -> list[str]:
+    """Units that words of a name may be: of its last words, as in "rail_mV" or "rail_mm_s2", of others and of all."""
+    last = _last_word(name, names)
+    return [last] if last else [u for u in _other_words(name, names) if known_unit(u)]
+
+
 def _last_word(name: str, names: Sequence[str]) -> str:
     """The last words of a name if they are a unit, as in "rail_mV" or "rail_mm_s2".
 
@@ -243,6 +252,25 @@ def _last_word(name: str, names: Sequence[str]) -> str:
         return ""
     units = ["/".join((stem.rpartition("_")[2], words[0])), words[0]]
     return next((u for u in units if re.match(r"[^\W\d]", u) and (known_unit(u) or LEVEL.match(u))), "")
+
+
+def _other_words(name: str, names: Sequence[str]) -> list[str]:
+    """Words that may be a unit beside others, as in "F_kN_raw" and "kN 2", and a name that is nothing else.
+
+    None where they number the channels, as in "f", "g"; of single letters only those of the usual units.
+    """
+    plain = name.strip()
+    if len(plain) == 1 and any(len(other.strip()) == 1 and not known_unit(other) for other in names):
+        return []
+    words = SEPARATORS.split(plain)
+    others = [SEPARATORS.split(other.strip()) for other in names if other != name]
+    inner = [
+        word
+        for k, word in enumerate(words)
+        if (len(word) > 1 or word in ("g", "N"))
+        and not any(other[:k] + other[k + 1 :] == words[:k] + words[k + 1 :] for other in others)
+    ]
+    return [*inner, *([plain] if re.match(r"[^\W\d]", plain) else [])]
 
 
 def _split_name(name: str) -> list[str]:

@@ -104,7 +104,8 @@ def test_a_unit_under_any_name_is_compared_with_the_layout(format, tmp_path):
 
 NAMES = {  # name of the channel in the file: unit that it states
     "rail [g]": "g", "rail (mV)": "mV", "rail {mm/s²}": "mm/s²", "rail [dB]": "dB", "rail_g": "g", "rail_mV": "mV",
-    "rail mm_s2": "mm/s2", "rail_counts": "counts",
+    "rail mm_s2": "mm/s2", "rail_counts": "counts", "rail [g] 2": "g", "(mg) rail": "mg", "rail|g": "g", "rail [g": "g",
+    "rail_g_raw": "g", "a=mg": "mg", "g": "g", "mm/s²": "mm/s²",
 }  # fmt: skip
 
 
@@ -118,18 +119,33 @@ def test_a_unit_in_the_name_of_a_channel_is_compared_with_the_layout(name, tmp_p
 
 
 @pytest.mark.parametrize(
-    "name", ["rail [m/s²]", "rail_left", "rail [10 g]", "rail (left)", "rail_m", "rail 2", "rail_C"]
+    "name",
+    ["rail [m/s²]", "rail_left", "rail [10 g]", "rail (left)", "rail_m", "rail 2", "rail_C", "rail [m/s²] 2", "G 2 m"],
 )
 def test_a_name_without_another_unit_of_the_channel_states_nothing(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     assert is_read(outcome(tmp_path / "a.npz", (SENSORS[0], replace(SENSORS[1], source=name))))
 
 
-def test_letters_that_number_the_channels_are_no_units(tmp_path):
-    names = [f"rail_{letter}" for letter in "fg"]
+@pytest.mark.parametrize("name", ["rail_{}", "{}", "rail {} 2"])
+def test_letters_that_number_the_channels_are_no_units(name, tmp_path):
+    names = [name.format(letter) for letter in "fg"]
     np.savez(tmp_path / "a.npz", **dict(zip(names, SAMPLES)))
     sensors = tuple(RawChannel(n, n, "acceleration", unit="m/s²") for n in names)
     assert is_read(outcome(tmp_path / "a.npz", sensors))
+
+
+@pytest.mark.parametrize(
+    ("cell", "name", "unit"),
+    [
+        ("rail/(m/s^2)", "rail", "m/s^2"), ("a_z_(g)", "a_z_", "g"), ("rail / [g]", "rail", "g"),
+        ("Rail [g] (ch 2)", "Rail [g] (ch 2)", "g"), ("[g] rail", "[g] rail", "g"), ("rail (ch 2)", "rail", "ch 2"),
+    ],
+)  # fmt: skip
+def test_brackets_anywhere_in_a_column_name_hold_its_unit(cell, name, unit, tmp_path):
+    rows = "\n".join(f"{f:.12g};{a:.12g}" for f, a in SAMPLES.T)
+    (tmp_path / "a.csv").write_text(f"force [N];{cell}\n{rows}\n", encoding="utf-8")
+    assert names_and_units("a.csv", tmp_path) == (("force", "N"), (name, unit))
 
 
 @pytest.mark.parametrize(
