@@ -93,7 +93,7 @@ def _columns_of(
     columns: list[Column] = []
     cells = with_dates([column.to_numpy(zero_copy_only=False) for column in table.columns])
     for i, column in enumerate(cells):
-        numbers = with_durations(column, f"column {names[i] or i + 1!r}", source)
+        numbers = with_durations(column, "column", names[i] or str(i + 1), source)
         check_thousands(numbers, i, names[i], data, offset, separator, source)
         columns.append(numbers)
     return columns

@@ -47,6 +47,7 @@ from turnout.readers.metadata_names import (
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.signal_structures import with_signal_structures
 from turnout.readers.source import RawFile, RawRecord, Source
+from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
 from turnout.readers.time_texts import stated_time
@@ -126,7 +127,7 @@ def _with_fields(variables: Mapping[str, Any]) -> Mapping[str, Any]:
 def _with_durations(variables: Mapping[str, Any], source: Source) -> Mapping[str, Any]:
     """The variables, with durations in place of texts that are the time of day of each sample."""
     changed = {
-        name: with_durations(value, f"variable {name!r}", source)
+        name: with_durations(value, "variable", name, source)
         for name, value in variables.items()
         if isinstance(value, np.ndarray) and value.size > MAX_ENTRIES
     }
@@ -254,7 +255,10 @@ def _raw_record(
         entries=facts.entries,
         units=tuple(units),
         **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
-        axis_starts=tuple(stated_time(value[0]) for value in clocks.values() if value.dtype.kind == "M"),
+        axis_starts=(
+            *(stated_time(value[0]) for value in clocks.values() if value.dtype.kind == "M"),
+            start_in_columns(clocks),
+        ),
         conditions=facts.conditions(k, n),
         time=time,
         time_label=facts.label_of(TIME_NAMES),

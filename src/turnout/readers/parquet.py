@@ -24,6 +24,7 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES
 from turnout.readers.sample_variables import is_flag_series
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_text, without_drawings
 from turnout.readers.texts import decode_text
@@ -70,7 +71,7 @@ def read_raw(source: Source) -> RawFile:
     edges = [0, n_row]
     if numbers is not None:
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
-    time = next((name for name in columns if name.lower() in TIME_NAMES), None)
+    time = next((name for name, x in columns.items() if name.lower() in TIME_NAMES and x.dtype.kind in "fiumM"), None)
     names = [name for name, x in columns.items() if name != time and (x.dtype.kind in "fiu" or is_flag_series(x))]
     if n_row and not names:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
@@ -98,7 +99,10 @@ def read_raw(source: Source) -> RawFile:
                 entries=entries,
                 units=tuple(units[name] for name in names),
                 **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
-                axis_starts=tuple(_first_time(columns[name][span], schema.field(name)) for name in stamped),
+                axis_starts=(
+                    *(_first_time(columns[name][span], schema.field(name)) for name in stamped),
+                    start_in_columns({name: x[span] for name, x in columns.items() if x.dtype.kind in "OUSTm"}),
+                ),
                 conditions=facts.conditions(k, n),
                 time=None if time is None else _seconds(columns[time][span]),
                 undecided=nested | {i: stated[name] for i, name in enumerate(names) if stated[name]},
@@ -144,7 +148,7 @@ def _to_numpy(column: pa.ChunkedArray, name: str, source: Source) -> np.ndarray:
         return whole.astype("int64").view(f"timedelta64[{column.type.unit}]") if whole.dtype.kind == "i" else whole
     if pa.types.is_decimal(column.type):
         column = column.cast(pa.float64())
-    return with_durations(column.to_numpy(), f"column {name!r}", source)
+    return with_durations(column.to_numpy(), "column", name, source)
 
 
 class RowGroupReader:

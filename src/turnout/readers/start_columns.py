@@ -1,18 +1,20 @@
 """Start of a recording in its first sample: a date and a time of day, or a count from a known origin."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 
-from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE
+from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE, ClockColumn
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import words_of
 from turnout.readers.rate_words import is_time_name
 from turnout.readers.source import RawRecord
+from turnout.readers.stamp_texts import plain_stamp
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
+from turnout.readers.texts import decode_text
 from turnout.readers.time_numbers import time_of_number
 
 TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
@@ -43,7 +45,11 @@ def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime
     >>> start_in_cells(["05/06/2026", "10:00:00", "1.5"], ["Date", "Time", "Force"])
     (None, '05/06/2026 10:00:00: day or month first?')
     """
-    cells = [cell.strip() for cell, name in zip(cells, names) if not any(OTHER.search(w) for w in words_of(name))]
+    cells = [
+        plain_stamp(cell).strip()
+        for cell, name in zip(cells, names)
+        if not any(OTHER.search(w) for w in words_of(name))
+    ]
     dated = [cell for cell in cells if DATED.fullmatch(cell)]
     if not dated:
         dates = [cell for cell in cells if DATE_ALONE.fullmatch(cell)]
@@ -56,6 +62,33 @@ def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime
     start = _time_of(orders[0], match, dated[0]) if match and len(orders) == 1 else None
     question = ": day or month first?" if len(orders) > 1 else ""
     return start, "" if start else dated[0] + question
+
+
+def start_in_columns(columns: Mapping[str, Column]) -> tuple[datetime | None, str]:
+    """Start time in the first row of columns that are texts, or were before they became durations.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        Columns by name; those of numbers take no part.
+
+    Returns
+    -------
+    tuple of (datetime or None, str)
+        As ``start_in_cells``.
+    """
+    clocks = {name: column for name, column in columns.items() if isinstance(column, ClockColumn) and len(column)}
+    cells = {name: column.first_text for name, column in clocks.items()}
+    cells |= {name: _text(c) for name, c in columns.items() if c.dtype.kind in "OUST" and c.ndim == 1 and len(c)}
+    start, text = start_in_cells([*cells.values()], [*cells])
+    elapsed = [column[0] / np.timedelta64(1, "us") for column in clocks.values()]
+    return (start + timedelta(microseconds=float(elapsed[0])) if start and len(elapsed) == 1 else start), text
+
+
+def _text(column: Column) -> str:
+    """Text of the first value of a column."""
+    first = column[:1][0]
+    return decode_text(first) if isinstance(first, bytes) else str(first)
 
 
 def _orders(date: str) -> list[tuple[int, int, int]]:

@@ -24,6 +24,7 @@ from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings
 from turnout.readers.time_texts import parse_time
@@ -290,7 +291,10 @@ def _complete_record(
             *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
             declared=facts.label_of(START_NAMES),
         ),
-        axis_starts=tuple((_in_utc(c[0]), "") for c in channels if c.dtype.kind == "M" and len(c)),
+        axis_starts=(
+            *((_in_utc(c[0]), "") for c in channels if c.dtype.kind == "M" and len(c)),
+            start_in_columns({c.name: x for c, x in zip(channels, samples) if x.dtype.kind in "OUSTm"}),
+        ),
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
         undecided=undecided,
@@ -354,5 +358,5 @@ def _scaled_numbers(channel: nptdms.TdmsChannel, where: str, source: Source) -> 
 def _numbers(channel: nptdms.TdmsChannel, source: Source) -> Column:
     """All numbers of a channel, or a lazy column: npTDMS can skip what is not requested."""
     if not source.lazy or channel.dtype.kind not in "fiu":
-        return with_durations(channel[:], f"channel {channel.name!r}", source)
+        return with_durations(channel[:], "channel", channel.name, source)
     return LazyColumn(lambda start, stop: channel.read_data(start, stop - start), len(channel), channel.dtype)

@@ -1,12 +1,12 @@
 """Times of day as loggers print and store them."""
 
 import re
-import unicodedata
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
 
+from turnout.readers.stamp_texts import DAY_OF_YEAR, month_of, with_calendar_date
 from turnout.readers.time_numbers import time_of_digits, time_of_number
 
 NUMBER_TEXT = re.compile(r"\d+(?:\.\d*)?(?:[eE]\+?\d+)?")
@@ -24,13 +24,6 @@ CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 WITH_UTC = re.compile(r"(.*\d) ?\(?(?:UTC|GMT)\)?")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
-
-
-# Beginnings of months in English, German, French, Danish, Italian and Spanish.
-MONTH_WORDS = {
-    1: "jan gen ene", 2: "feb fev", 3: "mar mrz maer", 4: "apr avr abr", 5: "may mai maj mag", 6: "jun juin giu",
-    7: "jul juil lug", 8: "aug aou ago", 9: "sep set", 10: "oct okt ott", 11: "nov", 12: "dec dez dic des",
-}  # fmt: skip
 
 
 def looks_dated(text: str) -> bool:
@@ -51,7 +44,8 @@ def looks_dated(text: str) -> bool:
     >>> [looks_dated(text) for text in ("05/13/2024 10:00 AM", "13 May 2024 10:00:00", "20240513T100000", "3.5 mm")]
     [True, True, True, False]
     """
-    return bool(DATED.match(text) or (WORDED_DATE.search(text) and _month_of(text) and re.search(r"\d{4}", text)))
+    is_worded = WORDED_DATE.search(text) and month_of(text) and re.search(r"\d{4}", text)
+    return bool(DATED.match(text) or DAY_OF_YEAR.match(text) or is_worded)
 
 
 def is_date(text: str) -> bool:
@@ -94,7 +88,7 @@ def is_day(text: str) -> bool:
     [True, True, True, False, False, False]
     """
     text = text.strip()
-    is_worded = len(text) <= MAX_WORDED_DATE and re.search(r"\b\d{4}\b", text) and _month_of(text)
+    is_worded = len(text) <= MAX_WORDED_DATE and re.search(r"\b\d{4}\b", text) and month_of(text)
     return is_date(text) or bool(SHORT_DATE.fullmatch(text)) or bool(is_worded and ":" not in text)
 
 
@@ -102,17 +96,9 @@ SHORT_DATE = re.compile(r"\d{1,2}[-./]\d{1,2}[-./]\d{2}|\d{1,2}-[A-Za-z]{3}-\d{2
 MAX_WORDED_DATE = 40  # characters
 
 
-def _month_of(text: str) -> int:
-    """Number of the only month that a text names, 0 for none or several."""
-    letters = unicodedata.normalize("NFKD", text.casefold())
-    words = re.findall(r"[a-z]{3,}", "".join(c for c in letters if not unicodedata.combining(c)))
-    months = {k for word in words for k, starts in MONTH_WORDS.items() if word.startswith(tuple(starts.split()))}
-    return months.pop() if len(months) == 1 else 0
-
-
 def _parse_worded(text: str) -> datetime | None:
     """Time of a text that names the month and has a day, a year of four digits and a time of day without AM or PM."""
-    month, clock = _month_of(text), CLOCK.search(text)
+    month, clock = month_of(text), CLOCK.search(text)
     if not month or not clock or re.search(r"\b[ap]\.?m\b|[+-]\d{2}:?\d{2}\b", text[clock.start() :], re.IGNORECASE):
         return None
     remainder = text[: clock.start()] + " " + text[clock.end() :]
@@ -206,6 +192,8 @@ def _time_of_stamp(value: Any) -> datetime | None:
     if match := WITH_UTC.fullmatch(value.strip()):
         time = _time_of_stamp(match[1])
         return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
+    if DAY_OF_YEAR.match(value):
+        value = with_calendar_date(value)
     if match := DOTTED_DATE.fullmatch(value.strip()):
         value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
     if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:

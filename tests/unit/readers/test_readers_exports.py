@@ -172,7 +172,7 @@ def test_a_channel_that_holds_no_real_numbers_is_named_with_what_it_holds(tmp_pa
 
 @pytest.mark.parametrize(
     ("cells", "words"),
-    [("08:30:00:100;1.0;2.0", "time of a clock"), ("1.0/2.0/3.0", "the last line reads '1.0/2.0/3.0'")],
+    [("08:30:00:12;1.0;2.0", "time of a clock"), ("1.0/2.0/3.0", "the last line reads '1.0/2.0/3.0'")],
 )
 def test_rows_that_cannot_be_read_are_named_by_what_they_are(tmp_path, cells, words):
     with pytest.raises(ReadError, match=words):

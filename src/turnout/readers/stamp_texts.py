@@ -1,0 +1,121 @@
+"""Notations of times that become one: days of the year, weeks, months as words, ISO durations, fractions behind colons.
+
+Loggers print "2026-332T07:28:14", "28-Nov-2026 07:28:14", "PT0.5S" and "07:28:14:000050". They are written anew as a
+date of the calendar, a count of days and a decimal fraction, which all other modules read.
+"""
+
+import re
+import unicodedata
+from datetime import date
+
+CLOCK_AHEAD = r"(?=[T ,_:]+\d{1,2}:\d{2})"
+# Year and day of the year; only if a time of day follows.
+DAY_OF_YEAR = re.compile(rf" *((?:19|20)\d{{2}})[-: ./]?(\d{{3}}){CLOCK_AHEAD}[T ,_:]+")
+WEEK = re.compile(rf" *(\d{{4}})-?W(\d{{2}})-?(\d){CLOCK_AHEAD}[T ,_:]+")
+DAY_AND_MONTH = re.compile(
+    rf" *(\d{{1,2}})[-. /]{{1,2}}([^\W\d_]{{3,9}})\.?[-, /]{{1,2}}(\d{{4}}){CLOCK_AHEAD}[T ,_:]+"
+)
+MONTH_AND_DAY = re.compile(rf" *([^\W\d_]{{3,9}})\.?[- ](\d{{1,2}}),? (\d{{4}}){CLOCK_AHEAD}[T ,_:]+")
+DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[.,Z+-]|$)")
+DURATION = re.compile(r" *P(?:(\d{1,5})D)?T(?:(\d{1,6})H)?(?:(\d{1,8})M)?(?:(\d{1,10})([.,]\d{1,12})?S)? *")
+# A fraction behind a colon has as many digits as ms, µs or ns; two would be frames of a film.
+FRACTION = re.compile(r"(\d{1,2}:\d{2}:\d{2}):(\d{9}|\d{6}|\d{3})(?:[.,](\d{3}|\d{6}))?(?!\d)")
+# Beginnings of months in English, German, French, Danish, Italian and Spanish.
+MONTH_WORDS = {
+    1: "jan gen ene", 2: "feb fev", 3: "mar mrz maer", 4: "apr avr abr", 5: "may mai maj mag", 6: "jun juin giu",
+    7: "jul juil lug", 8: "aug aou ago", 9: "sep set", 10: "oct okt ott", 11: "nov", 12: "dec dez dic des",
+}  # fmt: skip
+
+
+def month_of(text: str) -> int:
+    """Number of the only month that a text names.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    int
+        0 for none or several.
+
+    Examples
+    --------
+    >>> month_of("13. März 2024"), month_of("Mon May 13"), month_of("12:30")
+    (3, 5, 0)
+    """
+    letters = unicodedata.normalize("NFKD", text.casefold())
+    words = re.findall(r"[a-z]{3,}", "".join(c for c in letters if not unicodedata.combining(c)))
+    months = {k for word in words for k, starts in MONTH_WORDS.items() if word.startswith(tuple(starts.split()))}
+    return months.pop() if len(months) == 1 else 0
+
+
+def plain_stamp(text: str) -> str:
+    """A time stamp in the notation that all modules read; any other text unchanged.
+
+    Parameters
+    ----------
+    text : str
+        A cell or a value.
+
+    Returns
+    -------
+    str
+        With the date as YYYY-MM-DD, a duration as a count of days and hours, a fraction behind a point.
+
+    Examples
+    --------
+    >>> plain_stamp("2026-332T07:28:14.5"), plain_stamp("28-Nov-2026 07:28:14:000050")
+    ('2026-11-28T07:28:14.5', '2026-11-28T07:28:14.000050')
+    >>> plain_stamp("PT90.5S"), plain_stamp("13.05.2026 10:00:00,5")
+    ('0 days 00:01:30.5', '13.05.2026 10:00:00,5')
+    """
+    if text.lstrip()[:1] == "P" and (match := DURATION.fullmatch(text)) and any(match.groups()):
+        days, hours, minutes, seconds = (int(number or 0) for number in match.groups()[:4])
+        minutes, seconds = minutes + seconds // 60, seconds % 60
+        hours, minutes = hours + minutes // 60, minutes % 60
+        return f"{days + hours // 24} days {hours % 24:02}:{minutes:02}:{seconds:02}{match[5] or ''}"
+    text = FRACTION.sub(lambda match: f"{match[1]}.{match[2]}{match[3] or ''}", text)
+    if match := DIGITS_ALONE.match(text):
+        text = "{}-{}-{}T{}:{}:{}".format(*match.groups()) + text[match.end() :]
+    return with_calendar_date(text)
+
+
+def with_calendar_date(text: str) -> str:
+    """A time stamp with its day of the year, its week or its month in a word replaced by a date YYYY-MM-DD.
+
+    Parameters
+    ----------
+    text : str
+        A cell or a value.
+
+    Returns
+    -------
+    str
+        Unchanged without such a day, or with one that no calendar has.
+
+    Examples
+    --------
+    >>> with_calendar_date("2026332 07:28:14"), with_calendar_date("2026-W48-6T07:28:14")
+    ('2026-11-28T07:28:14', '2026-11-28T07:28:14')
+    """
+    for pattern in (DAY_OF_YEAR, WEEK, DAY_AND_MONTH, MONTH_AND_DAY):
+        if (match := pattern.match(text)) and (day := _day_of(pattern, *match.groups())):
+            return f"{day.isoformat()}T{text[match.end() :]}"
+    return text
+
+
+def _day_of(pattern: re.Pattern[str], *parts: str) -> date | None:
+    """The day that the parts of a match state, None if no calendar has it."""
+    try:
+        if pattern is DAY_OF_YEAR:
+            first = date(int(parts[0]), 1, 1)
+            day = date.fromordinal(first.toordinal() + int(parts[1]) - 1)
+            return day if day.year == first.year and int(parts[1]) else None
+        if pattern is WEEK:
+            return date.fromisocalendar(*map(int, parts))
+        number, word = parts[:2] if pattern is DAY_AND_MONTH else parts[1::-1]
+        return date(int(parts[2]), month_of(word), int(number))
+    except ValueError:
+        return None
