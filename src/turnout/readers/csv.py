@@ -21,7 +21,6 @@ many decimals as all others.
 import re
 from collections.abc import Iterator, Sequence
 from datetime import datetime
-from itertools import pairwise
 from mmap import mmap
 
 import numpy as np
@@ -37,6 +36,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
+from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
@@ -75,7 +75,7 @@ def read_raw(source: Source) -> RawFile:
     if separator == BLANK:
         data = data[:end]
         data = data[:offset] + _with_single_blanks(data[offset:])
-    is_in_memory = separator == BLANK or "record" in [name.strip().lower() for name in names]
+    is_in_memory = separator == BLANK or any(map(may_number_records, names))
     is_in_memory = is_in_memory or any(map(is_clock_or_date, first_cells(data, offset, separator)))
     time = time_column(names, units)
     if lazy and not is_in_memory:
@@ -155,29 +155,29 @@ def _records(
     first: tuple[datetime | None, str],
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
-    lower = [name.strip().lower() for name in names]
-    number = columns[lower.index("record")] if "record" in lower else None
-    number = None if number is not None and _counts_rows(number) else number
+    numbering = record_column(dict(reversed([*zip(names, columns)])), source)
+    numbers = columns[names.index(numbering)] if numbering is not None else None
+    numbers = None if numbers is not None and _counts_rows(numbers) else numbers
     time = time if time is not None and columns[time].dtype.kind in "fiu" else None
     clocks = {
         i: np.asarray(column[:]).astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"
     }
-    selected = [i for i, name in enumerate(lower) if name != "record" and i != time and columns[i].dtype.kind in "fiu"]
+    selected = [i for i, name in enumerate(names) if name != numbering and i != time and columns[i].dtype.kind in "fiu"]
     selected = [i for i in selected if names[i] or len(selected) == 1 or not _is_empty(columns[i])]
     seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     n_row = len(columns[0])
-    edges = [0, n_row]
-    if number is not None:
-        if not np.isfinite(number).all():
-            raise source.error("column 'record'", "it does not number every row", COPY_AGAIN)
-        edges = [0, *(np.flatnonzero(np.diff(number)) + 1), n_row]
-    n = len(edges) - 1
+    spans = spans_of_records(numbers, n_row)
+    n = len(spans)
     promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
     if promised is None and rows is not None and rows > n_row:
         promised = int(rows)
     of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
-    for k, (a, b) in enumerate(pairwise(edges)):
+    for k, span in enumerate(spans):
+        if span is None:
+            yield missing_record(k, n, source)
+            continue
+        a, b = span.start, span.stop
         if promised is not None and b - a != promised:
             is_cut_off = b - a < promised
             problem = f"has {b - a} of the {promised} samples that its header states"

@@ -22,6 +22,7 @@ from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES
+from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
 from turnout.readers.sample_variables import is_flag_series
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
@@ -61,16 +62,14 @@ def read_raw(source: Source) -> RawFile:
             raise source.error("the columns", problem, "Write the file again with a name of its own for each column")
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         remarks = tuple(_differing_copies(schema.metadata, file.metadata.metadata, source))
-        rows = RowGroupReader(file) if source.lazy and "record" not in schema.names else None
+        rows = RowGroupReader(file) if source.lazy and not any(map(may_number_records, schema.names)) else None
         columns = _columns(file, rows, source)
     notes = _notes_of(schema.metadata)
     facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
     stated = {f.name: scale_text({**without_drawings(notes), **_notes_of(f.metadata)}) for f in schema}
-    numbers = columns.pop("record", None)
-    edges = [0, n_row]
-    if numbers is not None:
-        edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1), n_row]
+    numbering = record_column(columns, source)
+    spans = spans_of_records(columns.pop(numbering) if numbering is not None else None, n_row)
     time = next((name for name, x in columns.items() if name.lower() in TIME_NAMES and x.dtype.kind in "fiumM"), None)
     names = [name for name, x in columns.items() if name != time and (x.dtype.kind in "fiu" or is_flag_series(x))]
     if n_row and not names:
@@ -83,10 +82,12 @@ def read_raw(source: Source) -> RawFile:
     common = tuple(entries_of(_metadata(schema), "metadata"))
     entries = (*common, *entries_of(fields, ""))
     nested = entry_statements(common, names)
-    n = len(edges) - 1
+    n = len(spans)
     records: list[RawRecord | ReadError] = []
-    for k in range(n):
-        span = slice(edges[k], edges[k + 1])
+    for k, span in enumerate(spans):
+        if span is None:
+            records.append(missing_record(k, n, source))
+            continue
         promised = facts.count(("n_samples",), k, n)
         if promised is not None and span.stop - span.start != promised:
             problem = f"has {span.stop - span.start} of the {promised} samples that its metadata promise"

@@ -1,0 +1,136 @@
+"""Column of a table that numbers the records, and the rows of each record."""
+
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from turnout.errors import ReadError
+from turnout.readers.lazy import Column
+from turnout.readers.source import COPY_AGAIN, Source
+
+RECORD_NAME = re.compile(
+    r"(?:record|rec|segment|impact|hit|schlag)(?:[_ ]?(?:no|nr|num|number|id|index)\.?)?",
+    re.IGNORECASE,
+)
+LOST_REMEDY = f"{COPY_AGAIN}; if that impact was rejected in the field, the others can be used as they are"
+
+
+def may_number_records(name: str) -> bool:
+    """Whether a column of this name may number the records.
+
+    Parameters
+    ----------
+    name : str
+        Name of a column.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [may_number_records(name) for name in ("record", "Impact No", "hit", "force")]
+    [True, True, True, False]
+    """
+    return bool(RECORD_NAME.fullmatch(name.strip()))
+
+
+def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
+    """Name of the column that numbers the records.
+
+    Under another name than "record" it has whole numbers that never fall, in blocks of one length but for the last:
+    a force, or a flag that is set at the contact, may have such a name as well.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        Columns by name.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    str or None
+        None without such a column.
+
+    Raises
+    ------
+    ReadError
+        If a column "record" does not number every row.
+    """
+    names = [name for name, column in columns.items() if may_number_records(name) and column.dtype.kind in "fiu"]
+    for name in sorted(names, key=lambda name: name.strip().lower() != "record"):
+        numbers = np.asarray(columns[name][:])
+        if name.strip().lower() == "record":
+            if not np.isfinite(numbers).all():
+                raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
+            return name
+        if _numbers_blocks(numbers):
+            return name
+    return None
+
+
+def _numbers_blocks(numbers: np.ndarray) -> bool:
+    if not np.isfinite(numbers).all() or (numbers != np.rint(numbers)).any() or (np.diff(numbers) < 0).any():
+        return False
+    lengths = np.diff([0, *(np.flatnonzero(np.diff(numbers)) + 1), len(numbers)])
+    return len(lengths) > 1 and lengths[0] > 1 and len(set(lengths[:-1])) == 1 and lengths[-1] <= lengths[0]
+
+
+def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
+    """Rows of each record in the order of the file, None for one whose number is missing between two others.
+
+    If the gaps outnumber the records or are all alike, or the numbers fall, no record counts as missing: a clock or
+    another counter numbered them.
+
+    Parameters
+    ----------
+    numbers : (n_row,) Column or None
+        The column that numbers the records; None: all rows are one record.
+    n_row : int
+        Number of rows.
+
+    Returns
+    -------
+    list of (slice or None)
+
+    Examples
+    --------
+    >>> spans_of_records(np.array([1, 1, 2, 2, 4, 4]), 6)
+    [slice(0, 2, None), slice(2, 4, None), None, slice(4, 6, None)]
+    """
+    if numbers is None:
+        return [slice(0, n_row)]
+    values = np.asarray(numbers[:])
+    edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(values))), n_row]
+    spans: list[slice | None] = [slice(a, b) for a, b in pairwise(edges)]
+    steps = np.diff(values[edges[:-1]]) if n_row else np.empty(0)
+    n_missing = float(np.sum(steps - 1))
+    is_counted = len(set(steps)) > 1 and not (steps != np.rint(steps)).any() and not (steps < 1).any()
+    if not is_counted or not 0 < n_missing <= len(spans):
+        return spans
+    gaps: list[list[None]] = [[None] * (int(step) - 1) for step in (1, *steps)]
+    return [span for gap, own in zip(gaps, spans) for span in (*gap, own)]
+
+
+def missing_record(k: int, n: int, source: Source) -> ReadError:
+    """Error of a record whose number is missing.
+
+    Parameters
+    ----------
+    k : int
+        Number of the record, from 0.
+    n : int
+        Number of records.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    ReadError
+        It is returned, not raised.
+    """
+    problem = "its number is missing between those of its neighbours"
+    return source.error(f"record {k + 1} of {n}", problem, LOST_REMEDY, reason="truncated")
