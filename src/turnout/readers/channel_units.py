@@ -14,6 +14,7 @@ from turnout.records import RawChannel
 from turnout.units import Conversion, conversion, to_si
 
 FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
+FIND_OUT = "Find out which is right; then set it in the layout"
 CORRECT_SOURCE = "Correct 'source' of this channel in the layout"
 
 
@@ -51,7 +52,8 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
         remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (statement := record.undecided.get(index)) and not is_overruled:
-        raise source.error(place, statement, scale_remedy(file_unit), reason="scale_unknown")
+        remedy = FIND_OUT if "'unit: " in statement else scale_remedy(file_unit)
+        raise source.error(place, statement, remedy, reason="scale_unknown")
     if not is_overruled:
         _check_stated_units(record, index, raw, place, source)
     if raw.sensitivity is not None and not is_overruled:
@@ -90,7 +92,7 @@ def _check_stated_units(record: RawRecord, index: int, raw: RawChannel, place: s
     holder = "the layout" if is_meaningless(record.units[index]) else "its unit"
     problem = f"its metadata or its name {record.names[index]!r} say {rival!r}, {holder} {unit_in_use!r}"
     choices = " or ".join(f"'unit: {unit}!'" for unit in (rival, unit_in_use) if _is_usable(unit, raw))
-    remedy = f"Find out which is right; then set it in the layout as {choices or 'a unit with !'}"
+    remedy = f"{FIND_OUT} as {choices or 'a unit with !'}"
     raise source.error(place, problem, remedy, reason="unit_unknown")
 
 

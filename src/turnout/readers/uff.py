@@ -18,6 +18,7 @@ from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
+from turnout.readers.stated_units import known_unit
 from turnout.readers.time_texts import is_unread_uff_time, parse_uff_time
 from turnout.readers.timing import check_simultaneous
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
@@ -198,7 +199,7 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,
         aliases=aliases,
-        undecided={i: of[0] for i, s in enumerate(sets) if (of := entry_statements(_entries([s]), [""]))},
+        undecided={i: text for i, s in enumerate(sets) if (text := _undecided_scale(s, stated_units))},
     )
 
 
@@ -230,6 +231,20 @@ def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
     scale = {"N": stated_units.force, "Pa": stated_units.force / stated_units.length**2}.get(si, stated_units.length)
     candidates = UNITS[conversion(si).dimension]
     return next((u for u, (s, _) in candidates.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
+
+
+def _undecided_scale(dataset: UffDataset, stated_units: FileUnits | None) -> str:
+    """What a set states about its scale and nothing settles: in its ID lines, or by a label that dataset 164 denies."""
+    if of_ids := entry_statements(_entries([dataset]), [""]):
+        return of_ids[0]
+    data_type, title, label = dataset.labels[1]
+    of_file = "" if _is_blank(label) else _unit((data_type, title, ""), stated_units)
+    written, stated = known_unit(label), known_unit(of_file)
+    if not written or not stated or written.dimension != stated.dimension:
+        return ""
+    is_same = abs(written.scale / stated.scale - 1.0) < FACTOR_PRECISION
+    choices = f"'unit: {label}!' if the label is right, 'unit: {of_file}!' if the data set is"
+    return "" if is_same else f"its label says {label!r}, data set 164 of the file {of_file!r} ({choices})"
 
 
 def _is_blank(label: str) -> bool:

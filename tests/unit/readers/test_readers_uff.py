@@ -382,6 +382,65 @@ def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length,
         assert result.errors[0].reason == "unit_unknown"
 
 
+@pytest.mark.parametrize(
+    ("code", "length", "force", "label", "stated"),
+    [
+        (1, 1.0, 1.0, "m/s²", None), (1, 1.0, 1.0, "m/s^2", None), (1, 1.0, 1.0, "g", "m/s²"),
+        (1, 1.0, 1.0, "mV", None),
+        (5, 1000.0, 1000.0, "m/s²", "mm/s²"), (5, 1000.0, 1000.0, "mm/s²", None), (6, 100.0, 100.0, "g", "cm/s²"),
+        (9, 2.5, 1.0, "m/s²", "0.4 m/s²"),
+    ],
+)  # fmt: skip
+def test_a_label_that_dataset_164_denies_is_reported(code, length, force, label, stated, tmp_path):
+    samples = universal_file(tmp_path, LABELS[0], (f"{'m/s²':<20}", f"{label:<20}"))
+    text = (tmp_path / "a.uff").read_text(encoding="utf-8")
+    head = [f"{'    -1':80}", "   164", f"{code:10d}{'units':20}{2:10d}", f"{length:25.17E}{force:25.17E}{1.0:25.17E}"]
+    (tmp_path / "a.uff").write_text("\n".join([*head, f"{273.15:25.17E}", "    -1", ""]) + text, encoding="utf-8")
+    volts = {"unit": "mV", "sensitivity": 1.0, "sensitivity_unit": "mV/(m/s²)"} if label == "mV" else {}
+    sensors = (RawChannel("force", "force", "force", unit="N!"), RawChannel("rail", "rail", "acceleration", **volts))
+    result = read("a.uff", tmp_path, RawDescription(sensors))
+    if stated is None:
+        assert [e.reason for e in result.errors] == [] and len(result.recordings) == 2
+        return
+    assert f"its label says {label!r}, data set 164 of the file {stated!r}" in str(result.errors[0])
+    overruled = (sensors[0], RawChannel("rail", "rail", "acceleration", unit="m/s²!"))
+    assert read("a.uff", tmp_path, RawDescription(overruled)).recordings[0].samples[1] == pytest.approx(
+        samples[1], rel=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("order", "n_read"), [((0, 1, 0, 1, 4, 5), 3), ((0, 1, 0, 3, 4, 5), None), ((0, 2, 4, 1, 3, 1), None)]
+)
+def test_a_set_that_repeats_another_one_without_its_partner_is_reported(order, n_read, hammer_test, in_si, tmp_path):
+    """A whole impact that was written twice is told by the hammer test, a force beside another response by the file."""
+    sets = _sets_without_numbers(hammer_test, tmp_path, ["NONE"] * 8)
+    data = "".join(sets[i] for i in order).encode()
+    if n_read:
+        assert len(_read_bytes(tmp_path / "a.uff", data, in_si).recordings) == n_read
+        return
+    with pytest.raises(ReadError, match=r"repeats set \d, and set \d of channel '\w+' does not"):
+        _read_bytes(tmp_path / "a.uff", data, in_si)
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 7])
+def test_few_sets_need_sizes_that_fit_much_better(n, hammer_test, in_si, tmp_path):
+    """All between the first force and the last response are moved; intact impacts whose ratios scatter are read."""
+    rng = np.random.default_rng(n)
+    strengths = np.array([5.0, 9.0, 6.0, 10.0, 5.5, 8.0, 7.0, 9.5])[: n + 1]
+    shape = rng.normal(size=(2, 301)) * [[100.0], [30.0]]
+    for scatter, is_lost in [(0.0005, True), *[(0.05, False)] * 20]:
+        factors = np.exp(scatter * rng.normal(size=(n + 1, 2, 1)))
+        impacts = [replace(hammer_test[0], samples=shape * a * b) for a, b in zip(strengths, factors)]
+        sets = _sets_without_numbers(impacts, tmp_path, ["NONE"] * 2 * (n + 1))
+        data = "".join(sets[2::2] + sets[1:-1:2] if is_lost else sets).encode()
+        if is_lost:
+            with pytest.raises(ReadError, match="have lost their partners"):
+                _read_bytes(tmp_path / "a.uff", data, in_si)
+        else:
+            assert len(_read_bytes(tmp_path / "a.uff", data, in_si).recordings) == n + 1
+
+
 def test_exponents_of_fortran_are_read_in_header_and_samples(tmp_path):
     recording = Recording(
         np.random.default_rng(58).normal(size=(2, 64)), 25600.0, (Channel("f", "force"), Channel("a", "acceleration"))
