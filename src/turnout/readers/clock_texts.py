@@ -230,14 +230,14 @@ def with_dates(columns: Sequence[np.ndarray]) -> list[np.ndarray]:
 TIME_REMEDY = "Export the time in seconds from the start of the record, as numbers"
 
 
-def with_durations(column: np.ndarray, kind: str, name: str, source: Source) -> np.ndarray:
+def with_durations(column: np.ndarray, noun: str, name: str, source: Source) -> np.ndarray:
     """A column of texts that are times of day as durations since the first one; any other column unchanged.
 
     Parameters
     ----------
     column : (n,) array
         Values of a column.
-    kind : str
+    noun : str
         What the format calls a column, for the message.
     name : str
         Name or number of the column.
@@ -256,7 +256,7 @@ def with_durations(column: np.ndarray, kind: str, name: str, source: Source) -> 
     """
     if column.ndim != 1 or len(column) < 2 or column.dtype.kind not in "OUST":
         return column
-    where = f"{kind} {name!r}"
+    where = f"{noun} {name!r}"
     if not is_clock(_text(column[0])):
         if name.strip().lower() in TIME_NAMES and any(value != column[0] for value in column):
             problem = f"it holds {_text(column[0])[:60]!r}, and so no known times"

@@ -112,7 +112,7 @@ def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
     if not is_counted or not 0 < n_missing <= len(spans):
         return spans
     gaps: list[list[None]] = [[None] * (int(step) - 1) for step in (1, *steps)]
-    return [span for gap, own in zip(gaps, spans) for span in (*gap, own)]
+    return [span for gap, rows in zip(gaps, spans) for span in (*gap, rows)]
 
 
 def missing_record(k: int, n: int, source: Source) -> ReadError:

@@ -263,12 +263,12 @@ def _other_words(name: str, names: Sequence[str]) -> list[str]:
     if len(plain) == 1 and any(len(other.strip()) == 1 and not known_unit(other) for other in names):
         return []
     words = SEPARATORS.split(plain)
-    others = [SEPARATORS.split(other.strip()) for other in names if other != name]
+    neighbours = [SEPARATORS.split(other.strip()) for other in names if other != name]
     inner = [
         word
         for k, word in enumerate(words)
         if (len(word) > 1 or word in ("g", "N"))
-        and not any(other[:k] + other[k + 1 :] == words[:k] + words[k + 1 :] for other in others)
+        and not any(other[:k] + other[k + 1 :] == words[:k] + words[k + 1 :] for other in neighbours)
     ]
     return [*inner, *([plain] if re.match(r"[^\W\d]", plain) else [])]
 
