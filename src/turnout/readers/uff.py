@@ -191,7 +191,7 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
-        entries=(*_entries(sets), *_texts(sets), *_quantities(sets, names)),
+        entries=(*_entries(sets), *_texts(sets), *_quantities(sets, names), *_directions(sets, names)),
         units=tuple(_unit(s.labels[1], stated_units) for s in sets),
         started_at=parse_uff_time(first.ids[2]),
         unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
@@ -278,6 +278,15 @@ def _quantities(sets: Sequence[UffDataset], names: Sequence[str]) -> Iterator[En
         quantity = QUANTITY_OF_TYPE.get(dataset.labels[1][0])
         if quantity and _is_blank(dataset.labels[1][2]):
             yield Entry(f"data type of the ordinate {name!r}", DEFINED_NAME, quantity)
+
+
+def _directions(sets: Sequence[UffDataset], names: Sequence[str]) -> Iterator[Entry]:
+    """The direction of each response that is measured against an axis (record 6)."""
+    for dataset, name in zip(sets, names):
+        if dataset.response[2] < 0:
+            yield Entry(
+                f"record 6 of {name!r}", "response direction", _dof_name(("", *dataset.response[1:])), is_defined=True
+            )
 
 
 def _seconds_per_x(dataset: UffDataset) -> float:

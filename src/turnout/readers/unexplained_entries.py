@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.directions import opposite_directions
 from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject
 from turnout.readers.entry_candidates import (
     DURATION,
@@ -250,6 +251,7 @@ class EntryCheck:
         key = (record.units, rate, n_sample)
         if self._last is not None and self._last[0] is record.entries and self._last[1] == key:
             return []
+        directions = list(self._direction_errors(where, record))
         if self._key != key:
             self._key, self._seen = key, set()
         new_entries = [
@@ -257,7 +259,7 @@ class EntryCheck:
         ]
         if not new_entries:
             self._last = record.entries, key
-            return []
+            return directions
         facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
         unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
         for entry, candidate in unexplained:
@@ -271,11 +273,24 @@ class EntryCheck:
         self._reported.update((e.name, c.text) for e, c in new)
         objects = [e for e in new_entries if isinstance(e.value, UnreadObject) and e.name.lower() not in START_NAMES]
         return [
+            *directions,
             *self._object_errors(where, objects),
             *of_converter,
             *overloads,
             *([self._error(where, new, "entry_unknown")] if new else []),
         ]
+
+    def _direction_errors(self, where: str, record: RawRecord) -> Iterator[ReadError]:
+        """Remark on each response that was measured against an axis, while the layout has the sign +1 for it."""
+        for i, name, text in opposite_directions(record, self._channels):
+            channel = record.names[i]
+            if (channel, text) in self._reported or name.strip().casefold() in self._checked:
+                continue
+            self._reported.add((channel, text))
+            statement = f"its direction is {text!r} by its name" if name == channel else f"its {name!r} is {text!r}"
+            problem = f"{statement}, so its numbers may point the other way; they are taken as they are"
+            remedy = f"Set 'sign: -1' for it in the layout; if its numbers are right, 'checked_entries: {name}'"
+            yield self.source.error(f"{where}, channel {channel!r}", problem, remedy, reason="entry_unknown")
 
     def _object_errors(self, where: str, entries: Sequence[Entry]) -> Iterator[ReadError]:
         """Remarks on objects whose content cannot be read, each name once."""

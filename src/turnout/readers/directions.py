@@ -1,0 +1,94 @@
+"""Directions of sensors that a file states: one against an axis, such as -Z, needs the sign of the layout."""
+
+import re
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+from turnout.readers.entries import Entry
+from turnout.readers.entry_owners import owners_of
+from turnout.readers.scale_words import plain_word
+from turnout.readers.source import RawRecord
+from turnout.readers.texts import decode_text
+from turnout.records import RawChannel
+
+MINUS = r"[-\u2212\u2013]"
+EDGE = r"[\s:._/,;()\[\]]"  # beside a direction; a hyphen between two words is no minus
+AGAINST_AXIS = re.compile(
+    rf"(?:^|{EDGE})(?:{MINUS}\s?[XYZ]|[XYZ]{MINUS}|(?:minus|neg(?:ative)?)[ _-]?[XYZ])(?:$|{EDGE})", re.IGNORECASE
+)
+UPSIDE_DOWN = re.compile(
+    r"upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
+)
+DIRECTION_NAME = re.compile(
+    r"direction|richtung|orient|ausricht|^dof$|degreeoffreedom|axis$|achse$|mount|montage|einbau"
+)
+OTHER_NAME = re.compile(r"train|zug|travel|fahrt|track|gleis|wind|scan|sort|reference|force|hammer|[xyz]axis$|time")
+DIRECTED = ("acceleration", "velocity", "displacement")  # quantities of a response; a hammer strikes in -Z
+MAX_TEXT = 40  # characters: a longer text is a description
+
+
+@lru_cache(maxsize=4096)
+def is_against_axis(text: str) -> bool:
+    """Whether a text states a direction against an axis.
+
+    Parameters
+    ----------
+    text : str
+        Name of a channel, or value of an entry.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_against_axis(text) for text in ("12 -Z", "rail:Z-", "neg_z", "rail-z", "+Z", "Z-axis")]
+    [True, True, True, False, False, False]
+    """
+    return len(text) <= MAX_TEXT and bool(AGAINST_AXIS.search(text))
+
+
+@lru_cache(maxsize=4096)
+def _is_direction_name(name: str) -> bool:
+    word = plain_word(name)
+    return bool(DIRECTION_NAME.search(word)) and not OTHER_NAME.search(word)
+
+
+def opposite_directions(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[tuple[int, str, str]]:
+    """Responses that the file states to be measured against an axis, and that the layout takes with the sign +1.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    channels : sequence of RawChannel
+        Channels of the layout.
+
+    Yields
+    ------
+    tuple of (int, str, str)
+        Index of the channel; name of the entry, which may be the channel's own; its text.
+    """
+    wanted = [
+        i
+        for i, name in enumerate(record.names)
+        if any(c.source in (i, name, *_aliases(record, i)) and c.quantity in DIRECTED and c.sign > 0 for c in channels)
+    ]
+    yield from ((i, record.names[i], record.names[i]) for i in wanted if is_against_axis(record.names[i]))
+    for entry in record.entries:
+        if entry.is_piece or not _is_direction_name(entry.name) or not (text := _opposite_text(entry)):
+            continue
+        owners = owners_of(entry, record.entries, record.names)
+        yield from ((i, entry.name, text) for i in wanted if not owners or i in owners)
+
+
+def _aliases(record: RawRecord, i: int) -> tuple[str, ...]:
+    return record.aliases[i] if i < len(record.aliases) else ()
+
+
+def _opposite_text(entry: Entry) -> str:
+    """The text of an entry if it states a direction against an axis, else ""."""
+    value = decode_text(entry.value) if isinstance(entry.value, bytes) else entry.value
+    if not isinstance(value, str) or len(value) > MAX_TEXT:
+        return ""
+    return value if is_against_axis(value) or UPSIDE_DOWN.search(value) else ""
