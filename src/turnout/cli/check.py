@@ -79,8 +79,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {fault}")
     for path in _unread_files(configuration.folder):
         print(f"  {path}: no command reads a file of this name. Rename it, or move it out of the configuration")
-    for event in _planned_events(configuration.events):
-        print(f"  {event}")
+    for remark in (*_planned_events(configuration.events), *_position_remarks(configuration)):
+        print(f"  {remark}")
     if not configuration.ids:
         print("  no turnout yet: `turnout add ID LAYOUT` adds one")
     for decision in _open_decisions(configuration.folder / "layouts"):
@@ -140,6 +140,36 @@ def _planned_events(events: Iterable[Event]) -> Iterator[str]:
             yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 
+def _position_remarks(configuration: Configuration) -> Iterator[str]:
+    """Remarks on positions in turnouts.tsv that other rows or the time zone of the layout contradict."""
+    from turnout.config.positions import position_remarks
+
+    def zone_of(name: str) -> str:
+        turnout = configuration.turnout(name)
+        descriptions = [*turnout.hammer.descriptions.values()] if turnout.hammer else []
+        descriptions += [turnout.passages.description] if turnout.passages else []
+        return next((d.time_zone for d in descriptions), "")
+
+    return position_remarks(configuration.rows, zone_of)
+
+
+def _remarks_on_train_types(turnout: TurnoutConfig, raw: Path) -> Iterator[str]:
+    """A remark on each type of trains.csv that no axle pattern has: its trains are recognised by the table alone."""
+    from turnout.errors import ConfigError
+    from turnout.stages.passage_context import known_patterns
+
+    try:
+        types = {pattern.type for pattern in known_patterns(turnout.settings["passage"].axle_patterns)}
+    except ConfigError:  # a fault of its own
+        return
+    listed = {row["train_type"] for row in turnout.trains if row.get("train_type")}
+    for train_type in sorted(listed - types if types else ()):
+        yield (
+            f"{raw / turnout.raw / 'trains.csv'}: no axle pattern is called {train_type!r}, so no recording shows it. "
+            f"Correct the name, or add its axle distances to {turnout.settings['passage'].axle_patterns}"
+        )
+
+
 def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.campaign_notes import read_notes
@@ -157,6 +187,7 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
         if not note_errors:
             remarks += _without_temperature(noted_turnout, raw, scanned.units)
+            remarks += _remarks_on_train_types(noted_turnout, raw)
     problem_count = count_of(len(problems), "problem") if problems else "no problem"
     print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:

@@ -20,7 +20,7 @@ ROW = {
     "raw": Key("text", "folder of its raw files below the raw root; empty: its id"),
     "name": Key("text", "name for display"),
     "line": Key("text", "railway line"),
-    "km": Key("number", "position along the line", unit="km", minimum=0, maximum=100000),
+    "km": Key("number", "position along the line", unit="km", minimum=0, maximum=10000),
     "lat_deg": Key("number", "latitude, WGS 84", unit="°", minimum=-90, maximum=90),
     "lon_deg": Key("number", "longitude, WGS 84", unit="°", minimum=-180, maximum=180),
     "external_id": Key("text", "the owner's id"),

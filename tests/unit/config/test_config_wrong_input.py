@@ -67,7 +67,7 @@ WRONG = {
     "duplicate id": (row("t1\tmain"), "line 4, column 1: turnout 't1' for the second time. Give it another id"),
     "no id": (row("\tmain"), "line 4, column 1: turnout is empty. Write id"),
     "unknown layout": (row("t3\tmian"), "line 4, column 4: no layout 'mian'. Did you mean 'main'?"),
-    "number that is none": (row("t3\tmain\t\t12,4"), "line 4, column 10: km is '12,4'. Write a number from 0 to"),
+    "number that is none": (row("t3\tmain\t\t12,4"), "line 4, column 10: km is '12,4'. Write a number from 0 to 10000"),
     "rate of zero": (
         row("t3\tmain\t\t\t0"),
         "line 4, column 11: hammer_rate_hz is 0.0. Write a number from 250",
