@@ -10,6 +10,7 @@ from turnout.readers.array_metadata import Metadata, list_of_texts
 from turnout.readers.metadata_names import (
     CHANNEL_NAMES,
 )
+from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import Source
 
 RECORD_NAME = re.compile(r"^(?:record|rec|segment|impact|hit)[_ ]?(\d+)$", re.IGNORECASE)
@@ -41,8 +42,6 @@ def records_in_order(
 ) -> Iterator[Any]:
     """Values of the records in the order of their numbers, None for a missing number.
 
-    If the gaps outnumber the records, no record counts as missing: a clock or a counter numbered them.
-
     Parameters
     ----------
     numbered : iterable of tuple of (int, str)
@@ -65,9 +64,7 @@ def records_in_order(
     names: dict[int, list[str]] = {}
     for number, name in sorted(numbered):
         names.setdefault(number, []).append(name)
-    first, last = min(names), max(names)
-    is_dense = last - first + 1 <= 2 * len(names)
-    for i, number in enumerate(range(first, last + 1) if is_dense else names):
+    for i, number in enumerate(with_missing(names)):
         candidates = names.get(number, [])
         if len(candidates) > 1:
             problem = f"{' and '.join(map(repr, candidates))} are both number {number}"

@@ -6,6 +6,7 @@ some 2 µs per number. Layout: National Instruments, "Specification for the LabV
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -15,6 +16,7 @@ from pyarrow import csv
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
+from turnout.readers.csv_cells import DECIMAL, INVALID_VALUE
 from turnout.readers.entries import Entry, entries_of, step_entry
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.rate_units import rate_unit
@@ -312,7 +314,7 @@ def _columns(
     width = indices[-1] + 1
     indices = [0, *indices] if n_x_columns else indices
     separator_bytes = separator.encode()
-    with source.parsed_by("pyarrow", where):
+    with source.parsed_by("pyarrow", where), _cell_errors(where, decimal_mark, source):
         try:
             table = _table(body, width, separator, decimal_mark, indices)
         except pa.ArrowInvalid:  # a comment behind the channels: only some rows have one
@@ -320,6 +322,20 @@ def _columns(
             table = _table(b"\n".join(map(separator_bytes.join, rows)) + b"\n", width, separator, decimal_mark, indices)
     columns = [column.to_numpy(zero_copy_only=False) for column in table.columns]
     return (columns[1:], columns[0]) if n_x_columns else (columns, None)
+
+
+@contextmanager
+def _cell_errors(where: str, decimal_mark: str, source: Source) -> Iterator[None]:
+    """Context that converts pyarrow's error about a cell with another decimal mark than that of the header."""
+    try:
+        yield
+    except pa.ArrowInvalid as error:
+        cell = INVALID_VALUE.search(str(error))
+        if not cell or not DECIMAL.fullmatch(cell[3].strip()):
+            raise
+        problem = f"{cell[3].strip()[:60]!r} has another decimal mark than {decimal_mark!r}, which its header states"
+        remedy = "Export it again with one decimal mark; somebody or another program changed the file"
+        raise source.error(where, problem, remedy) from error
 
 
 def _table(body: bytes, width: int, separator: str, decimal_mark: str, indices: Sequence[int]) -> pa.Table:

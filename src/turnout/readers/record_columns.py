@@ -8,6 +8,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.lazy import Column
+from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import COPY_AGAIN, Source
 
 RECORD_NAME = re.compile(
@@ -82,8 +83,7 @@ def _numbers_blocks(numbers: np.ndarray) -> bool:
 def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
     """Rows of each record in the order of the file, None for one whose number is missing between two others.
 
-    If the gaps outnumber the records or are all alike, or the numbers fall, no record counts as missing: a clock or
-    another counter numbered them.
+    Numbers that fall are those of another counter, so none is missing.
 
     Parameters
     ----------
@@ -105,14 +105,12 @@ def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
         return [slice(0, n_row)]
     values = np.asarray(numbers[:])
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(values))), n_row]
-    spans: list[slice | None] = [slice(a, b) for a, b in pairwise(edges)]
-    steps = np.diff(values[edges[:-1]]) if n_row else np.empty(0)
-    n_missing = float(np.sum(steps - 1))
-    is_counted = len(set(steps)) > 1 and not (steps != np.rint(steps)).any() and not (steps < 1).any()
-    if not is_counted or not 0 < n_missing <= len(spans):
-        return spans
-    gaps: list[list[None]] = [[None] * (int(step) - 1) for step in (1, *steps)]
-    return [span for gap, rows in zip(gaps, spans) for span in (*gap, rows)]
+    spans = [slice(a, b) for a, b in pairwise(edges)]
+    numbers_of_spans = values[edges[:-1]] if n_row else np.empty(0)
+    if (numbers_of_spans != np.rint(numbers_of_spans)).any() or (np.diff(numbers_of_spans) < 1).any():
+        return [*spans]
+    span_of = dict(zip(map(int, numbers_of_spans), spans))
+    return [span_of.get(number) for number in with_missing(span_of)]
 
 
 def missing_record(k: int, n: int, source: Source) -> ReadError:

@@ -18,11 +18,13 @@ from nptdms.timestamp import TdmsTimestamp
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
-from turnout.readers.array_names import natural_sort_key
+from turnout.readers.array_names import natural_sort_key, numbered_names
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import Entry, entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES
+from turnout.readers.record_columns import missing_record
+from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
@@ -112,7 +114,7 @@ def read_raw(source: Source) -> RawFile:
             tdms = nptdms.TdmsFile.open(file) if source.lazy else nptdms.TdmsFile.read(file)
     for channel in (c for group in tdms.groups() for c in group.channels() if c.path in first_values.starts):
         channel.properties["wf_start_time"] = first_values.starts[channel.path]
-    groups = _records_of_groups(tdms.groups(), source)
+    groups = _with_lost_groups(_records_of_groups(tdms.groups(), source))
     names = {channel.name for channels in groups for channel in channels}
     damaged = _damaged_paths(tdms) if truncation else set()
     of_file = [
@@ -121,6 +123,8 @@ def read_raw(source: Source) -> RawFile:
     ]
     records = [
         _record(g, k, len(groups), names, damaged, first_values.problems, tdms, of_file, source)
+        if g
+        else missing_record(k, len(groups), source)
         for k, g in enumerate(groups)
     ]
     if truncation and not any(isinstance(r, ReadError) for r in records):
@@ -173,6 +177,15 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
             remedy = f"Start all tasks by one trigger at one rate. {export}"
             raise source.error("the groups", f"{problem}their time axes differ ({listed})", remedy, "clock_drift")
     return [[c for g in groups_of_record for c in g.channels()] for groups_of_record in records]
+
+
+def _with_lost_groups(groups: list[list[nptdms.TdmsChannel]]) -> list[list[nptdms.TdmsChannel]]:
+    """The channels of each record, and none for one whose number is missing between those of "impact 1", "impact 3"."""
+    numbers = [number for number, _ in numbered_names(channels[0].group_name for channels in groups)]
+    if len(numbers) < len(groups) or len(set(numbers)) < len(numbers):
+        return groups
+    channels_of = dict(zip(numbers, groups))
+    return [channels_of.get(number, []) for number in with_missing(numbers)]
 
 
 def _varying_numbers(names: Sequence[str]) -> tuple[tuple[int, ...], ...]:

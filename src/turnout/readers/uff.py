@@ -15,10 +15,11 @@ from turnout.errors import ReadError
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text, step_entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.rate_units import rate_unit
+from turnout.readers.record_columns import missing_record
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
-from turnout.readers.stated_units import known_unit
+from turnout.readers.stated_units import is_meaningless, known_unit
 from turnout.readers.time_texts import is_unread_uff_time, parse_uff_time
 from turnout.readers.timing import check_simultaneous
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
@@ -170,6 +171,8 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
     group, channels, n = pairing.groups[k], pairing.channels, len(pairing.groups)
     if problem := pairing.problems.get(k):
         return source.error(f"record {k + 1} of {n}", problem, PAIRING_REMEDY)
+    if not group:
+        return missing_record(k, n, source)
     for key in channels:
         dataset = group.get(key)
         if dataset is None:
@@ -184,6 +187,11 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
     first = sets[0]
     names, aliases = _distinct_names(channels)
     starts, steps = zip(*map(_axis, sets))
+    for dataset, name in zip(sets, names):
+        if unit := _unit_of_other_axis(dataset.labels[0][2]):
+            place = f"record {k + 1} of {n}, channel {name!r}"
+            problem = f"the unit of its abscissa is {unit!r}, and its samples are a time response"
+            return source.error(place, problem, "Export time responses, with their times in s, ms or µs", "wrong_rate")
     try:
         check_simultaneous(names, steps, starts, f"record {k + 1} of {n}", source)
     except ReadError as error:
@@ -208,6 +216,13 @@ def _axis(dataset: UffDataset) -> tuple[float, float]:
     if dataset.x is None or len(dataset.x) < 2:
         return dataset.start, dataset.step
     return float(dataset.x[0]), float(dataset.x[-1] - dataset.x[0]) / (len(dataset.x) - 1)
+
+
+def _unit_of_other_axis(label: str) -> str:
+    """The unit of an abscissa if it is one of another quantity than time, else ""."""
+    unit = rate_unit(label)
+    is_of_other = not unit.is_step if unit is not None else not is_meaningless(label) and known_unit(label) is not None
+    return label if is_of_other else ""
 
 
 def _distinct_names(channels: Sequence[ChannelKey]) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import Source
 from turnout.readers.time_texts import parse_uff_time
 from turnout.readers.uff_datasets import UffDataset
@@ -116,9 +117,11 @@ def pair_sets(named: Sequence[UffDataset], nameless: Sequence[UffDataset], sourc
     numbers = [s.sequence for s in named]
     if len(set(zip(keys, numbers))) == len(named) and len(set(numbers)) > 1:
         span = range(min(numbers), max(numbers) + 1)
-        is_dense = len(span) <= len(set(numbers)) + len(nameless)  # else the logger's own numbering has gaps
+        is_of_damaged_sets = len(span) <= len(set(numbers)) + len(nameless)
         by_number = _by_label(keys, numbers, named)
-        return Pairing(channels, [by_number.get(n, {}) for n in (span if is_dense else sorted(by_number))])
+        return Pairing(
+            channels, [by_number.get(n, {}) for n in (span if is_of_damaged_sets else with_missing(numbers))]
+        )
     stamps, nodes = _joined_stamps(keys, [parse_uff_time(s.ids[2]) for s in named]), [_impact_node(s) for s in named]
     if len(channels) > 1 and _settles(keys, stamps):
         by_stamp = dict(sorted(_by_label(keys, stamps, named).items()))

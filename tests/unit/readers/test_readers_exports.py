@@ -14,7 +14,8 @@ from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.entries import entries_of_text
 from turnout.readers.foreign_formats import FOREIGN_FORMATS
-from turnout.records import RawChannel, RawDescription
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 RATE = 20000.0
 N = 400
@@ -291,3 +292,12 @@ def test_a_column_that_counts_samples_promises_none(name, tmp_path):
     counts = [f"{k}" for k in range(5000, 5000 + N)]
     description = RawDescription((*layout().channels, RawChannel("number", name, "ignored")), rate=RATE)
     assert_right(read_text(tmp_path, f"{name};{HEAD}{rows(counts, FORCE, RAIL)}", description))
+
+
+def test_lvm_samples_with_another_decimal_mark_than_the_header_are_named(tmp_path):
+    channels = (Channel("force", "force"), Channel("rail", "acceleration"))
+    write([Recording(np.vstack([FORCE, RAIL]), RATE, channels)], tmp_path / "a.lvm", "lvm")
+    head, marker, samples = (tmp_path / "a.lvm").read_text(encoding="utf-8").rpartition("***End_of_Header***")
+    (tmp_path / "a.lvm").write_text(head + marker + samples.replace(".", ","), encoding="utf-8")
+    error = str(only_error(read("a.lvm", tmp_path, IN_SI)))
+    assert "has another decimal mark than '.', which its header states. Export it again with one decimal mark" in error

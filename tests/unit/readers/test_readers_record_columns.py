@@ -1,12 +1,16 @@
-"""Columns that number the records of a table: their names, their blocks, and numbers that are missing."""
+"""Records that a file numbers, in a column, a group or a set: their names, and numbers that are missing."""
 
+import h5py
+import nptdms
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.records import RawChannel, RawDescription
+from turnout.readers.writing import write
+from turnout.records import Channel, RawChannel, RawDescription, Recording
 
 N = 30
 SENSORS = (
@@ -49,3 +53,42 @@ def test_numbers_of_another_counter_are_no_missing_records(format, numbers, tmp_
 )
 def test_a_flag_of_the_contact_does_not_cut_a_record(format, numbers, lengths, tmp_path):
     assert outcome(tmp_path, format, "hit", numbers, lengths) == ([], [("record 1 of 1", "channel_unknown")])
+
+
+def test_records_that_texts_number_are_an_error_in_parquet(tmp_path):
+    """Else two records would be one, with a jump in the middle."""
+    table = pa.table({"force": np.arange(60.0), "rail": np.arange(60.0), "Record": ["1"] * 30 + ["2"] * 30})
+    pq.write_table(table, tmp_path / "a.parquet")
+    with pytest.raises(ReadError, match=r"column 'Record': it holds text or objects, such as '1'"):
+        read("a.parquet", tmp_path, RawDescription(SENSORS, rate=2e4))
+
+
+def write_groups(path, format, numbers):
+    samples = np.random.default_rng(3).normal(size=(len(numbers), 2, N)) * [[900.0], [30.0]]
+    if format == "h5":
+        with h5py.File(path, "w") as file:
+            for number, (force, rail) in zip(numbers, samples):
+                file[f"hit_{number}/force"], file[f"hit_{number}/rail"] = force, rail
+    elif format == "tdms":
+        with nptdms.TdmsWriter(str(path)) as writer:
+            for number, pair in zip(numbers, samples):
+                channels = zip(("force", "rail"), pair)
+                writer.write_segment([nptdms.ChannelObject(f"impact {number}", *channel) for channel in channels])
+    else:
+        channels = (Channel("force", "force"), Channel("rail", "acceleration"))
+        write([Recording(pair, 2e4, channels) for pair in samples], path, "uff58")
+        text = path.read_text(encoding="utf-8")
+        for k in range(len(numbers), 0, -1):
+            text = text.replace(f"\n    1         0{k:5d}", f"\n    1         0{numbers[k - 1]:5d}")
+        path.write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize("format", ["h5", "tdms", "uff"])
+@pytest.mark.parametrize(
+    ("numbers", "lost"), [((1, 2, 4, 5), [3]), ((1, 3), [2]), ((1, 3, 5), []), ((3, 4, 5), []), ((10, 20, 45), [])]
+)
+def test_the_same_rule_holds_for_groups_and_sets(format, numbers, lost, tmp_path):
+    write_groups(tmp_path / f"a.{format}", format, numbers)
+    result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=2e4))
+    assert len(result.recordings) == len(numbers)
+    assert [(e.reason, e.where.split(" of ")[0]) for e in result.errors] == [("truncated", f"record {k}") for k in lost]

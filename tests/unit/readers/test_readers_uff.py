@@ -441,6 +441,21 @@ def test_few_sets_need_sizes_that_fit_much_better(n, hammer_test, in_si, tmp_pat
             assert len(_read_bytes(tmp_path / "a.uff", data, in_si).recordings) == n + 1
 
 
+@pytest.mark.parametrize(
+    "label, is_read", [("s", True), ("ms", True), ("NONE", True), ("-", True), ("Hz", False), ("m", False)]
+)
+def test_a_time_response_has_times_on_its_abscissa(label, is_read, tmp_path):
+    universal_file(tmp_path)
+    text = (tmp_path / "a.uff").read_text(encoding="utf-8")
+    text, n = re.subn(r"(?m)^(        17    0    0    0 .{20} )s {19}", lambda m: f"{m[1]}{label:<20}", text)
+    assert n == 4
+    (tmp_path / "a.uff").write_text(text, encoding="utf-8")
+    sensors = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
+    result = read("a.uff", tmp_path, RawDescription(sensors))
+    assert len(result.recordings) == 2 * is_read
+    assert is_read or f"the unit of its abscissa is {label!r}" in str(result.errors[0])
+
+
 def test_exponents_of_fortran_are_read_in_header_and_samples(tmp_path):
     recording = Recording(
         np.random.default_rng(58).normal(size=(2, 64)), 25600.0, (Channel("f", "force"), Channel("a", "acceleration"))
