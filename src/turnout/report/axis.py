@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -202,8 +202,14 @@ class Axis:
         values = np.asarray(values, dtype=float)
         if self.scale == "log":
             with np.errstate(divide="ignore", invalid="ignore"):
-                return (np.log10(values) - np.log10(self.low)) / (np.log10(self.high) - np.log10(self.low))
+                first, last = self._exponents
+                return (np.log10(values) - first) / (last - first)
         return (values - self.low) / (self.high - self.low)
+
+    @cached_property
+    def _exponents(self) -> tuple[float, float]:
+        """Powers of ten at the ends of a logarithmic axis."""
+        return np.log10(self.low), np.log10(self.high)
 
     def ticks(self) -> list[tuple[float, str]]:
         """Pairs of value and text of the ticks."""

@@ -68,8 +68,9 @@ MAX_STEP = 1000  # px, steps written together are below it
 # Text of a step: separator or sign, whole part without a leading zero, decimals without zeros at their end.
 STEP = np.dtype([("sign", "S1"), ("whole", "S3"), ("decimals", "S3")])
 SIGNS = np.array([b" ", b"-"], dtype="S1")
+DECIMAL_TEXTS = [f".{k:02d}".rstrip("0") if k else "" for k in range(HUNDREDTHS)]
 WHOLE = np.array([str(k) if k else "" for k in range(MAX_STEP)], dtype="S3")
-DECIMALS = np.array([f".{k:02d}".rstrip("0") if k else "" for k in range(HUNDREDTHS)], dtype="S3")
+DECIMALS = np.array(DECIMAL_TEXTS, dtype="S3")
 
 
 def format_pixels(hundredths: int) -> str:
@@ -91,7 +92,7 @@ def format_pixels(hundredths: int) -> str:
     ['62', '-4.5', '.07', '0']
     """
     whole, rest = divmod(abs(hundredths), HUNDREDTHS)
-    text = (str(whole) if whole else "") + (f".{rest:02d}".rstrip("0") if rest else "")
+    text = (str(whole) if whole else "") + DECIMAL_TEXTS[rest]
     return ("-" if hundredths < 0 else "") + (text or "0")
 
 

@@ -78,6 +78,7 @@ ROWS = {
         join (
             select section_id, max(campaign_id) as campaign_id from impacts_current where {ID_GIVEN} group by section_id
         ) newest using (section_id, campaign_id)
+        where i.{ID_GIVEN}
         order by i.section_id, i.test, i.record""",
     # of each reason the newest by name, because a sensor may be dead for years; of a remark on the layout one for all
     "quarantine": f"""
