@@ -64,7 +64,7 @@ def is_clock_or_date(text: str) -> bool:
     bool
         Whether it is.
     """
-    return is_clock(text) or bool(DATE_ALONE.fullmatch(text))
+    return is_clock(text) or bool(DATE_ALONE.fullmatch(plain_stamp(text)))
 
 
 def seconds_of_clock(texts: Sequence[str]) -> np.ndarray:
@@ -219,7 +219,7 @@ def with_dates(columns: Sequence[np.ndarray]) -> list[np.ndarray]:
     """
     columns = list(columns)
     texts = {i: _text(c[0]) for i, c in enumerate(columns) if len(c) and c.dtype.kind in "OUST"}
-    dates = [i for i, text in texts.items() if DATE_ALONE.fullmatch(text)]
+    dates = [i for i, text in texts.items() if DATE_ALONE.fullmatch(plain_stamp(text))]
     clocks = [i for i, text in texts.items() if (stamp := STAMP.fullmatch(text)) and not stamp["date"]]
     if len(dates) == len(clocks) == 1 and len(set(map(_text, columns[dates[0]]))) > 1:
         pairs = zip(columns[dates[0]], columns[clocks[0]])

@@ -16,6 +16,13 @@ DAY_AND_MONTH = re.compile(
     rf" *(\d{{1,2}})[-. /]{{1,2}}([^\W\d_]{{3,9}})\.?[-, /]{{1,2}}(\d{{4}}){CLOCK_AHEAD}[T ,_:]+"
 )
 MONTH_AND_DAY = re.compile(rf" *([^\W\d_]{{3,9}})\.?[- ](\d{{1,2}}),? (\d{{4}}){CLOCK_AHEAD}[T ,_:]+")
+# The same as a cell of its own, beside a time of day in another one; 2026332 and 2026.332 are numbers there.
+DAYS_ALONE = {
+    DAY_OF_YEAR: re.compile(r" *((?:19|20)\d{2})-(\d{3}) *"),
+    WEEK: re.compile(r" *(\d{4})-W(\d{2})-(\d) *"),
+    DAY_AND_MONTH: re.compile(r" *(\d{1,2})[-. /]{1,2}([^\W\d_]{3,9})\.?[-, /]{1,2}(\d{4}) *"),
+    MONTH_AND_DAY: re.compile(r" *([^\W\d_]{3,9})\.?[- ](\d{1,2}),? (\d{4}) *"),
+}
 DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[.,Z+-]|$)")
 DURATION = re.compile(r" *P(?:(\d{1,5})D)?T(?:(\d{1,6})H)?(?:(\d{1,8})M)?(?:(\d{1,10})([.,]\d{1,12})?S)? *")
 # A fraction behind a colon has as many digits as ms, µs or ns; two would be frames of a film.
@@ -79,6 +86,9 @@ def plain_stamp(text: str) -> str:
     text = FRACTION.sub(lambda match: f"{match[1]}.{match[2]}{match[3] or ''}", text)
     if match := DIGITS_ALONE.match(text):
         text = "{}-{}-{}T{}:{}:{}".format(*match.groups()) + text[match.end() :]
+    for pattern, alone in DAYS_ALONE.items():
+        if (match := alone.fullmatch(text)) and (day := _day_of(pattern, *match.groups())):
+            return day.isoformat()
     return with_calendar_date(text)
 
 

@@ -81,6 +81,19 @@ def test_each_notation_gives_rate_and_start_in_every_format(notation, format, tm
     assert outcome(path, 25600.0) == "wrong_rate"
 
 
+@pytest.mark.parametrize("separator", [";", " "])
+@pytest.mark.parametrize("day", ["%Y-%j", "%d-%b-%Y", "%G-W%V-%u", "%d.%m.%Y"])
+@pytest.mark.parametrize("start", [START, datetime(2026, 12, 31, 23, 59, 59, 999000)])
+def test_a_day_beside_the_time_of_day_may_have_any_notation(day, separator, start, tmp_path):
+    stamps = [start + timedelta(microseconds=50 * k) for k in range(N)]
+    cells = [[stamp.strftime(day), stamp.strftime("%H:%M:%S.%f")] for stamp in stamps]
+    rows = [[*cell, f"{f:.9g}", f"{a:.9g}"] for cell, (f, a) in zip(cells, SAMPLES.T)]
+    lines = [separator.join(row) for row in (["day", "time", "force", "rail"], *rows)]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert outcome(tmp_path / "a.csv", 2e4) == start
+    assert outcome(tmp_path / "a.csv", 25600.0) == "wrong_rate"
+
+
 @pytest.mark.parametrize("format", ["parquet", "h5", "npz", "tdms"])
 def test_a_time_in_unknown_words_is_an_error(format, tmp_path):
     """Else the rate of the layout would be taken although the file states one."""
