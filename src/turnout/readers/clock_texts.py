@@ -262,8 +262,8 @@ def with_durations(column: np.ndarray, noun: str, name: str, source: Source) -> 
             problem = f"it holds {_text(column[0])[:60]!r}, and so no known times"
             raise source.error(where, problem, TIME_REMEDY)
         return column
-    texts = [_text(value) for value in column]
-    if len(set(texts)) == 1:  # the start, repeated in every row
+    texts = [value if type(value) is str else _text(value) for value in column.tolist()]
+    if all(text == texts[0] for text in texts):  # the start, repeated in every row
         return column
     seconds = seconds_of_clock(texts)
     if not np.isfinite(seconds).all():
