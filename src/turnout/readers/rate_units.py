@@ -81,6 +81,7 @@ def rate_unit(text: str) -> RateUnit | None:
     return None
 
 
+@lru_cache(maxsize=4096)
 def words_of(name: str) -> tuple[str, ...]:
     """Words of a name, without case, accents and punctuation.
 

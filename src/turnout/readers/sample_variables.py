@@ -162,6 +162,10 @@ def is_flag_series(array: Any) -> bool:
     return bool(array.dtype.kind == "b" and np.any(array[:]) and not np.all(array[:]))
 
 
+# Names of vectors that are metadata, not samples.
+RESERVED_NAMES = frozenset((*TIME_NAMES, *CHANNEL_NAMES, *UNIT_NAMES, *START_NAMES, *RECORD_COUNT_NAMES, *CONDITIONS))
+
+
 def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
     """Vectors that can be channels; those much shorter than the longest are metadata, not samples.
 
@@ -175,19 +179,11 @@ def vectors(variables: Mapping[str, Any]) -> dict[str, Any]:
     dict of str to any
         Vectors of numbers or flags that are longer than half of the longest and have no name of metadata.
     """
-    reserved_names = {
-        *TIME_NAMES,
-        *CHANNEL_NAMES,
-        *UNIT_NAMES,
-        *START_NAMES,
-        *RECORD_COUNT_NAMES,
-        *CONDITIONS,
-    }
     candidates = {
         name: v
         for name, v in variables.items()
         if isinstance(v, ARRAYS) and v.ndim == 1 and v.size > 1 and (v.dtype.kind in "fiu" or is_flag_series(v))
-        if underscored_name(plain_name(name)) not in reserved_names
+        if underscored_name(plain_name(name)) not in RESERVED_NAMES
         and not (is_rate_name(name) and v.size <= MAX_ENTRIES)
     }
     longest = max((v.size for v in candidates.values()), default=0)

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import lru_cache
 
 from turnout.errors import ReadError
 from turnout.readers.entries import Entry
@@ -59,6 +60,7 @@ def _key(entry: Entry) -> tuple[str, str, str]:
     return entry.place, entry.name, str(entry.value)
 
 
+@lru_cache(maxsize=4096)
 def _may_state_start(name: str) -> bool:
     """Whether a name may mean the start of a recording, or its day or time of day."""
     words = words_of(name)
@@ -76,6 +78,8 @@ def _entries_of_start(record: RawRecord, counts: Counter, n: int) -> tuple[Entry
 
 def _with_start(record: RawRecord, entries: tuple[Entry, ...]) -> RawRecord:
     """The record with the start that these entries state."""
+    if not entries and not record.unread_start:
+        return record
     is_part = is_day(record.unread_start) or CLOCK_ALONE.fullmatch(record.unread_start)
     if record.unread_start and not is_part:
         return record

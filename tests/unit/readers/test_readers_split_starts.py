@@ -9,6 +9,9 @@ import pytest
 import soundfile
 
 from turnout.readers import read
+from turnout.readers.entries import Entry
+from turnout.readers.source import RawRecord
+from turnout.readers.split_starts import with_stated_starts
 from turnout.records import RawChannel, RawDescription
 
 FORCE = np.random.default_rng(6).normal(size=(3, 200)).round(4)
@@ -133,3 +136,9 @@ def test_a_start_of_the_file_does_not_fill_a_gap_between_those_of_records(tmp_pa
     expected = [datetime.fromisoformat(b).replace(tzinfo=UTC).replace(tzinfo=None) for b in BEGINS]
     assert found == [expected[0], None, expected[2]]
     assert [e.problem for e in remarks] == ["it lacks the start time that the other records have"]
+
+
+def test_records_without_an_entry_of_a_start_are_not_copied():
+    entry = Entry("the file", "Operator", "M. Jensen")
+    records = [RawRecord(("force",), (row,), entries=(entry,)) for row in FORCE]
+    assert all(out is record for out, record in zip(with_stated_starts(records), records, strict=True))
