@@ -53,9 +53,9 @@ def reduce_points(px: np.ndarray, py: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """
     column = np.floor(px).astype(int)
     step = np.diff(column)
-    starts = np.flatnonzero(np.concatenate([[True], step != 0]))
-    if 4 * len(starts) >= len(px) or np.any(step < 0):
+    if 4 * (1 + np.count_nonzero(step)) >= len(px) or np.any(step < 0):
         return px, py
+    starts = np.append(0, np.flatnonzero(step) + 1)
     ends = np.append(starts[1:], len(px)) - 1
     order = np.lexsort((py, column))
     indices = np.unique(np.concatenate([starts, ends, order[starts], order[ends]]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -178,7 +179,7 @@ class Interval:
     @property
     def half_width(self) -> float | None:
         """Half of its width, None without limits."""
-        return 0.5 * (self.high - self.low) if np.isfinite(self.high) else None
+        return 0.5 * (self.high - self.low) if math.isfinite(self.high) else None
 
 
 def interval(mode: Mapping[str, Any], quantity: Quantity) -> Interval:
