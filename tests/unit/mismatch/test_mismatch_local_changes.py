@@ -1,4 +1,4 @@
-"""An effect at one position that only trains show: its evidence, and names of no position that it refutes."""
+"""Generic laws of single components: another value under trains, and one unlike its kind; and names they refute."""
 
 from dataclasses import replace
 
@@ -8,9 +8,15 @@ from scipy.stats import multivariate_normal
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.diagnose import diagnose, grade_names
 from turnout.mismatch.engine.findings import Findings
-from turnout.mismatch.engine.local_changes import changed_positions, local_change_evidence, local_changes
+from turnout.mismatch.engine.local_changes import (
+    evidence_by_position,
+    evidence_of_any,
+    local_changes,
+    local_deviations,
+)
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -20,17 +26,17 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter
 
-N_SUPPORT, SD, NOISE = 6, 0.1, 0.5
+N_SUPPORT, SD, NOISE = 8, 0.1, 0.5
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of all supports", "made up 2026"),)
 
 
 class Supports(Case):
-    """Impacts and trains that see six supports alike; a train sees them ``changes`` stiffer.
+    """Impacts and trains that see eight supports alike, ``deviations`` stiffer; a train sees them ``changes`` stiffer.
 
     The candidate is a change of all of them under trains: at no position, or at one.
     """
 
-    def __init__(self, changes, where=()):
+    def __init__(self, changes, where=(), deviations=0.0):
         rng = np.random.default_rng(4)
         self.nuisances = tuple(
             Nuisance(f"support_{j}", "-", 0.0, SD, group="support", index=j, at=("place", 0.6 * j))
@@ -38,7 +44,7 @@ class Supports(Case):
         )
         self.jacobian = {name: 3.0 * rng.normal(size=(60, N_SUPPORT)) for name in ("hammer", "train")}
         self.candidates = (Candidate.of("preload", SIZE, dict, ((0.5,),), dict(where)),)
-        truth = SD * rng.normal(size=N_SUPPORT)
+        truth = SD * rng.normal(size=N_SUPPORT) + deviations
         data = {
             name: j @ (truth + (name == "train") * np.array(changes)) + NOISE * rng.normal(size=60)
             for name, j in self.jacobian.items()
@@ -74,20 +80,20 @@ def test_the_evidence_is_that_of_dense_covariances(changes):
         for c in trains.T
     ]
     expected = np.logaddexp.reduce(gains) - np.log(N_SUPPORT)
-    assert local_change_evidence(case, fit) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert evidence_of_any(local_changes(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 def test_impacts_or_trains_alone_show_no_difference():
     case = Supports(in_one(0.4))
     for name in ("hammer", "train"):
         case.observations = tuple(o for o in Supports(in_one(0.4)).observations if o.name == name)
-        assert local_change_evidence(case, fit_jointly(case)) == 0.0
+        assert evidence_of_any(local_changes(case, fit_jointly(case))) == 0.0
 
 
 def test_components_that_are_not_alike_have_no_position():
     case = Supports(in_one(0.4))
     case.nuisances = tuple(replace(n, index=None) for n in case.nuisances)
-    assert local_change_evidence(case, fit_jointly(case)) == 0.0
+    assert evidence_of_any(local_changes(case, fit_jointly(case))) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -116,7 +122,7 @@ def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(w
     assert ("local_change_remains" in graded[0].trail) is (answer == "unknown")
 
 
-@pytest.mark.parametrize("changes, answer", [([0.0] * N_SUPPORT, "none"), (in_one(0.3), "unknown")])
+@pytest.mark.parametrize("changes, answer", [([0.0] * N_SUPPORT, "none"), (in_one(0.25), "unknown")])
 def test_what_differs_in_one_support_alone_is_located_there_without_any_name(changes, answer):
     """The other supports absorb it: the residual is that of intact recordings, and no candidate explains it."""
     case = Supports(changes)
@@ -128,11 +134,51 @@ def test_what_differs_in_one_support_alone_is_located_there_without_any_name(cha
         assert diagnosis.where.frame == "place" and diagnosis.where.place == pytest.approx(1.2)
 
 
+def test_the_evidence_of_a_deviation_is_that_of_dense_covariances():
+    """Mean over supports of N(0, S + (9 - 1) sd² c cᵀ) / N(0, S): three times the scatter instead of the scatter."""
+    case = Supports(in_one(0.0), deviations=np.array(in_one(0.4)))
+    fit = fit_jointly(case)
+    j, y = np.concatenate(list(case.jacobian.values())), np.concatenate([o.data for o in case.observations])
+    covariance = np.diag(np.repeat([NOISE**2 / o.effective for o in case.observations], 60))
+    spreads = [max(SD, spread_of_others(case, fit, n)) for n in case.nuisances]
+    covariance = covariance + j @ np.diag(np.square(spreads)) @ j.T
+    wider = (THRESHOLDS.max_ordinary_spreads**2 - 1.0) ** 0.5 * j * spreads
+    gains = [
+        multivariate_normal.logpdf(y, cov=covariance + np.outer(c, c)) - multivariate_normal.logpdf(y, cov=covariance)
+        for c in wider.T
+    ]
+    expected = np.logaddexp.reduce(gains) - np.log(N_SUPPORT)
+    assert evidence_of_any(local_deviations(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "deviations, answer",
+    [(in_one(0.0), "none"), (in_one(1.0), "unknown"), ([0.1, 0.4, 0.5, -0.4, 0.2, -0.5, 0.4, -0.4], "none")],
+)
+def test_a_component_unlike_its_kind_is_located_without_any_name(deviations, answer):
+    """The base model explains it by a value that is possible. Where all supports scatter as widely, it is ordinary."""
+    case = Supports(in_one(0.0), deviations=np.array(deviations))
+    case.candidates, case.control_level = (), {"hammer": 2.0, "train": 2.0}
+    diagnosis = diagnose(case)
+    assert diagnosis.verdict.answer == answer and max(diagnosis.base.level.values()) < 2.0
+    assert ("component_unlike_its_kind" in diagnosis.verdict.trail) is (answer == "unknown")
+    if answer == "unknown":
+        assert diagnosis.where.frame == "place" and diagnosis.where.place == pytest.approx(1.2)
+
+
+def test_what_the_data_do_not_show_is_no_deviation():
+    case = Supports(in_one(0.0))
+    for jacobian in case.jacobian.values():
+        jacobian[:] = 0.0
+    assert [nats for _, nats in local_deviations(case, fit_jointly(case))] == [0.0] * N_SUPPORT
+
+
 def test_components_of_one_position_count_together():
     case = Supports(in_one(0.35))
     case.nuisances = tuple(replace(n, at=("place", 0.6 * (n.index // 2))) for n in case.nuisances)
     fit = fit_jointly(case)
-    gains = {n.index: nats for n, nats in local_changes(case, fit)}
-    first = changed_positions(case, fit)[0]
+    changes = local_changes(case, fit)
+    gains = {n.index: nats for n, nats in changes}
+    first = evidence_by_position(changes)[0]
     assert (first.frame, first.level) == ("place", 0.6)
     assert first.nats == pytest.approx(np.logaddexp(gains[2], gains[3]) - np.log(N_SUPPORT))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.verification import Verification
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
-COMPONENT_DIFFERS = "component_differs_under_trains"
+COMPONENT_DIFFERS, COMPONENT_UNUSUAL = "component_differs_under_trains", "component_unlike_its_kind"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"
 
 
@@ -67,6 +67,9 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
          "a component there has another value under trains than under impacts (evidence {e.local_change:.0f} nats)",
          LOCATED),
+    Rule(COMPONENT_UNUSUAL, lambda e: e.shows_nothing and e.local_deviation > e.settings.threshold, "unknown",
+         "a component there differs from others of its kind by more than they differ among themselves "
+         "(evidence {e.local_deviation:.0f} nats)", LOCATED),
     Rule(AMBIGUOUS, lambda e: e.shows_nothing and e.is_ambiguous, "unknown", "{e.ambiguity.words}",
          "decisions/short-wave-corrugation.md"),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
@@ -243,7 +246,7 @@ def grade_name(
     strained : str
         Value that no tolerance explains in that fit, in words; "" if there is none.
     local_change : float
-        Evidence of ``local_change_evidence`` in that fit. [nats]
+        Evidence of ``local_changes`` in that fit. [nats]
 
     Returns
     -------

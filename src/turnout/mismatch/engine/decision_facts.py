@@ -85,6 +85,8 @@ class EffectEvidence:
         Value of the base model that no tolerance explains, in words; "" if there is none.
     local_change : float
         Evidence that a single component differs under trains from what impacts show. [nats]
+    local_deviation : float
+        Evidence that a single component differs from those that are alike, beyond their scatter. [nats]
     ambiguity : Ambiguity or None
         Something that the recordings show and cannot tell what it is.
     """
@@ -99,6 +101,7 @@ class EffectEvidence:
     mismatched_trains: tuple[str, ...] = ()
     strained: str = ""
     local_change: float = 0.0
+    local_deviation: float = 0.0
     ambiguity: Ambiguity | None = None
 
     @cached_property

@@ -10,6 +10,7 @@ import numpy as np
 
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
+    COMPONENT_UNUSUAL,
     NUMERICS_RULES,
     confirm,
     first_applicable,
@@ -21,8 +22,8 @@ from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
-from turnout.mismatch.engine.local_changes import local_change_evidence
-from turnout.mismatch.engine.localization import Location, locate, locate_change, location_of_ambiguity
+from turnout.mismatch.engine.local_changes import evidence_of_any, local_changes, local_deviations
+from turnout.mismatch.engine.localization import Location, locate, locate_component, location_of_ambiguity
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_error import error_of_fitted
@@ -254,7 +255,7 @@ def grade_names(findings: Findings) -> Findings:
     leaders = [v.scores[0] for v in findings.verdicts if v.scores]
     local_gain = sum(s.gain for s in leaders if s.has_position or "sensor" in s.candidate.where)
     shape_errors = THRESHOLDS.shape_error_share * local_gain
-    local_change = local_change_evidence(search.case, fit) - shape_errors
+    local_change = evidence_of_any(local_changes(search.case, fit)) - shape_errors
     for verdict in findings.verdicts:
         is_refuted = verdict.answer == "a_or_b" and (strained or free_share > THRESHOLDS.max_free_law_share)
         if verdict.answer == "named" or is_refuted:
@@ -284,8 +285,9 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
     search = findings.search
     if AMBIGUOUS in verdict.trail:
         return location_of_ambiguity(search.case)
-    if COMPONENT_DIFFERS in verdict.trail:
-        return locate_change(search.case, findings.base)
+    for rule, gains in ((COMPONENT_DIFFERS, local_changes), (COMPONENT_UNUSUAL, local_deviations)):
+        if rule in verdict.trail:
+            return locate_component(search.case, gains(search.case, findings.base))
     leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
     leader = None if {"strained_value_remains", "local_change_remains"} & set(verdict.trail) else leader
     absorbed = strained_value(search.case, findings.base, search.settings.threshold)

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.mismatch.engine.channel_levels import loud_recording, worst_channel_excess
+from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.fit_quality import is_significantly_worse, lost_evidence
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
-from turnout.mismatch.engine.local_changes import local_change_evidence
+from turnout.mismatch.engine.local_changes import evidence_of_any, local_changes, local_deviations
 from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.strained_values import strained_value
@@ -138,9 +139,9 @@ def _is_opposed(case: Case, fit: Fit, refit: Fit, candidate: Candidate) -> bool:
 def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
     r"""Whether a component differs from similar ones by no more than they do among themselves, the effect included.
 
-    .. math:: |\ln \psi| < 3 s, \quad s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
+    .. math:: |\ln \psi| < 3 s
 
-    with :math:`v_j` the fitted logarithms of the other components and :math:`\sigma_j` their standard errors.
+    with s the ``spread_of_others``.
 
     Parameters
     ----------
@@ -160,14 +161,9 @@ def is_within_spread(case: Case, refit: Fit, candidate: Candidate) -> bool:
     masking = next((n for n in case.nuisances if n.name == candidate.site.masking_parameter), None)
     if masking is None or masking.index is None:  # the common value of all components, or of one without its like
         return False
-    siblings = [
-        k for k, n in enumerate(case.nuisances) if n.group == masking.group and n.index not in (None, masking.index)
-    ]
-    first = refit.psi[refit.part(candidate).start]
-    if len(siblings) < THRESHOLDS.min_siblings or first <= 0.0:
+    first, spread = refit.psi[refit.part(candidate).start], spread_of_others(case, refit, masking)
+    if spread is None or first <= 0.0:
         return False
-    values = np.array([refit.values[case.nuisances[k].name] for k in siblings])
-    spread = np.sqrt(values.var() + np.mean(np.diag(refit.covariance)[siblings]))
     return abs(float(np.log(first))) < THRESHOLDS.max_ordinary_spreads * spread
 
 
@@ -243,7 +239,8 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     strained = None if fit.candidates else strained_value(case, fit, settings.threshold)
     facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
     facts["mismatched_trains"] = case.mismatched_trains
-    facts["local_change"] = 0.0 if fit.candidates else local_change_evidence(case, fit)
+    for fact, gains in (("local_change", local_changes), ("local_deviation", local_deviations)):
+        facts[fact] = 0.0 if fit.candidates else evidence_of_any(gains(case, fit))
     facts["ambiguity"] = None if fit.candidates else case.ambiguity()
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
-from turnout.mismatch.engine.local_changes import changed_positions
+from turnout.mismatch.engine.local_changes import evidence_by_position
 from turnout.mismatch.engine.space_evidence import SpaceEvidence, weigh_spaces
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.nuisance import Nuisance
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.strained_values import StrainedValue
 
@@ -134,21 +135,21 @@ def location_of_ambiguity(case: Case) -> Location | None:
     return Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
 
 
-def locate_change(case: Case, fit: Fit) -> Location | None:
-    """Location of a component that is another one in expensive recordings than in cheap ones.
+def locate_component(case: Case, gains: Sequence[tuple[Nuisance, float]]) -> Location | None:
+    """Location of a component that differs from what it should be, by a generic law of single components.
 
     Parameters
     ----------
     case : Case
-    fit : Fit
-        With its Jacobian.
+    gains : sequence of (Nuisance, float)
+        Gain of each component, of ``local_changes`` or ``local_deviations``. [nats]
 
     Returns
     -------
     Location or None
         None if no position of such a component is known.
     """
-    positions = changed_positions(case, fit)
+    positions = evidence_by_position(gains)
     return replace(_location_of_evidence(positions), measured_range=case.measured_range) if positions else None
 
 

@@ -1,0 +1,43 @@
+"""Scatter of a component among those that are alike, such as the railpads of a turnout."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from turnout.mismatch.engine.case import Case
+    from turnout.mismatch.engine.fit import Fit
+    from turnout.mismatch.engine.nuisance import Nuisance
+
+
+def spread_of_others(case: Case, fit: Fit, component: Nuisance) -> float | None:
+    r"""Standard deviation of the components that are like one, as fitted, the errors of the fit included.
+
+    .. math:: s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
+
+    with :math:`v_j` their fitted values and :math:`\sigma_j` the standard errors of these.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        Its covariance begins with the nuisances, in their order.
+    component : Nuisance
+        With an index.
+
+    Returns
+    -------
+    float or None
+        In the unit of the component. None if fewer than ``THRESHOLDS.min_siblings`` are like it.
+    """
+    others = [
+        k for k, n in enumerate(case.nuisances) if n.group == component.group and n.index not in (None, component.index)
+    ]
+    if len(others) < THRESHOLDS.min_siblings:
+        return None
+    values = np.array([fit.values[case.nuisances[k].name] for k in others])
+    return float(np.sqrt(values.var() + np.mean(np.diag(fit.covariance)[others])))
