@@ -63,7 +63,7 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     """
     names = [name for name, column in columns.items() if may_number_records(name) and column.dtype.kind in "fiu"]
     for name in sorted(names, key=lambda name: name.strip().lower() != "record"):
-        numbers = np.asarray(columns[name][:])
+        numbers = _signed(columns[name])
         if name.strip().lower() == "record":
             if not np.isfinite(numbers).all():
                 raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
@@ -71,6 +71,12 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
         if _numbers_blocks(numbers):
             return name
     return None
+
+
+def _signed(numbers: Column) -> np.ndarray:
+    """The numbers, those without a sign as with one: else 1 after 2 would be a step of 255."""
+    values = np.asarray(numbers[:])
+    return values.astype(np.int64) if values.dtype.kind == "u" else values
 
 
 def _numbers_blocks(numbers: np.ndarray) -> bool:
@@ -103,7 +109,7 @@ def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
     """
     if numbers is None:
         return [slice(0, n_row)]
-    values = np.asarray(numbers[:])
+    values = _signed(numbers)
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(values))), n_row]
     spans = [slice(a, b) for a, b in pairwise(edges)]
     numbers_of_spans = values[edges[:-1]] if n_row else np.empty(0)

@@ -47,6 +47,20 @@ def test_numbers_of_another_counter_are_no_missing_records(format, numbers, tmp_
     assert outcome(tmp_path, format, "record", numbers) == ([N] * len(numbers), [])
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.uint32, np.int64, np.float64])
+@pytest.mark.parametrize(
+    "name, numbers, n_record", [("record", (1, 2, 1, 2), 4), ("record", (3, 2, 1), 3), ("hit", (2, 1), 0)]
+)
+def test_numbers_that_fall_keep_all_records_in_the_order_of_the_file(kind, name, numbers, n_record, tmp_path):
+    """Also numbers without a sign, whose step from 2 to 1 is 255."""
+    number = np.repeat(numbers, N).astype(kind)
+    samples = np.arange(2.0 * len(number)).reshape(2, -1)
+    pq.write_table(pa.table({"force": samples[0], "rail": samples[1], name: number}), tmp_path / "a.parquet")
+    result = read("a.parquet", tmp_path, RawDescription(SENSORS, rate=2e4))
+    assert [r.samples[0, 0] for r in result.recordings] == [1.0 * N * k for k in range(n_record)]
+    assert [e.reason for e in result.errors] == ["channel_unknown"] * (n_record == 0)
+
+
 @pytest.mark.parametrize("format", ["csv", "parquet"])
 @pytest.mark.parametrize(
     "numbers, lengths", [((0, 1), (7, 53)), ((1, 2, 3), (9, 11, 7)), ((5,), (40,)), ((1, 0), (9, 9))]
