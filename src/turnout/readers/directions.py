@@ -12,9 +12,13 @@ from turnout.readers.texts import decode_text
 from turnout.records import RawChannel
 
 MINUS = r"[-\u2212\u2013]"
-EDGE = r"[\s:._/,;()\[\]]"  # beside a direction; a hyphen between two words is no minus
+EDGE = r"[\s:._/,;()\[\]]"  # beside a direction; a hyphen between two words, as in "A1 - Z", is no minus
 AGAINST_AXIS = re.compile(
-    rf"(?:^|{EDGE})(?:{MINUS}\s?[XYZ]|[XYZ]{MINUS}|(?:minus|neg(?:ative)?)[ _-]?[XYZ])(?:$|{EDGE})", re.IGNORECASE
+    rf"^\s*{MINUS}\s?[XYZ](?:$|{EDGE})"
+    rf"|{EDGE}{MINUS}[XYZ](?:$|{EDGE})"
+    rf"|(?:^|{EDGE})[XYZ]{MINUS}(?:$|[\s,;:)\]]+(?!und\b|oder\b|and\b|or\b|et\b|og\b))"
+    rf"|(?:^|{EDGE})(?:minus|neg(?:ative)?)[ _-]?[XYZ](?:$|{EDGE})",
+    re.IGNORECASE,
 )
 UPSIDE_DOWN = re.compile(
     r"upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
@@ -22,7 +26,10 @@ UPSIDE_DOWN = re.compile(
 DIRECTION_NAME = re.compile(
     r"direction|richtung|orient|ausricht|^dof$|degreeoffreedom|axis$|achse$|mount|montage|einbau"
 )
-OTHER_NAME = re.compile(r"train|zug|travel|fahrt|track|gleis|wind|scan|sort|reference|force|hammer|[xyz]axis$|time")
+OTHER_NAME = re.compile(
+    r"train|zug|travel|fahrt|driv|line|strecke|track|gleis|wind|scan|sort|cable|kabel|[xyz]axis$|time"
+    r"|reference|force|hammer|impact|hit|strike|schlag|sto(?:ss|ß)|excit|anreg"  # of the force
+)
 DIRECTED = ("acceleration", "velocity", "displacement")  # quantities of a response; a hammer strikes in -Z
 MAX_TEXT = 40  # characters: a longer text is a description
 

@@ -35,6 +35,8 @@ ENTRIES = {
     ("direction", "-Z"): True, ("Orientation", "Z-"): True, ("dof", "12:-Z"): True, ("mounting", "upside down"): True,
     ("Messrichtung", "nach unten"): True, ("axis", "neg_z"): True, ("Direction", "\u2212Y"): True,
     ("direction", "+Z"): False, ("axis", "z"): False, ("mounting", "web of rail"): False, ("direction", "south"): False,
+    ("Impact direction", "-Z"): False, ("Anregungsrichtung", "-Z"): False, ("Driving direction", "-X"): False,
+    ("direction", "1 - Z"): False, ("direction", "X-/Z-Achse"): False, ("direction", "X- und Z-Achse"): False,
     ("Train direction", "-Z"): False, ("Z axis", "-Z"): False, ("comment", "-Z"): False,
 }  # fmt: skip
 
