@@ -237,12 +237,15 @@ def _check_repeats(
                 raise source.error("the sets", problem, PAIRING_REMEDY)
 
 
+MIN_DISTINCT = 8  # values of a set: one with fewer, as of a dead channel, repeats by chance
+
+
 def _copies(sets: Sequence[UffDataset | None]) -> dict[int, int]:
     """Number of each set whose samples are those of an earlier one -> that of the earlier one."""
     first_of: dict[bytes, int] = {}
     copies = {}
     for k, dataset in enumerate(sets):
-        if dataset is None or not np.isfinite(_log_energy(dataset)):
+        if dataset is None or not np.isfinite(_log_energy(dataset)) or len(np.unique(dataset.data)) < MIN_DISTINCT:
             continue
         first = first_of.setdefault(np.asarray(dataset.data).tobytes(), k)
         if first != k:

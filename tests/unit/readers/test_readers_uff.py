@@ -423,6 +423,15 @@ def test_a_set_that_repeats_another_one_without_its_partner_is_reported(order, n
         _read_bytes(tmp_path / "a.uff", data, in_si)
 
 
+@pytest.mark.parametrize("values", [np.full(301, -0.0123), np.eye(301)[5]], ids=["dead", "one step"])
+def test_a_dead_channel_repeats_itself_without_any_lost_set(values, hammer_test, in_si, tmp_path):
+    """It costs the records where it is dead, not the file."""
+    impacts = [replace(r, samples=np.stack([r.samples[0], values])) if k > 1 else r for k, r in enumerate(hammer_test)]
+    sets = _sets_without_numbers(impacts, tmp_path, ["NONE"] * 8)
+    result = _read_bytes(tmp_path / "a.uff", "".join(sets).encode(), in_si)
+    assert len(result.recordings) >= 2
+
+
 @pytest.mark.parametrize("n", [4, 5, 6, 7])
 def test_few_sets_need_sizes_that_fit_much_better(n, hammer_test, in_si, tmp_path):
     """All between the first force and the last response are moved; intact impacts whose ratios scatter are read."""
