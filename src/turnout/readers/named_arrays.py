@@ -129,12 +129,18 @@ def _with_durations(variables: Mapping[str, Any], source: Source) -> Mapping[str
     changed = {
         name: with_durations(value, "variable", name, source)
         for name, value in variables.items()
-        if isinstance(value, np.ndarray) and value.size > MAX_ENTRIES
+        if isinstance(value, np.ndarray) and value.size > MAX_ENTRIES and not _is_of_records(value, variables)
     }
     if all(variables[name] is value for name, value in changed.items()):
         return variables
     merged = {**variables, **changed}
     return Alphabetical(merged) if isinstance(variables, Alphabetical) else merged
+
+
+def _is_of_records(array: np.ndarray, variables: Mapping[str, Any]) -> bool:
+    """Whether a vector has one value for each record of an array (records, channels, samples)."""
+    shapes = [v.shape for v in variables.values() if isinstance(v, ARRAYS) and v.ndim == 3]
+    return any(shape[0] == array.size and array.size not in shape[1:] for shape in shapes)
 
 
 def _with_vectors(variables: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -106,6 +106,18 @@ def test_a_time_in_unknown_words_is_an_error(format, tmp_path):
     assert "'time': it holds '07h28m14.000000', and so no known times" in str(error)
 
 
+@pytest.mark.parametrize("name", ["time", "start_time"])
+@pytest.mark.parametrize("notation", ["%Y-%m-%dT%H:%M:%S", "%d %b %Y %H:%M"])
+def test_a_text_for_each_of_many_records_is_no_time_of_samples(name, notation, tmp_path):
+    starts = [datetime(2026, 11, 28, 7) + timedelta(minutes=k) for k in range(70)]
+    texts = np.array([start.strftime(notation) for start in starts])
+    np.savez(tmp_path / "a.npz", data=np.random.default_rng(3).normal(size=(70, 2, N)), **{name: texts})
+    sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
+    result = read("a.npz", tmp_path, RawDescription(sensors, rate=2e4))
+    assert [r.started_at for r in result.recordings] == (starts if name == "start_time" else [None] * 70)
+    assert result.errors == ()
+
+
 @pytest.mark.parametrize("format", ["parquet", "tdms"])
 def test_a_start_that_is_repeated_in_every_row_is_the_start(format, tmp_path):
     FORMATS[format](tmp_path / f"a.{format}", [f"{START:%Y-%m-%d %H:%M:%S}"] * N)
