@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result
-from turnout.counts import count_of
+from turnout.counts import count_of, first_texts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from turnout.records import Unit
     from turnout.units import Conversion
 
+MAX_TYPES = 6  # of trains that a remark names
 TABLE_SUFFIXES = (".csv", ".ods", ".tsv", ".txt", ".xls", ".xlsx", ".yaml")
 GROUP = "Set up"
 HELP = "check the configuration and the names of raw files"
@@ -154,19 +155,21 @@ def _position_remarks(configuration: Configuration) -> Iterator[str]:
 
 
 def _remarks_on_train_types(turnout: TurnoutConfig, raw: Path) -> Iterator[str]:
-    """A remark on each type of trains.csv that no axle pattern has: its trains are recognised by the table alone."""
+    """A remark on the types of trains.csv that no axle pattern has: recordings cannot show them."""
     from turnout.errors import ConfigError
     from turnout.stages.passage_context import known_patterns
 
+    path = turnout.settings["passage"].axle_patterns
     try:
-        types = {pattern.type for pattern in known_patterns(turnout.settings["passage"].axle_patterns)}
+        types = {pattern.type for pattern in known_patterns(path)}
     except ConfigError:  # a fault of its own
         return
     listed = {row["train_type"] for row in turnout.trains if row.get("train_type")}
-    for train_type in sorted(listed - types if types else ()):
+    if types and (without := sorted(listed - types)):
+        names = first_texts([*map(repr, without)], MAX_TYPES)
         yield (
-            f"{raw / turnout.raw / 'trains.csv'}: no axle pattern is called {train_type!r}, so no recording shows it. "
-            f"Correct the name, or add its axle distances to {turnout.settings['passage'].axle_patterns}"
+            f"{raw / turnout.raw / 'trains.csv'}: no axle pattern is called {names}, so no recording is recognised as "
+            f"such a train. Correct the name, or add its axle distances to {path}"
         )
 
 

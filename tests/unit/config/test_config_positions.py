@@ -28,6 +28,9 @@ def remarks(folder, rows, zone=""):
         (["A\t1\t-33.9\t151.2", "A\t2\t-37.8\t145.0"], "Australia/Sydney", 0),
         (["A\t1\t151.2\t-33.9"], "", None),
         (["A\t1\t\t10.4", "A\t2\t55.4\t"], "Europe/Copenhagen", 0),
+        (["A\t1\t55.3\t10.4", "A\t2\t10.3\t55.4"], "Europe/Copenhagen", 1),
+        (["A\t1\t39.9\t32.9", "A\t2\t39.8\t32.8", "A\t3\t40.6\t43.1"], "Europe/Istanbul", 0),
+        (["A\t1\t-33.9\t151.2", "A\t2\t-31.9\t115.9"], "", 0),
     ],
 )
 def test_coordinates_that_fit_only_if_they_are_swapped_are_reported(rows, zone, n, tmp_path):
@@ -50,6 +53,10 @@ def test_a_kilometre_in_metres_is_reported_by_the_others_of_its_line(cells, n, t
     ] * n
 
 
+def test_turnouts_without_a_line_are_not_compared_by_kilometre(tmp_path):
+    assert remarks(tmp_path, ["\t0.3\t\t", "\t0.5\t\t", "\t650.2\t\t"]) == []
+
+
 @pytest.mark.parametrize("km", ["12,345,678", "12345678", "12345"])
 def test_a_kilometre_that_no_line_has_is_an_error(km, tmp_path):
     with pytest.raises(ConfigErrors, match=r"km is .*Write a number from 0 to 10000"):
@@ -64,10 +71,14 @@ def test_check_prints_positions_and_train_types_without_pattern(tmp_path, capsys
         "vehicles: {a: {length: 20.0, axles: [3.0, 17.0]}}\ntrains: {IC3: {units: [a]}}\n"
     )
     (tmp_path / "raw/t1").mkdir(parents=True)
-    trains = "passed_at_utc,train_type\n2024-05-13T10:00:00,IC3\n2024-05-13T11:00:00,IC 3\n2024-05-13T12:00:00,\n"
+    passed = ("10:00:00,IC3", "11:00:00,IC 3", "11:30:00,X31", "12:00:00,")
+    trains = "passed_at_utc,train_type\n" + "".join(f"2024-05-13T{row}\n" for row in passed)
     (tmp_path / "raw/t1/trains.csv").write_text(trains)
     main(["check"])
     printed = capsys.readouterr().out
     assert "turnouts.tsv, line 3, column 13: lat_deg 10 and lon_deg 55 of t2 seem to be swapped" in printed
-    assert "trains.csv: no axle pattern is called 'IC 3', so no recording shows it. Correct the name" in printed
+    assert (
+        "trains.csv: no axle pattern is called 'IC 3', 'X31', so no recording is recognised as such a train. Correct"
+        in printed
+    )
     assert "'IC3'" not in printed
