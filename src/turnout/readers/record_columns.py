@@ -63,7 +63,7 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     """
     names = [name for name, column in columns.items() if may_number_records(name) and column.dtype.kind in "fiu"]
     for name in sorted(names, key=lambda name: name.strip().lower() != "record"):
-        numbers = _signed(columns[name])
+        numbers = _signed_numbers(columns[name])
         if name.strip().lower() == "record":
             if not np.isfinite(numbers).all():
                 raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
@@ -73,7 +73,7 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     return None
 
 
-def _signed(numbers: Column) -> np.ndarray:
+def _signed_numbers(numbers: Column) -> np.ndarray:
     """The numbers, those without a sign as with one: else 1 after 2 would be a step of 255."""
     values = np.asarray(numbers[:])
     return values.astype(np.int64) if values.dtype.kind == "u" else values
@@ -109,7 +109,7 @@ def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
     """
     if numbers is None:
         return [slice(0, n_row)]
-    values = _signed(numbers)
+    values = _signed_numbers(numbers)
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(values))), n_row]
     spans = [slice(a, b) for a, b in pairwise(edges)]
     numbers_of_spans = values[edges[:-1]] if n_row else np.empty(0)
