@@ -30,6 +30,8 @@ CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware 
 # In brackets anywhere in a name, of which the last one may be cut off.
 UNIT_IN_NAME = re.compile(r"[\[({<|]\s*([^\[\](){}<>|]+?)\s*(?:[\])}>|]|$)")
 SEPARATORS = re.compile(r"[\s_./:;,=|@*\"'-]+")  # of the words of a name
+# A range, a distance or a sensitivity: "5 kN hammer", "rail 50g 2", "mV/g rail". The 2 of "rail_2_g_raw" is a number.
+AMOUNT = re.compile(r"(?:^|(?<=\s))(?:[±+-]?\d+(?:[.,]\d+)?\s?[^\W\d_][^\s_]*|[mµu]?V/[^\s_]+)")
 LEVEL = re.compile(r"dB")
 
 
@@ -257,13 +259,14 @@ def _last_word(name: str, names: Sequence[str]) -> str:
 def _other_words(name: str, names: Sequence[str]) -> list[str]:
     """Words that may be a unit beside others, as in "F_kN_raw" and "kN 2", and a name that is nothing else.
 
-    None where they number the channels, as in "f", "g"; of single letters only those of the usual units.
+    None where they number the channels, as in "f", "g", or belong to an amount; of single letters only usual units.
     """
     plain = name.strip()
     if len(plain) == 1 and any(len(other.strip()) == 1 and not known_unit(other) for other in names):
         return []
-    words = SEPARATORS.split(plain)
-    neighbours = [SEPARATORS.split(other.strip()) for other in names if other != name]
+    words, *neighbours = (
+        SEPARATORS.split(AMOUNT.sub("", other.strip())) for other in (name, *(n for n in names if n != name))
+    )
     inner = [
         word
         for k, word in enumerate(words)

@@ -105,7 +105,7 @@ def test_a_unit_under_any_name_is_compared_with_the_layout(format, tmp_path):
 NAMES = {  # name of the channel in the file: unit that it states
     "rail [g]": "g", "rail (mV)": "mV", "rail {mm/s²}": "mm/s²", "rail [dB]": "dB", "rail_g": "g", "rail_mV": "mV",
     "rail mm_s2": "mm/s2", "rail_counts": "counts", "rail [g] 2": "g", "(mg) rail": "mg", "rail|g": "g", "rail [g": "g",
-    "rail_g_raw": "g", "a=mg": "mg", "g": "g", "mm/s²": "mm/s²",
+    "rail_g_raw": "g", "rail_2_g_raw": "g", "A1 g 2": "g", "a=mg": "mg", "g": "g", "mm/s²": "mm/s²",
 }  # fmt: skip
 
 
@@ -120,7 +120,22 @@ def test_a_unit_in_the_name_of_a_channel_is_compared_with_the_layout(name, tmp_p
 
 @pytest.mark.parametrize(
     "name",
-    ["rail [m/s²]", "rail_left", "rail [10 g]", "rail (left)", "rail_m", "rail 2", "rail_C", "rail [m/s²] 2", "G 2 m"],
+    [
+        "rail [m/s²]",
+        "rail_left",
+        "rail [10 g]",
+        "rail (left)",
+        "rail_m",
+        "rail 2",
+        "rail_C",
+        "rail [m/s²] 2",
+        "G 2 m",
+        "rail 50 g 2",
+        "50g rail",
+        "mV/g rail",
+        "10 mV/g rail",
+        "rail ±50,5 g left",
+    ],
 )
 def test_a_name_without_another_unit_of_the_channel_states_nothing(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
