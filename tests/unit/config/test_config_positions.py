@@ -23,6 +23,7 @@ def remarks(folder, rows, zone=""):
         (["A\t1\t55.3\t10.4", "A\t2\t55.4\t10.3"], "Europe/Copenhagen", 0),
         (["A\t1\t10.4\t55.3", "A\t2\t10.3\t55.4"], "Europe/Copenhagen", 2),
         (["A\t1\t10.4\t55.3"], "UTC", 0),
+        (["A\t1\t10.4\t55.3"], "Etc/GMT-1", 0),
         (["A\t1\t40.4\t-3.7"], "Europe/Madrid", 0),
         (["A\t1\t39.5\t76.0"], "Asia/Shanghai", 0),
         (["A\t1\t-33.9\t151.2", "A\t2\t-37.8\t145.0"], "Australia/Sydney", 0),

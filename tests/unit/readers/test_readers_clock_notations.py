@@ -142,6 +142,9 @@ TEXTS = {  # first text, last text, seconds between them
     "second 60": ("23:59:60.0", "23:59:60.5", 0.5), "hours of a count": ("25:00:00", "25:00:01", 1.0),
     "day of the year": ("2024-366T23:59:59", "2025-001T00:00:00", 1.0),
     "no such day": ("2024-366T23:59:59", "2025-366T00:00:00", np.nan),
+    "second 61": ("10:00:61", "10:00:62", np.nan),
+    "hour 24 of a date": ("1.5.2026 24:00:00", "1.5.2026 24:00:01", np.nan),
+    "days that are counted": ("1.23:59:59.5", "1.00:00:00.5", -86399.0),
     "no padding": ("10:00:00:950", "10:00:00:100000", np.nan),
     "duration": ("PT59.5S", "PT1M0.5S", 1.0), "days": ("P1DT23H59M59S", "P2DT0H0M1S", 2.0),
 }  # fmt: skip

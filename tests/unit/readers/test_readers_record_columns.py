@@ -63,7 +63,15 @@ def test_numbers_that_fall_keep_all_records_in_the_order_of_the_file(kind, name,
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
 @pytest.mark.parametrize(
-    "numbers, lengths", [((0, 1), (7, 53)), ((1, 2, 3), (9, 11, 7)), ((5,), (40,)), ((1, 0), (9, 9))]
+    "numbers, lengths",
+    [
+        ((0, 1), (7, 53)),
+        ((1, 2, 3), (9, 11, 7)),
+        ((5,), (40,)),
+        ((1, 0), (9, 9)),
+        (range(40), [1] * 40),
+        ((0.5, 1.5), (9, 9)),
+    ],
 )
 def test_a_flag_of_the_contact_does_not_cut_a_record(format, numbers, lengths, tmp_path):
     assert outcome(tmp_path, format, "hit", numbers, lengths) == ([], [("record 1 of 1", "channel_unknown")])
@@ -99,7 +107,16 @@ def write_groups(path, format, numbers):
 
 @pytest.mark.parametrize("format", ["h5", "tdms", "uff"])
 @pytest.mark.parametrize(
-    ("numbers", "lost"), [((1, 2, 4, 5), [3]), ((1, 3), [2]), ((1, 3, 5), []), ((3, 4, 5), []), ((10, 20, 45), [])]
+    ("numbers", "lost"),
+    [
+        ((1, 2, 4, 5), [3]),
+        ((1, 3), [2]),
+        ((1, 3, 5), []),
+        ((3, 4, 5), []),
+        ((10, 20, 45), []),
+        ((1, 2, 6), [3, 4, 5]),
+        ((1, 2, 8), []),
+    ],
 )
 def test_the_same_rule_holds_for_groups_and_sets(format, numbers, lost, tmp_path):
     write_groups(tmp_path / f"a.{format}", format, numbers)

@@ -130,6 +130,7 @@ def test_a_unit_in_the_name_of_a_channel_is_compared_with_the_layout(name, tmp_p
         "rail_C",
         "rail [m/s²] 2",
         "G 2 m",
+        "rail G 2",
         "rail 50 g 2",
         "50g rail",
         "mV/g rail",
