@@ -15,21 +15,26 @@ from turnout.physics.term import Parameter, PhysicsTerm
 if TYPE_CHECKING:
     from turnout.simulate.sensor import Sensor
 
+MAINS = 50.0  # [Hz]
 START_SHARE = 0.1  # of the channel's peak in the band
 
 
 @dataclass(frozen=True)
 class Hum(PhysicsTerm):
-    r"""A line at the mains frequency, :math:`a \sin 2\pi f t + b \cos 2\pi f t`, also before and after the train.
+    r"""A line at the mains frequency, also without a train.
 
-    ``start`` is the time from the start of the record to the first sample of the signal [s].
+    .. math:: a \sin(2 \pi f t + \varphi) + b \cos(2 \pi f t + \varphi)
+
+    ``start`` is the time from the start of the record to the first sample of the signal [s]. ``phase`` is that of the
+    line at the start of the record [rad]: no record begins at a fixed phase of the mains.
     """
 
     channel_name: str
     sine: float
     cosine: float = 0.0
-    frequency: float = 50.0
+    frequency: float = MAINS
     start: float = 0.0
+    phase: float = 0.0
 
     name = "hum"
     left_out = "channel {channel_name} hums at {frequency:.1f} Hz with an amplitude of {amplitude:.3g} m/s²"
@@ -42,7 +47,7 @@ class Hum(PhysicsTerm):
     column_type = "channel"
     n_size_parameters = 2
     parameters = (
-        Parameter("sine", "m/s²", 0.0, (-50.0, 50.0), "part in phase with the record's start",
+        Parameter("sine", "m/s²", 0.0, (-50.0, 50.0), "part in phase with the line where no wheel is near",
                   "EN 50163:2004, supply voltages of traction systems: 50 Hz and 16.7 Hz"),
         Parameter("cosine", "m/s²", 0.0, (-50.0, 50.0), "part a quarter period ahead", "EN 50163:2004"),
     )  # fmt: skip
@@ -69,13 +74,17 @@ class Hum(PhysicsTerm):
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
     def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
-        """The term with the start time of the signal of this recording."""
-        return replace(self, start=float(conditions.get("start", 0.0)))
+        """The term with the start time of the signal of this recording, and the phase of its channel there.
+
+        ``conditions["hum_phases"]`` has the phase of each channel [rad], 0 for others.
+        """
+        phase = conditions.get("hum_phases", {}).get(self.channel_name, 0.0)
+        return replace(self, start=float(conditions.get("start", 0.0)), phase=float(phase))
 
     def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
         """The signal with the line added."""
         self.check()
         if sensor.name != self.channel_name:
             return signal
-        phase = 2.0 * np.pi * self.frequency * (self.start + np.arange(np.size(signal)) / rate)
+        phase = 2.0 * np.pi * self.frequency * (self.start + np.arange(np.size(signal)) / rate) + self.phase
         return signal + self.sine * np.sin(phase) + self.cosine * np.cos(phase)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION, TRACK
+from turnout.physics.hum import MAINS
 from turnout.simulate.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ class AlignedPassage:
     """One passage aligned with its simulation; its observation holds the sensors one after the other.
 
     ``time`` (n,) [s] counts from the start of the recording. At ``reference`` [s] the first wheel reaches the first
-    sensor. ``speed`` [m/s] is that after alignment.
+    sensor. ``speed`` [m/s] is that after alignment. ``hum_phases`` are the phases of a line of the mains at the start
+    of the recording by channel [rad], as each shows it where no wheel is near.
     """
 
     name: str
@@ -35,6 +37,7 @@ class AlignedPassage:
     time: np.ndarray
     reference: float
     speed: float
+    hum_phases: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def high(self) -> float:
@@ -149,12 +152,37 @@ def observe_passage(
     factor = max(1, int(np.ceil(PASSAGE.min_read_rate / recording.rate)))
     signals, rate = upsample(signals, factor) if factor > 1 else signals, factor * recording.rate
     data = read_at(signals, rate, time)
+    quiet = [(start, end) for start, end in _wheel_free_times(aligned) if end - start >= PASSAGE.min_quiet_time]
     noise = np.zeros(len(sensors))
-    for start, end in _wheel_free_times(aligned):
-        if end - start >= PASSAGE.min_quiet_time:
-            noise = np.std(read_at(signals, rate, np.arange(start, end, step)), axis=1)
-            break
+    if quiet:
+        noise = np.std(read_at(signals, rate, np.arange(*quiet[0], step)), axis=1)
+        quiet_time = np.concatenate([np.arange(*ends, step) for ends in quiet])
+        phases = line_phases(read_at(signals, rate, quiet_time), quiet_time, MAINS)
+        aligned = replace(aligned, hum_phases=dict(zip((s.name for s in sensors), phases)))
     return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
+
+
+def line_phases(samples: np.ndarray, time: np.ndarray, frequency: float) -> list[float]:
+    r"""Phase of a line in each signal, by least squares: that of :math:`\sin(2\pi f t + \varphi)` at t = 0.
+
+    Parameters
+    ----------
+    samples : (n_channel, n) array of float
+        Signals.
+    time : (n,) array of float
+        Times of the samples, also with gaps. [s]
+    frequency : float
+        Frequency of the line. [Hz]
+
+    Returns
+    -------
+    list of float
+        For each signal, between -π and π. [rad]
+    """
+    turns = 2.0 * np.pi * frequency * time
+    lines = np.column_stack([np.sin(turns), np.cos(turns), np.ones(time.size)])
+    sine, cosine, _ = np.linalg.lstsq(lines, samples.T, rcond=None)[0]
+    return [float(phase) for phase in np.arctan2(cosine, sine)]
 
 
 def _wheel_free_times(aligned: AlignedPassage) -> tuple[tuple[float, float], tuple[float, float]]:

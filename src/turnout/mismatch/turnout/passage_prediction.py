@@ -112,7 +112,8 @@ class PassagePredictor(SiteModel):
         (n,) array of float
             [m/s²]
         """
-        conditions = {"name": aligned.name, "start": _start_time(values, aligned)}
+        start = _start_time(values, aligned)
+        conditions = {"name": aligned.name, "start": start, "hum_phases": aligned.hum_phases}
         for term in terms:
             if term.effect_type == "channel":
                 signal = term.under_conditions(conditions).channel(signal, 4.0 * self.solver.rate, sensor)
