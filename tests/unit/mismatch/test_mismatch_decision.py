@@ -95,7 +95,7 @@ CASES = {
         2.0,
         {},
     ),
-    "passes": ([score(), score("gap", 33.0)], 2.0, {}),
+    "passes": ([score(), score("gap", 33.0)], 2.0, {"local_change": 90.0, "local_deviation": 90.0}),
 }
 
 

@@ -1,6 +1,7 @@
 """Generic laws of single components: another value under trains, and one unlike its kind; and names they refute."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ class Supports(Case):
         )
         self.jacobian = {name: 3.0 * rng.normal(size=(60, N_SUPPORT)) for name in ("hammer", "train")}
         self.candidates = (Candidate.of("preload", SIZE, dict, ((0.5,),), dict(where)),)
-        truth = SD * rng.normal(size=N_SUPPORT) + deviations
+        self.truth = truth = SD * rng.normal(size=N_SUPPORT) + deviations
         data = {
             name: j @ (truth + (name == "train") * np.array(changes)) + NOISE * rng.normal(size=60)
             for name, j in self.jacobian.items()
@@ -64,6 +65,14 @@ class Supports(Case):
 
 def in_one(change):
     return [change * (j == 2) for j in range(N_SUPPORT)]
+
+
+def with_values(values, error=0.01, groups=("support",) * N_SUPPORT):
+    """A case and a fit that has these values, with one standard error for all."""
+    case = Supports(in_one(0.0))
+    case.nuisances = tuple(replace(n, group=group) for n, group in zip(case.nuisances, groups))
+    names = [n.name for n in case.nuisances]
+    return case, SimpleNamespace(values=dict(zip(names, values)), covariance=error**2 * np.eye(N_SUPPORT))
 
 
 @pytest.mark.parametrize("changes", [in_one(0.0), in_one(0.4), [0.2] * N_SUPPORT])
@@ -140,7 +149,7 @@ def test_the_evidence_of_a_deviation_is_that_of_dense_covariances():
     fit = fit_jointly(case)
     j, y = np.concatenate(list(case.jacobian.values())), np.concatenate([o.data for o in case.observations])
     covariance = np.diag(np.repeat([NOISE**2 / o.effective for o in case.observations], 60))
-    spreads = [max(SD, spread_of_others(case, fit, n)) for n in case.nuisances]
+    spreads = [max(SD, spread_of_others(case, fit, n, without_outliers=True)) for n in case.nuisances]
     covariance = covariance + j @ np.diag(np.square(spreads)) @ j.T
     wider = (THRESHOLDS.max_ordinary_spreads**2 - 1.0) ** 0.5 * j * spreads
     gains = [
@@ -153,7 +162,7 @@ def test_the_evidence_of_a_deviation_is_that_of_dense_covariances():
 
 @pytest.mark.parametrize(
     "deviations, answer",
-    [(in_one(0.0), "none"), (in_one(1.0), "unknown"), ([0.1, 0.4, 0.5, -0.4, 0.2, -0.5, 0.4, -0.4], "none")],
+    [(in_one(0.0), "none"), (in_one(1.2), "unknown"), ([0.1, 0.4, 0.5, -0.4, 0.2, -0.5, 0.4, -0.4], "none")],
 )
 def test_a_component_unlike_its_kind_is_located_without_any_name(deviations, answer):
     """The base model explains it by a value that is possible. Where all supports scatter as widely, it is ordinary."""
@@ -164,6 +173,36 @@ def test_a_component_unlike_its_kind_is_located_without_any_name(deviations, ans
     assert ("component_unlike_its_kind" in diagnosis.verdict.trail) is (answer == "unknown")
     if answer == "unknown":
         assert diagnosis.where.frame == "place" and diagnosis.where.place == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize("deviations", [[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]])
+def test_two_components_unlike_their_kind_do_not_hide_each_other(deviations):
+    deviations = np.concatenate([deviations, np.zeros(N_SUPPORT - len(deviations))])
+    case = Supports(in_one(0.0), deviations=deviations)
+    gains = [nats for _, nats in local_deviations(case, fit_jointly(case))]
+    assert set(np.argsort(gains)[-2:]) == set(np.flatnonzero(deviations)) and min(np.sort(gains)[-2:]) > 12.0
+
+
+@pytest.mark.parametrize("error", [0.0, 0.3])
+def test_the_spread_is_that_of_the_others_of_a_group_and_has_the_errors_of_their_values(error):
+    """The spread of the component itself, and that of another group, do not count."""
+    values = np.array([9.0, -0.2, -0.1, 0.1, 0.2, -0.2, 0.2, -0.1])
+    case, fit = with_values(values, error)
+    others = values[1:]
+    assert spread_of_others(case, fit, case.nuisances[0]) == pytest.approx(np.hypot(others.std(), error))
+    robust = np.median(np.abs(others - np.median(others))) / 0.6745
+    assert spread_of_others(case, fit, case.nuisances[0], True) == pytest.approx(np.hypot(robust, error), rel=1e-4)
+    case, fit = with_values(values, error, ("support",) * 7 + ("pad",))  # six others are alike
+    assert spread_of_others(case, fit, case.nuisances[0]) == pytest.approx(np.hypot(values[1:7].std(), error))
+    case, fit = with_values(values, error, ("support",) * 6 + ("pad",) * 2)  # five others give no spread
+    assert spread_of_others(case, fit, case.nuisances[0]) is None
+
+
+def test_a_component_within_the_prior_is_no_deviation_where_all_others_are_equal():
+    case = Supports(in_one(0.0), deviations=-Supports(in_one(0.0)).truth + np.array(in_one(2.0 * SD)))
+    fit = fit_jointly(case)
+    assert spread_of_others(case, fit, case.nuisances[2], without_outliers=True) < 0.7 * SD
+    assert evidence_of_any(local_deviations(case, fit)) < 1.0
 
 
 def test_what_the_data_do_not_show_is_no_deviation():

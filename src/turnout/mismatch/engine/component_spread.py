@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import median_abs_deviation
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.nuisance import Nuisance
 
 
-def spread_of_others(case: Case, fit: Fit, component: Nuisance) -> float | None:
+def spread_of_others(case: Case, fit: Fit, component: Nuisance, without_outliers: bool = False) -> float | None:
     r"""Standard deviation of the components that are like one, as fitted, the errors of the fit included.
 
     .. math:: s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
@@ -28,6 +29,8 @@ def spread_of_others(case: Case, fit: Fit, component: Nuisance) -> float | None:
         Its covariance begins with the nuisances, in their order.
     component : Nuisance
         With an index.
+    without_outliers : bool
+        The first part is that of the median absolute deviation, which a few components unlike the others do not widen.
 
     Returns
     -------
@@ -40,4 +43,5 @@ def spread_of_others(case: Case, fit: Fit, component: Nuisance) -> float | None:
     if len(others) < THRESHOLDS.min_siblings:
         return None
     values = np.array([fit.values[case.nuisances[k].name] for k in others])
-    return float(np.sqrt(values.var() + np.mean(np.diag(fit.covariance)[others])))
+    spread = median_abs_deviation(values, scale="normal") if without_outliers else values.std()
+    return float(np.sqrt(spread**2 + np.mean(np.diag(fit.covariance)[others])))

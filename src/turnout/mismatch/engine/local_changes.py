@@ -110,8 +110,8 @@ def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
 def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     """Components, and the gain of each by a value beyond the ordinary scatter of those that are alike.
 
-    The scatter is that of the prior, or ``spread_of_others`` where that is larger. A value beyond it has a prior as
-    wide as changes have in ``local_changes`` (``evidence_of_large_values``).
+    The scatter is that of the prior, or ``spread_of_others`` without outliers where that is larger. A value beyond it
+    has a prior as wide as changes have in ``local_changes`` (``evidence_of_large_values``).
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     components = [case.nuisances[k] for k in _components(case)]
     if not components or not fit.jacobian:
         return []
-    spreads = {n.name: max(n.sd, spread_of_others(case, fit, n) or 0.0) for n in components}
+    spreads = {n.name: max(n.sd, spread_of_others(case, fit, n, without_outliers=True) or 0.0) for n in components}
     scattered = copy(case)
     scattered.nuisances = tuple(replace(n, sd=spreads.get(n.name, n.sd)) for n in case.nuisances)
     gains = evidence_of_large_values(scattered, fit, spreads, THRESHOLDS.max_ordinary_spreads)
