@@ -129,7 +129,8 @@ def test_a_missing_index(tmp_path, in_si):
     channels = (RawChannel("force", 0, "force"), RawChannel("rail", 1, "acceleration"))
     error = only_error(name, tmp_path, replace(in_si, channels=channels), 0)
     assert error.reason == "channel_missing"
-    assert "record 1 of 1: there is no channel 1; the file has 1, counted from 0. Correct 'source' of" in str(error)
+    found = "the file has 1 ('force'; times and numbers of records are no channels), counted from 0"
+    assert f"record 1 of 1: there is no channel 1; {found}. Correct 'source' of" in str(error)
 
 
 def test_an_unknown_channel_must_be_named_even_to_be_ignored(tmp_path, in_si):
