@@ -141,9 +141,9 @@ def index_of(
     if isinstance(wanted, int):
         if 0 <= wanted < len(record.names):
             return wanted
-        names = f"{_name_list(record.names)}; times and numbers of records are no channels"
-        count = f"{len(record.names)}{f' ({names})' if any(record.names) else ''}"
-        problem = f"there is no channel {wanted}; the file has {count}, counted from 0"
+        listed = f"{_name_list(record.names)}; times and numbers of records are no channels"
+        found = f"{len(record.names)}{f' ({listed})' if any(record.names) else ''}"
+        problem = f"there is no channel {wanted}; the file has {found}, counted from 0"
         raise source.error(where, problem, f"{CORRECT_SOURCE}, or copy the file again", reason="channel_missing")
     for names in (record.names, [n.strip().casefold() for n in record.names]):
         key = wanted if names is record.names else wanted.strip().casefold()

@@ -156,10 +156,16 @@ def observe_passage(
     noise = np.zeros(len(sensors))
     if quiet:
         noise = np.std(read_at(signals, rate, np.arange(*quiet[0], step)), axis=1)
-        quiet_time = np.concatenate([np.arange(*ends, step) for ends in quiet])
-        phases = line_phases(read_at(signals, rate, quiet_time), quiet_time, MAINS)
+        near_times = np.concatenate([np.arange(*ends, step) for ends in _beside_train(quiet, reference)])
+        phases = line_phases(read_at(signals, rate, near_times), near_times, MAINS)
         aligned = replace(aligned, hum_phases=dict(zip((s.name for s in sensors), phases)))
     return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
+
+
+def _beside_train(quiet: Sequence[tuple[float, float]], reference: float) -> list[tuple[float, float]]:
+    """Equal parts of the quiet times, those next to the train: a line drifts least there, before as much as behind."""
+    length = min(PASSAGE.hum_time, *(end - start for start, end in quiet))
+    return [(start, start + length) if start > reference else (end - length, end) for start, end in quiet]
 
 
 def line_phases(samples: np.ndarray, time: np.ndarray, frequency: float) -> list[float]:

@@ -173,6 +173,8 @@ class PassagePriors:
         ERROR_MODES)
     record_margin: float = prior(0.02, "s", "at both ends of a recording that is no noise", "convention")
     min_quiet_time: float = prior(0.1, "s", "without a wheel, at least, for a channel's noise", "convention")
+    hum_time: float = prior(
+        0.5, "s", "before and behind a train, at most, that tell the phase of hum: mains drift by 0.1 Hz", "convention")
     clipping_blur: float = prior(0.03, "s", "about a sample at the range, which is disturbed by clipping", "numerical")
     range_share: float = prior(0.999, "share of the range", "from which a sample counts as clipped", "numerical")
     coupling_corner_sd: float = prior(0.7, "Hz", "lower corner of an amplifier without a data sheet", ERROR_MODES)
