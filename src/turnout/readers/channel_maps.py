@@ -141,9 +141,9 @@ def index_of(
     if isinstance(wanted, int):
         if 0 <= wanted < len(record.names):
             return wanted
-        listed = f"{_name_list(record.names)}; times and numbers of records are no channels"
-        found = f"{len(record.names)}{f' ({listed})' if any(record.names) else ''}"
-        problem = f"there is no channel {wanted}; the file has {found}, counted from 0"
+        name_list = _name_list(record.names)
+        in_brackets = f" ({name_list}; times and numbers of records are no channels)" if any(record.names) else ""
+        problem = f"there is no channel {wanted}; the file has {len(record.names)}{in_brackets}, counted from 0"
         raise source.error(where, problem, f"{CORRECT_SOURCE}, or copy the file again", reason="channel_missing")
     for names in (record.names, [n.strip().casefold() for n in record.names]):
         key = wanted if names is record.names else wanted.strip().casefold()

@@ -68,7 +68,6 @@ def read_raw(source: Source) -> RawFile:
     facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
     stated = {f.name: scale_text({**without_drawings(notes), **_notes_of(f.metadata)}) for f in schema}
-    _check_record_numbers(columns, source)
     numbering = record_column(columns, source)
     spans = spans_of_records(columns.pop(numbering) if numbering is not None else None, n_row)
     time = next((name for name, x in columns.items() if name.lower() in TIME_NAMES and x.dtype.kind in "fiumM"), None)
@@ -115,14 +114,6 @@ def read_raw(source: Source) -> RawFile:
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES), remarks)
-
-
-def _check_record_numbers(columns: dict[str, Column], source: Source) -> None:
-    """ReadError if a column "record" holds texts: without their numbers all records would be read as one."""
-    for name, column in columns.items():
-        if name.strip().lower() == "record" and column.dtype.kind in "OUST" and len(column):
-            problem = f"it holds {kind_of(column.dtype)}, such as {str(column[:1][0])[:60]!r}"
-            raise source.error(f"column {name!r}", problem, "Write the numbers of the records as whole numbers")
 
 
 def _differing_copies(

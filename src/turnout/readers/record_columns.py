@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.channel_maps import kind_of
 from turnout.readers.lazy import Column
 from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import COPY_AGAIN, Source
@@ -59,18 +60,26 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     Raises
     ------
     ReadError
-        If a column "record" does not number every row.
+        If a column "record" holds texts or does not number every row: all records would be read as one.
     """
-    names = [name for name, column in columns.items() if may_number_records(name) and column.dtype.kind in "fiu"]
-    for name in sorted(names, key=lambda name: name.strip().lower() != "record"):
-        numbers = _signed_numbers(columns[name])
-        if name.strip().lower() == "record":
-            if not np.isfinite(numbers).all():
-                raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
-            return name
-        if _numbers_blocks(numbers):
+    names = [name for name in columns if may_number_records(name)]
+    for name in sorted(names, key=lambda name: not _is_record(name)):
+        column = columns[name]
+        if _is_record(name) and column.dtype.kind in "OUST" and len(column):
+            problem = f"it holds {kind_of(column.dtype)}, such as {str(column[:1][0])[:60]!r}"
+            raise source.error(f"column {name!r}", problem, "Write the numbers of the records as whole numbers")
+        if column.dtype.kind not in "fiu":
+            continue
+        numbers = _signed_numbers(column)
+        if _is_record(name) and not np.isfinite(numbers).all():
+            raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
+        if _is_record(name) or _numbers_blocks(numbers):
             return name
     return None
+
+
+def _is_record(name: str) -> bool:
+    return name.strip().lower() == "record"
 
 
 def _signed_numbers(numbers: Column) -> np.ndarray:

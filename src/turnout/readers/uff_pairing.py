@@ -229,7 +229,7 @@ def _check_repeats(
     copies = {key: _copies([group.get(key) for group in groups]) for key in channels}
     for key, of_channel in copies.items():
         for k, first in of_channel.items():
-            if partner := next((c for c in groups[k] if copies[c].get(k) != first and c in groups[first]), None):
+            if partner := next((c for c in groups[k] if copies[c].get(k) != first), None):
                 problem = (
                     f"set {k + 1} of channel {channel_name(key)!r} repeats set {first + 1}, and set {k + 1} of channel "
                     f"{channel_name(partner)!r} does not; neither numbers, times nor nodes say which belong together"

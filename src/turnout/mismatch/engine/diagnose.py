@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.mismatch.engine.component_laws import evidence_of_any, local_changes, local_deviations
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
     COMPONENT_UNUSUAL,
@@ -22,7 +23,6 @@ from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
-from turnout.mismatch.engine.local_changes import evidence_of_any, local_changes, local_deviations
 from turnout.mismatch.engine.localization import Location, locate, locate_component, location_of_ambiguity
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates

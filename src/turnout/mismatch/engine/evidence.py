@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.mismatch.engine.channel_levels import loud_recording, worst_channel_excess
+from turnout.mismatch.engine.component_laws import evidence_of_any, local_changes, local_deviations
 from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.fit_quality import is_significantly_worse, lost_evidence
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
-from turnout.mismatch.engine.local_changes import evidence_of_any, local_changes, local_deviations
 from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.strained_values import strained_value

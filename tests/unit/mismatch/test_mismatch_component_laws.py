@@ -9,15 +9,15 @@ from scipy.stats import multivariate_normal
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.component_spread import spread_of_others
-from turnout.mismatch.engine.diagnose import diagnose, grade_names
-from turnout.mismatch.engine.findings import Findings
-from turnout.mismatch.engine.local_changes import (
+from turnout.mismatch.engine.component_laws import (
     evidence_by_position,
     evidence_of_any,
     local_changes,
     local_deviations,
 )
+from turnout.mismatch.engine.component_spread import spread_of_others
+from turnout.mismatch.engine.diagnose import diagnose, grade_names
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
