@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from contextlib import ExitStack
 from datetime import datetime
 from pathlib import Path
 
@@ -92,9 +93,10 @@ def test_two_units_that_kill_their_processes_cost_no_third_one(fleet, threads):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_job_killed_as_a_whole_night_after_night_condemns_no_unit(fleet, threads):
+    """Each of the two kills one night beside others and one alone; after these four nights the others are known."""
     fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
     fleet.put("t5/2024-05-13/A_1.txt", "kills the job")
-    for _ in range(4):
+    for _ in range(2 * 2 + 1):
         assert night(fleet, threads=threads) < 0
     assert statuses(fleet) == dict.fromkeys([UNITS[i] for i in (0, 1, 3, 4)], "ok")
     (complaint,) = judge([fleet.state], fleet.configuration).complaints
@@ -119,6 +121,26 @@ def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun
     for _ in range(2):
         assert night(fleet) < 0
     assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[2]], "ok")
+
+
+def test_those_begun_beside_two_that_end_their_job_are_known_when_each_has_ended_one_night_alone(fleet):
+    """The slowest order: both that end the job were begun before the two beside them."""
+    for i in (2, 5):
+        fleet.put(f"t{i}/2024-05-13/A_1.txt", "kills the job")
+    child = os.fork()
+    if child == 0:
+        with ExitStack() as marks:
+            for i in (2, 5, 3, 4):
+                marks.enter_context(mark_started(fleet.state, UNITS[i], "then"))
+                time.sleep(0.02)  # marks of one clock tick are in no order
+            os._exit(0)
+    os.waitpid(child, 0)
+    assert list(started_units(fleet.state)) == [UNITS[i] for i in (2, 5, 3, 4)]
+    known = []
+    for _ in range(3):
+        assert night(fleet) < 0
+        known.append(sorted(statuses(fleet)))
+    assert known == [[UNITS[i] for i in (0, 1)], [UNITS[i] for i in (0, 1)], [UNITS[i] for i in (0, 1, 3, 4)]]
 
 
 def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
