@@ -266,7 +266,8 @@ class Assignments:
         aliases = () if is_named else record.aliases
         if self._stated[0] is not record.entries:
             self._stated = record.entries, self._stated_of(record)
-        return record.names, record.units, aliases, tuple(record.undecided.items()), self._stated[1]
+        open_scales = tuple(record.undecided.items()), tuple(record.unit_conflicts.items())
+        return record.names, record.units, aliases, open_scales, self._stated[1]
 
     def _stated_of(self, record: RawRecord) -> tuple:
         """What the entries of a record state about units, quantities and sensitivities."""

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 
+from turnout.errors import ReadError
 from turnout.readers.lazy import Column
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
-from turnout.readers.stated_scales import remedy as scale_remedy
 from turnout.readers.stated_sensitivities import sensitivity_problem
 from turnout.readers.stated_units import contradicting_unit, is_meaningless
 from turnout.records import RawChannel
@@ -51,9 +51,8 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
     except ValueError as error:
         remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
-    if (statement := record.undecided.get(index)) and not is_overruled:
-        remedy = FIND_OUT if "'unit: " in statement else scale_remedy(file_unit)
-        raise source.error(place, statement, remedy, reason="scale_unknown")
+    if (scale_error := undecided_error(record, index, place, source)) and not is_overruled:
+        raise scale_error
     if not is_overruled:
         _check_stated_units(record, index, raw, place, source)
     if raw.sensitivity is not None and not is_overruled:
@@ -64,6 +63,41 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
     if record.audio and not is_overruled:
         _check_full_scale(record, index, raw.unit or "", place, source)
     return conversion_to_si
+
+
+def undecided_error(record: RawRecord, index: int, place: str, source: Source) -> ReadError | None:
+    """The error of a channel of which the file itself leaves the scale open, unless the layout decides.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    index : int
+        Number of the row, from 0.
+    place : str
+        Record and channel, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    ReadError or None
+        About a scale that may be applied already, or about two units that contradict each other.
+    """
+    if statement := record.undecided.get(index):
+        return source.error(place, statement, _scale_remedy(record.units[index]), reason="scale_unknown")
+    if statement := record.unit_conflicts.get(index):
+        return source.error(place, statement, FIND_OUT, reason="scale_unknown")
+    return None
+
+
+def _scale_remedy(unit: str) -> str:
+    """What to do about a scale of which nothing says whether it was applied, in a file that states ``unit``."""
+    label = unit.strip() or "N"
+    return (
+        f"Find out in the logger's manual whether its numbers already contain it; if they do, set unit: '{label}!' for "
+        f"this channel in the layout, else the value of one step, such as unit: '0.4 {label}!'"
+    )
 
 
 def _check_full_scale(record: RawRecord, index: int, unit: str, place: str, source: Source) -> None:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.rate_units import hertz_of
 from turnout.readers.source import Source, load
+from turnout.readers.stated_units import is_meaningless
 from turnout.readers.uff import FREQUENCY_RESPONSE, TIME_RESPONSE, read_frf
 from turnout.readers.uff_datasets import read_datasets
 
@@ -24,6 +26,7 @@ REAL = re.compile(r"(?<![a-z])(real|realteil|reell|réel|reel|re)(?![a-z])", re.
 IMAGINARY = re.compile(r"(?<![a-z])(imag\w*|imaginär\w*|im)(?![a-z])", re.IGNORECASE)
 MAGNITUDE = re.compile(r"(?<![a-z])(mag|magn\w*|abs|ampl?\w*|betrag|module)(?![a-z])", re.IGNORECASE)
 PHASE = re.compile(r"(?<![a-z])(phas\w*|angle|winkel)(?![a-z])", re.IGNORECASE)
+IN_UNIT = re.compile(r"(?:freq|frek|fréq)\w*\s*(?:in\s+|[\[(])([^\])\s,;]+)", re.IGNORECASE)  # "frequency in kHz"
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 UNSIGNED = NUMBER.removeprefix("[+-]?")
 COMPLEX = re.compile(
@@ -152,7 +155,7 @@ def _of_text(source: Source) -> FrequencyResponses | None:
     for separator in SEPARATORS:
         table = _table(lines, separator)
         if table is not None:
-            return _responses_of_table(*table)
+            return _responses_of_table(*table, source)
     return None
 
 
@@ -183,10 +186,15 @@ def _table(lines: Sequence[str], separator: str | None) -> tuple[list[str], list
     if len(rows) < MIN_LINES or not np.all(np.diff(np.array([row[0].real for row in rows])) > 0.0):
         return None
     above = list(lines[:first])
-    titles = next((
-        cells for line in reversed(above[-3:])
-        if len(cells := [c.strip().strip('"') for c in line.strip().split(separator) if c.strip()]) == len(rows[0])
-    ), [])  # fmt: skip
+    cells_above = [[c.strip().strip('"') for c in line.strip().split(separator) if c.strip()] for line in above[-3:]]
+    cells_above = [cells for cells in cells_above if len(cells) == len(rows[0])]
+    titles = next((cells for cells in reversed(cells_above) if FREQUENCY_WORD.search(cells[0])), [])
+    titles = titles or next(reversed(cells_above), [])
+    units = cells_above[-1] if cells_above and hertz_of(cells_above[-1][0]) else []
+    if units and titles is units and len(cells_above) > 1:
+        titles = cells_above[-2]
+    if units and titles is not units:  # a line of units below that of the titles
+        titles = [f"{title} [{unit.strip('[]() ')}]" for title, unit in zip(titles, units)]
     return above, titles, np.array(rows, dtype=complex)
 
 
@@ -206,13 +214,16 @@ def _number(cell: str, separator: str | None) -> complex | None:
         return None
 
 
-def _responses_of_table(above: Sequence[str], titles: Sequence[str], numbers: np.ndarray) -> FrequencyResponses | None:
+def _responses_of_table(
+    above: Sequence[str], titles: Sequence[str], numbers: np.ndarray, source: Source
+) -> FrequencyResponses | None:
     """Responses of a table of text by its title cells, or by the lines above it where the columns have no titles."""
     n_column = numbers.shape[1]
     if titles and not FREQUENCY_WORD.search(titles[0]):
         return None
     names = list(titles) or [""] * n_column
     words = " ".join(above)
+    scale = _hertz_per_number(titles[0] if titles else "".join(IN_UNIT.findall(words)[:1]), source)
     rows: list[np.ndarray] = []
     used: list[str] = []
     k = 1
@@ -222,11 +233,13 @@ def _responses_of_table(above: Sequence[str], titles: Sequence[str], numbers: np
         if np.any(column.imag):
             rows.append(column)
             k += 1
-        elif following is not None and REAL.search(pair) and IMAGINARY.search(pair):
-            rows.append(column.real + 1j * following.real)
+        elif following is not None and (real := REAL.search(pair)) and (imaginary := IMAGINARY.search(pair)):
+            parts = (column, following) if real.start() < imaginary.start() else (following, column)
+            rows.append(parts[0].real + 1j * parts[1].real)
             k += 2
-        elif following is not None and PHASE.search(pair) and MAGNITUDE.search(pair):
-            rows.append(_magnitude(column.real, pair) * np.exp(1j * _phase(following.real, pair)))
+        elif following is not None and (phase := PHASE.search(pair)) and (magnitude := MAGNITUDE.search(pair)):
+            parts = (column, following) if magnitude.start() < phase.start() else (following, column)
+            rows.append(_magnitude(parts[0].real, pair) * np.exp(1j * _phase(parts[1].real, pair)))
             k += 2
         else:
             k += 1
@@ -235,7 +248,20 @@ def _responses_of_table(above: Sequence[str], titles: Sequence[str], numbers: np
     if not rows:
         return None
     labels = tuple(name or f"response {i + 1}" for i, name in enumerate(used))
-    return FrequencyResponses(numbers[:, 0].real.copy(), np.array(rows), labels, tuple(map(_unit, labels)), "csv")
+    frequency = scale * numbers[:, 0].real
+    return FrequencyResponses(frequency, np.array(rows), labels, tuple(map(_unit, labels)), "csv")
+
+
+def _hertz_per_number(title: str, source: Source) -> float:
+    """Hertz of one unit of the column of frequencies, by its title: in brackets or its last word; else 1."""
+    in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", title)
+    unit = in_brackets[-1] if in_brackets else re.split(r"[\s_,]+", title.strip())[-1]
+    scale = hertz_of(unit)
+    if scale is None and in_brackets and not is_meaningless(unit):
+        problem = f"the title of the frequencies is {title[:60]!r}, and {unit[:20]!r} is no unit of a frequency"
+        remedy = "Export frequency responses with their frequencies in Hz, kHz, rad/s or rpm"
+        raise source.error("the line of titles", problem, remedy, reason="wrong_rate")
+    return 1.0 if scale is None else scale
 
 
 def _magnitude(values: np.ndarray, title: str) -> np.ndarray:
@@ -244,7 +270,9 @@ def _magnitude(values: np.ndarray, title: str) -> np.ndarray:
 
 def _phase(values: np.ndarray, title: str) -> np.ndarray:
     """Phase in radians; without a unit, numbers over more than two turns of a radian are degrees."""
-    is_degree = bool(re.search(r"deg|°|grad", title, re.IGNORECASE)) or np.ptp(values) > 4.0 * np.pi
+    is_degree = bool(re.search(r"deg|°|grad", title, re.IGNORECASE))
+    if not is_degree and not re.search(r"(?<![a-z])rad", title, re.IGNORECASE):
+        is_degree = np.ptp(values) > 4.0 * np.pi
     return np.radians(values) if is_degree else values
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistics, channel_error
 from turnout.readers.channel_maps import Assignments, ChannelMapping
+from turnout.readers.channel_units import undecided_error
 from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import is_single, lost_entry_errors
 from turnout.readers.missing_codes import count_alone, missing_code
@@ -23,7 +24,6 @@ from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples
-from turnout.readers.stated_scales import remedy as scale_remedy
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import LongRecording, RawDescription, Recording
@@ -152,11 +152,11 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     reported: set[tuple[str, str]] = set()
     for k, record in records:
         fills = fill_values(record.entries, record.names)
-        for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
+        for i, (name, column) in enumerate(zip(record.names, record.samples)):
             where = f"record {k + 1} of {len(raw.records)}, channel {name!r}"
-            if (statement := record.undecided.get(i)) and (name, "scale") not in reported:
+            if (error := undecided_error(record, i, where, source)) and (name, "scale") not in reported:
                 reported.add((name, "scale"))
-                yield source.error(where, statement, scale_remedy(unit), reason="scale_unknown")
+                yield error
             if (name, "samples") not in reported and (n := _missing_count(column, fills[i])):
                 reported.add((name, "samples"))
                 problem = "1 sample is missing" if n == 1 else f"{n} samples are missing"

@@ -1,5 +1,6 @@
 """Units of rates and time steps, and the words of a name without case, accents and punctuation."""
 
+import math
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -79,6 +80,36 @@ def rate_unit(text: str) -> RateUnit | None:
     if SAMPLES.fullmatch(under) and over in TIME_UNITS:
         return RateUnit(True, TIME_UNITS[over], True)
     return None
+
+
+PER_MINUTE = re.compile(r"rpm|cpm|u/min|1/min|min\^?-1|min⁻¹")
+RADIANS_PER_SECOND = re.compile(r"rad(?:ians?)?\s*(?:/|per|\s)\s*s(?:ec(?:ond)?)?|rad s(?:\^?-1|⁻¹)")
+
+
+def hertz_of(unit: str) -> float | None:
+    """Hertz of one unit of a frequency.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it is written, without its number.
+
+    Returns
+    -------
+    float or None
+        None for a unit that is none of a frequency.
+
+    Examples
+    --------
+    >>> hertz_of("kHz"), hertz_of("rpm") == 1 / 60, round(hertz_of("rad/s"), 4), hertz_of("ms"), hertz_of("order")
+    (1000.0, True, 0.1592, None, None)
+    """
+    known, plain = rate_unit(unit), unit.strip("[](){} .").casefold()
+    if known is not None:
+        return None if known.is_step or known.is_sampling else float(known.scale)
+    if RADIANS_PER_SECOND.fullmatch(plain):
+        return 1.0 / (2.0 * math.pi)
+    return 1.0 / 60.0 if PER_MINUTE.fullmatch(plain) else None
 
 
 @lru_cache(maxsize=4096)

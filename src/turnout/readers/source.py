@@ -206,7 +206,8 @@ class RawRecord:
     unless ``is_time_in_seconds`` is False: then its unit is not stated; ``time_label`` is its name, with the unit as it
     is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which axes of time
     stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
-    ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied.
+    ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied;
+    ``unit_conflicts`` are statements about units of channels that contradict each other, by index.
     ``not_numbers`` are variables without real numbers, name -> what they hold, for messages about missing channels.
     ``audio`` is "whole" for an audio file of whole numbers, which are fractions of full scale, "floating" for one of
     floating-point numbers, which may be none, and "" for any other file.
@@ -227,6 +228,7 @@ class RawRecord:
     clocks: tuple[tuple[str, np.ndarray], ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
+    unit_conflicts: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     audio: str = ""
     not_numbers: Mapping[str, str | UnreadObject] = field(default_factory=lambda: EMPTY_MAPPING)
 

@@ -314,23 +314,3 @@ def scale_problem(statement: str) -> str:
         The problem; "" for "".
     """
     return f"the file states {statement}, and nothing says whether its numbers already contain it" if statement else ""
-
-
-def remedy(unit: str) -> str:
-    """What to do about a scale of which nothing says whether it was applied.
-
-    Parameters
-    ----------
-    unit : str
-        Unit that the file states, "" without one.
-
-    Returns
-    -------
-    str
-        The advice, without its full stop.
-    """
-    label = unit.strip() or "N"
-    return (
-        f"Find out in the logger's manual whether its numbers already contain it; if they do, set unit: '{label}!' for "
-        f"this channel in the layout, else the value of one step, such as unit: '0.4 {label}!'"
-    )

@@ -14,7 +14,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text, step_entry
 from turnout.readers.lazy import Column, LazyColumn
-from turnout.readers.rate_units import rate_unit
+from turnout.readers.rate_units import hertz_of, rate_unit
 from turnout.readers.record_columns import missing_record
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, load, number_or_text
 from turnout.readers.stated_quantities import DEFINED_NAME
@@ -207,7 +207,8 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,
         aliases=aliases,
-        undecided={i: text for i, s in enumerate(sets) if (text := _undecided_scale(s, stated_units))},
+        undecided={i: text[0] for i, s in enumerate(sets) if (text := entry_statements(_entries([s]), [""]))},
+        unit_conflicts={i: text for i, s in enumerate(sets) if (text := _unit_conflict(s.labels[1], stated_units))},
     )
 
 
@@ -248,11 +249,9 @@ def _unit(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
     return next((u for u, (s, _) in candidates.items() if abs(s / scale - 1.0) < FACTOR_PRECISION), f"{scale:.9g} {si}")
 
 
-def _undecided_scale(dataset: UffDataset, stated_units: FileUnits | None) -> str:
-    """What a set states about its scale and nothing settles: in its ID lines, or by a label that dataset 164 denies."""
-    if of_ids := entry_statements(_entries([dataset]), [""]):
-        return of_ids[0]
-    data_type, title, label = dataset.labels[1]
+def _unit_conflict(axis: tuple[int, str, str], stated_units: FileUnits | None) -> str:
+    """The label of an axis and the unit of dataset 164 if they contradict each other, else ""."""
+    data_type, title, label = axis
     of_file = "" if _is_blank(label) else _unit((data_type, title, ""), stated_units)
     written, stated = known_unit(label), known_unit(of_file)
     if not written or not stated or written.dimension != stated.dimension:
@@ -351,7 +350,7 @@ def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyRespo
             raise source.error(f"byte {dataset.offset}", dataset.damage, COPY_AGAIN, reason="truncated")
     if not sets:
         raise source.error("the file", "it holds no frequency response (function type 4)", "Export frequency responses")
-    axes = [s.x if s.x is not None else s.start + s.step * np.arange(len(s.data)) for s in sets]
+    axes = [_frequency_axis(s, source) for s in sets]
     if any(len(axis) != len(axes[0]) or not np.allclose(axis, axes[0], rtol=1e-6) for axis in axes):
         raise source.error(
             "the file", "its frequency responses have different frequencies", "Export them to one file each"
@@ -366,7 +365,22 @@ def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyRespo
     )
 
 
+def _frequency_axis(dataset: UffDataset, source: Source) -> np.ndarray:
+    """Frequencies of a set [Hz] by the label of its abscissa; without one they are in Hz."""
+    label = dataset.labels[0][2]
+    scale = 1.0 if is_meaningless(label) or _is_blank(label) else hertz_of(label)
+    if scale is None:
+        problem = f"the unit of its abscissa is {label!r}, which is none of a frequency"
+        remedy = "Export frequency responses with their frequencies in Hz, kHz, rad/s or rpm"
+        raise source.error(f"byte {dataset.offset}", problem, remedy, reason="wrong_rate")
+    axis = dataset.x if dataset.x is not None else dataset.start + dataset.step * np.arange(len(dataset.data))
+    return scale * axis
+
+
 def _frf_unit(dataset: UffDataset, stated_units: FileUnits | None) -> str:
+    """Unit of a frequency response; where its labels and dataset 164 contradict each other, what they say."""
+    if conflicts := [text for axis in dataset.labels[1:3] if (text := _unit_conflict(axis, stated_units))]:
+        return f"not known: {conflicts[0].partition(' (')[0]}"
     numerator, denominator = (_unit(axis, stated_units) for axis in dataset.labels[1:3])
     return numerator if not denominator or "/N" in numerator else f"({numerator})/({denominator})"
 

@@ -99,3 +99,83 @@ def test_responses_that_cannot_be_evaluated_say_why(frequency, frf, words, tmp_p
     np.savez(tmp_path / "a.npz", frequency=frequency, h=frf.astype(complex))
     with pytest.raises(ReadError, match=words):
         check_evaluable(find_responses("a.npz", tmp_path), "a.npz")
+
+
+UNITS = {"Hz": 1.0, "kHz": 1e-3, "rad/s": 2.0 * np.pi, "rpm": 60.0, "1/min": 60.0}
+PLACES = ("Frequency [{}];Real;Imag", "Freq in {};Real;Imag", "Frequency;Real;Imag\n{};m/s²/N;m/s²/N",
+          "Real, imaginary part over frequency in {}")  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("head", PLACES)
+def test_frequencies_of_a_text_are_in_the_unit_that_it_states(head, unit, tmp_path):
+    rows = [";".join((f"{UNITS[unit] * f:.12g}", *cells(h))) for f, h in zip(F, H)]
+    (tmp_path / "a.csv").write_text("\n".join((head.format(unit), *rows)) + "\n", encoding="utf-8")
+    assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F, rel=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["ms", "order", "V"])
+def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
+    rows = [";".join((f"{f}", *cells(h))) for f, h in zip(F, H)]
+    (tmp_path / "a.csv").write_text("\n".join((f"Frequency [{unit}];Real;Imag", *rows)) + "\n")
+    with pytest.raises(ReadError, match=f"'{unit}' is no unit of a frequency") as error:
+        find_responses("a.csv", tmp_path)
+    assert error.value.reason == "wrong_rate"
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("Frequency [Hz];Imag;Real", lambda h: (h.imag, h.real)),
+        ("Frequency [Hz];Phase [rad];Magnitude", lambda h: (np.angle(h), abs(h))),
+        ("Frequency [Hz];Magnitude;Phase [rad]", lambda h: (abs(h), np.angle(h))),
+    ],
+)
+def test_the_titles_say_which_column_of_a_pair_is_which_and_what_a_phase_is(head, row, tmp_path):
+    """A phase in radians that is continued over several turns is none in degrees."""
+    values = H / np.abs(H).max()
+    turns = np.arange(len(F)) // 100
+    lines = [row(h) for h in values]
+    if head.endswith("Phase [rad]"):
+        lines = [(a, np.angle(h) - 2.0 * np.pi * n) for (a, _), h, n in zip(lines, values, turns)]
+    text = "".join(f"{f};{a:.12e};{b:.12e}\n" for f, (a, b) in zip(F, lines))
+    (tmp_path / "a.csv").write_text(f"{head}\n{text}")
+    assert find_responses("a.csv", tmp_path).frf[0] == pytest.approx(values, rel=1e-7)
+
+
+def write_function(path, abscissa, ordinate, code=1, scale=1.0):
+    """A Universal File of one frequency response, with data set 164 of SI or of mm and mN (5)."""
+    step, (size, n) = scale * (F[1] - F[0]), ((1000.0, len(F)) if code == 5 else (1.0, len(F)))
+    axes = [(18, abscissa), (12, ordinate), (13, "NONE"), (0, "NONE")]
+    lines = [
+        "    -1", "   164", f"{code:10d}{'units':20}{2:10d}", f"{size:25.17E}{size:25.17E}{1.0:25.17E}",
+        f"{273.15:25.17E}", "    -1", "    -1", "    58", "rail", "NONE", "NONE", "NONE", "NONE",
+        f"{4:5d}{0:10d}{1:5d}{0:10d} {'NONE':10}{1:10d}{3:4d} {'NONE':10}{1:10d}{3:4d}",
+        f"{6:10d}{n:10d}{1:10d}{scale * F[0]:13.5E}{step:13.5E}{0.0:13.5E}",
+        *(f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':20} {label:20}" for kind, label in axes),
+        *(f"{a.real:20.11E}{a.imag:20.11E}{b.real:20.11E}{b.imag:20.11E}" for a, b in zip(H[::2], H[1::2])),
+        "    -1", "",
+    ]  # fmt: skip
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_frequencies_of_a_universal_file_are_in_the_unit_of_their_label(unit, tmp_path):
+    write_function(tmp_path / "a.uff", unit, "m/s²", scale=UNITS[unit])
+    found = find_responses("a.uff", tmp_path)
+    assert found.frequency == pytest.approx(F, rel=1e-4) and found.frf[0] == pytest.approx(H, rel=1e-9)
+    write_function(tmp_path / "a.uff", "s", "m/s²")
+    with pytest.raises(ReadError, match="the unit of its abscissa is 's', which is none of a frequency"):
+        find_responses("a.uff", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("code", "label", "unit"), [
+        (1, "m/s²", "(m/s²)/(N)"), (5, "NONE", "(mm/s²)/(mN)"),
+        (1, "g", "not known: its label says 'g', data set 164 of the file 'm/s²'"),
+        (5, "m/s²", "not known: its label says 'm/s²', data set 164 of the file 'mm/s²'"),
+    ],
+)  # fmt: skip
+def test_a_label_of_a_frequency_response_that_dataset_164_denies_is_no_unit(code, label, unit, tmp_path):
+    write_function(tmp_path / "a.uff", "Hz", label, code)
+    assert find_responses("a.uff", tmp_path).units == (unit,)

@@ -14,6 +14,7 @@ from turnout.readers.uff import read_frf
 from turnout.readers.uff_datasets import read_datasets
 from turnout.readers.writing import write
 from turnout.records import Channel, RawChannel, RawDescription, Recording
+from turnout.stages.file_contents import file_contents
 
 VENDORS = (
     "Sample_UFF58_ascii.uff",
@@ -403,6 +404,8 @@ def test_a_label_that_dataset_164_denies_is_reported(code, length, force, label,
         assert [e.reason for e in result.errors] == [] and len(result.recordings) == 2
         return
     assert f"its label says {label!r}, data set 164 of the file {stated!r}" in str(result.errors[0])
+    (without_layout,) = file_contents(tmp_path / "a.uff").problems
+    assert "Find out which is right" in without_layout and "Find out which is right" in str(result.errors[0])
     overruled = (sensors[0], RawChannel("rail", "rail", "acceleration", unit="m/s²!"))
     assert read("a.uff", tmp_path, RawDescription(overruled)).recordings[0].samples[1] == pytest.approx(
         samples[1], rel=1e-5
