@@ -64,7 +64,9 @@ def columns_in_memory(
         try:
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
             if not table.column(0).null_count:  # an empty line is a row without values
-                return _columns_of(table, *context), ()
+                columns = _columns_of(table, *context)
+                _check_summary(columns, line + 1, source)
+                return columns, ()
         except pa.ArrowInvalid:
             pass
         try:
@@ -75,14 +77,17 @@ def columns_in_memory(
                 raise
             table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
     _check_one_block(data, offset, end, source)
-    return _columns_of(table, *context), _footer_entries(data, end, len(data), separator, names)
+    columns = _columns_of(table, *context)
+    _check_summary(columns, line + 1, source)
+    return columns, _footer_entries(data, end, len(data), separator, names)
 
 
 def _footer_entries(
     data: bytes | mmap, start: int, end: int, separator: str, names: Sequence[str]
 ) -> tuple[Entry, ...]:
-    """Entries of the lines of text below the numbers."""
+    """Entries of the lines of text below the numbers; statistics of the columns are none."""
     below = [decode_line(text) for text in data[start:end].splitlines()]
+    below = ["" if STATISTICS.match(line) else line for line in below]
     return tuple(entries_of_lines(below, separator, names, line_number(data, start) + 1)) if below else ()
 
 
@@ -100,25 +105,58 @@ def _columns_of(
 
 
 MAX_FOOTER_LINES = 20
+# The first word of a line with a statistic of each column, below the samples.
+STATISTICS = re.compile(
+    r"\W*(?:(?:abs(?:olute?)?|arithm\w*|std|standard|root)[ .-]*)?"
+    r"(?:min(?:im(?:um|a|o|al\w*))?|max(?:im(?:um|a|o|al\w*))?|mean|avg|average|median|rms|std|stdev|sd|var(?:iance)?"
+    r"|sum(?:me|m)?|peak|dev(?:iation)?|mittel(?:wert)?|durchschnitt|effektivwert|standardabweichung|moyenne"
+    r"|écart[ -]type|middelværdi|gennemsnit|medelvärde|gemiddelde|media|σ|µ|μ|Ø)(?:[ -]?(?:value|wert|val))?"
+    r"\W*(?:[;,\t|:=]|$)",
+    re.IGNORECASE,
+)
 
 
 def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) -> int:
     """Byte at which lines of words begin that end the text, as "End of data"; ``end``, its own end, without one.
 
-    A line with a number in one of its cells is a row of samples with an error in it, never a footer.
+    A line with a number in one of its cells is a row of samples with an error in it, unless it begins with the word
+    for a statistic, as "Max;2000;90".
     """
     number = re.compile(rb'"?[-+]?[.,]?\d[\d.,eE+-]*"?')
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
         line = data[start:end].strip()
-        if line and not re.match(rb'["#]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
+        if line and not re.match(rb'["#;,\t|]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
             break
-        if any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:]):
+        has_number = any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:])
+        if has_number and not STATISTICS.match(decode_line(line)):
             break
         end = start
         if start <= offset:
             break
     return end
+
+
+N_SUMMARY_ROWS = 6  # rows at the end, among which those of the least and the largest numbers are looked for
+
+
+def _check_summary(columns: Sequence[Column], first_line: int, source: Source) -> None:
+    """ReadError if a row at the end holds the least, and one the largest number that each column has above it.
+
+    No other row does, as that of a periodic signal would. The first row is in line ``first_line``.
+    """
+    numbers = [np.asarray(column[:]) for column in columns if column.dtype.kind == "f"]
+    first = len(columns[0]) - N_SUMMARY_ROWS if columns else 0  # of the rows at the end
+    if len(numbers) < 2 or first <= N_SUMMARY_ROWS:
+        return
+    summaries = []
+    for extreme in (np.min, np.max):
+        is_extreme = np.logical_and.reduce([column == extreme(column[:first]) for column in numbers])
+        summaries.append(np.flatnonzero(is_extreme))
+    if all(len(rows) == 1 and rows[0] >= first for rows in summaries):
+        line = first_line + int(min(rows[0] for rows in summaries))
+        problem = "from here on rows hold the least and the largest number of each column: they are a summary"
+        raise source.error(f"line {line}", problem, "Delete the rows that are no samples", reason="wrong_length")
 
 
 def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) -> None:

@@ -20,10 +20,12 @@ START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
     r"|acqui|erfass|optag|maling|timestamp|zeitstempel|horodat|datetime|^date$|^dato$|^datum$|^time$|^zeit$|^fecha$"
 )
-# Times of other events.
+# Times of other events, and what is written about the recording.
 OTHER = re.compile(
     r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
     r"|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
+    r"|^not[ae]s?$|notiz|remar[kq]|comment|komment|bemerk|bemaerk|anmerk|anmark|opmerk|poznam|descri|beschreib"
+    r"|maint|wartung|^tamp|stopf|grind|schleif|repair|repar|replac|ersetz|renew|erneuer"
 )
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
 TIME_WORD = re.compile(r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|started|begun|recorded")

@@ -87,3 +87,23 @@ def test_the_date_of_another_event_is_no_start(tmp_path):
 def test_a_zone_in_the_name_of_the_column_is_that_of_the_start(tmp_path, name):
     raw = record(tmp_path, [f"{name};force [N];rail [m/s2]"], [f"2026-05-13 {clock}" for clock in CLOCKS])
     assert raw.started_at == START.replace(tzinfo=UTC)
+
+
+REMARKS = ("note", "Remark", "Bemerkung", "Comment", "Kommentar zur Messung", "Recording note", "Remarque", "tamped on")
+
+
+@pytest.mark.parametrize("name", REMARKS)
+def test_a_dated_remark_is_no_start(tmp_path, name):
+    head = [f"{name};2026-05-12 09:00:00", "time;force [N];rail [m/s2]"]
+    raw = record(tmp_path, head, [f"{k / RATE}" for k in range(N)])
+    assert raw.started_at is None and not raw.unread_start
+    rows = [f"{a};{b};2026-05-12 09:00:00" for a, b in NUMBERS]
+    (tmp_path / "c.csv").write_text("\n".join([f"force [N];rail [m/s2];{name}", *rows]) + "\n", encoding="utf-8")
+    (raw,) = next(part for part in read_unconverted("c.csv", tmp_path) if hasattr(part, "records")).records
+    assert raw.started_at is None and not raw.unread_start
+
+
+def test_a_time_stamp_is_no_remark(tmp_path):
+    """Its word contains that for tamping."""
+    head = ["Timestamp;2026-05-12 09:00:00", "time;force [N];rail [m/s2]"]
+    assert record(tmp_path, head, [f"{k / RATE}" for k in range(N)]).started_at == datetime(2026, 5, 12, 9)

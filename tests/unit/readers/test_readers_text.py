@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from turnout.errors import ReadError
-from turnout.readers import FORMATS, read
+from turnout.readers import FORMATS, read, read_unconverted
 from turnout.records import RawChannel, RawDescription
 
 RATES = (44100, 65536, 48000, 30000, 16384, 12000, 51200, 20000)
@@ -589,3 +589,44 @@ def test_a_column_of_words_is_named(separator, word, tmp_path):
         read("a.csv", tmp_path, NAMED)
     expected = f"a.csv, line 52, column 'valid': {word!r} is no number, and no row holds only numbers, dates and times"
     assert str(caught.value).startswith(expected) and "states such as TRUE and FALSE as 1 and 0" in caught.value.remedy
+
+
+SUMMARIES = {
+    "a label in the first cell": "Min;{0}\nMax;{1}\nMean;0.1;0.2\n",
+    "a label in a cell of its own": "Minimum;;{0}\nMaximum;;{1}\n",
+    "a heading": "Statistics\nMittelwert;0.1;0.2\nStd. dev.;1.1;0.9\n",
+    "quoted": '"RMS";"1.1";"0.9"\n',
+    "signs": "Ø;0.1;0.2\nσ;1.1;0.9\n",
+}
+
+
+@pytest.mark.parametrize("summary", SUMMARIES.values(), ids=list(SUMMARIES))
+@pytest.mark.parametrize("is_lazy", [False, True])
+def test_statistics_below_the_samples_are_none_of_them(summary, is_lazy, tmp_path):
+    numbers = np.random.default_rng(4).normal(size=(60, 2)).round(6)
+    rows = "".join(f"{a};{b}\n" for a, b in numbers)
+    least, largest = (f"{x[0]};{x[1]}" for x in (numbers.min(axis=0), numbers.max(axis=0)))
+    (tmp_path / "a.csv").write_text("force;rail\n" + rows + summary.format(least, largest), encoding="utf-8")
+    _, _, raw = read_unconverted("a.csv", tmp_path, is_lazy=is_lazy)
+    assert [list(column[:]) for column in raw.records[0].samples] == [list(x) for x in numbers.T]
+    assert not any(entry.name.casefold() in ("min", "max") for entry in raw.records[0].entries)
+
+
+def test_a_damaged_row_at_the_end_is_no_statistic(tmp_path):
+    rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(4).normal(size=(60, 2)))
+    for row in ("maxwell;0.1;0.2\n", "m;0.1\n", "0.1;max\n"):
+        (tmp_path / "a.csv").write_text("force;rail\n" + rows + row)
+        with pytest.raises(ReadError, match="line 62"):
+            read_unconverted("a.csv", tmp_path)
+
+
+def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path):
+    numbers = np.random.default_rng(4).normal(size=(60, 2)).round(6)
+    rows = [*numbers, numbers.mean(axis=0), numbers.max(axis=0), numbers.min(axis=0)]
+    for order, line in ((rows, 63), (rows[:-1], None), (rows[:60], None)):
+        (tmp_path / "a.csv").write_text("force;rail\n" + "".join(f"{a};{b}\n" for a, b in order))
+        if line is None:
+            assert read_unconverted("a.csv", tmp_path)
+            continue
+        with pytest.raises(ReadError, match=f"line {line}: from here on rows hold the least and the largest"):
+            read_unconverted("a.csv", tmp_path)
