@@ -7,6 +7,7 @@ from typing import NamedTuple
 from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
+from turnout.readers.stated_units import SENSITIVITY_IN_NAME
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
@@ -114,7 +115,10 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     >>> name_and_unit("force [kN]"), name_and_unit("a/(m/s²)"), name_and_unit("Force [N] (ch 1)")
     (('force', 'kN'), ('a', 'm/s²'), ('Force [N] (ch 1)', 'N'))
     """
+    sensitivity = SENSITIVITY_IN_NAME.search(cell)
     for match in reversed([*BRACKETS.finditer(cell)]):
+        if sensitivity and sensitivity.start() < match.start() < sensitivity.end():  # of "10 mV/(m/s²)"
+            return cell, ""
         unit = next(text for text in match.groups() if text is not None).strip()
         if _is_known(unit):
             return cell[: match.start()].rstrip("/ ") if match.end() == len(cell) else cell, unit

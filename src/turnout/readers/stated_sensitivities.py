@@ -3,11 +3,14 @@
 import math
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of, spaced_words
 from turnout.readers.scale_words import plain_word
+from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
+from turnout.readers.stated_units import SENSITIVITY_IN_NAME
 from turnout.units import to_si
 
 SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
@@ -45,6 +48,29 @@ def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:
     """
     words = ((entry, plain_word(entry.name)) for entry in entries)
     return tuple(e for e, word in words if SENSITIVITY.search(word) and not BESIDE_SENSITIVITY.search(word))
+
+
+def with_named_sensitivities(record: RawRecord) -> RawRecord:
+    """The record with an entry for each sensitivity in the name of a channel, or in the place of its unit.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        A sensitivity is no unit of the samples.
+    """
+    labels = list(zip(record.names, record.units))
+    found = [SENSITIVITY_IN_NAME.search(f"{name} | {unit}") for name, unit in labels]
+    entries = tuple(
+        Entry(f"the name of channel {name!r}", "sensitivity", match[1])
+        for (name, _), match in zip(labels, found) if match
+    )  # fmt: skip
+    units = tuple("" if SENSITIVITY_IN_NAME.fullmatch(unit.strip()) else unit for unit in record.units)
+    return replace(record, entries=(*record.entries, *entries), units=units) if entries else record
 
 
 def sensitivity_problem(

@@ -33,6 +33,11 @@ SEPARATORS = re.compile(r"[\s_./:;,=|@*\"'-]+")  # of the words of a name
 # A range, a distance or a sensitivity: "5 kN hammer", "rail 50g 2", "mV/g rail". The 2 of "rail_2_g_raw" is a number.
 AMOUNT = re.compile(r"(?:^|(?<=\s))(?:[±+-]?\d+(?:[.,]\d+)?\s?[^\W\d_][^\s_]*|[mµu]?V/[^\s_]+)")
 LEVEL = re.compile(r"dB")
+# The sensitivity of a sensor in a name, "rail 100 mV/g": its unit is none of the samples.
+SENSITIVITY_IN_NAME = re.compile(
+    r"(?<![^\W_])(?<!\d[.,])(\d+(?:[.,]\d+)?\s?(?:[mµ\u03bcu]?V|p?C)\s?(?:/|per)\s?"
+    r"(?!count|lsb|bit|digit|div)(?:\([^()]*\)|[^\W\d_][^\s\[\](){}<>|_;,]*))"
+)
 
 
 @lru_cache(maxsize=4096)
@@ -218,13 +223,20 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
             (certain if not in_chain and is_meaningless(record.units[index]) else possible).append(texts[index])
         else:
             possible.extend(texts)
+    name, *all_names = (_without_sensitivity(of_channel) for of_channel in (name, *record.names))
     in_brackets = [u for u in UNIT_IN_NAME.findall(name) if not re.match(r"[+-]?[\d.]", u)]
     in_brackets = [u for u in in_brackets if known_unit(u) or LEVEL.match(u)]
     certain.extend(in_brackets)
     if not in_brackets:
-        bare, *names = (UNIT_IN_NAME.sub("", of_channel).strip() for of_channel in (name, *record.names))
+        bare, *names = (UNIT_IN_NAME.sub("", of_channel).strip() for of_channel in (name, *all_names))
         possible.extend(_units_in_words(bare, names))
     return [u for u in certain if not is_meaningless(u)], [u for u in possible if not is_meaningless(u)]
+
+
+def _without_sensitivity(name: str) -> str:
+    """A name without the sensitivity of a sensor in it, and without what separates it."""
+    plain = SENSITIVITY_IN_NAME.sub("", name)
+    return name if plain == name else plain.rstrip(" _@,;-")
 
 
 def _texts(value: Any) -> list[str]:

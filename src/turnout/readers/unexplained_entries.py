@@ -63,13 +63,14 @@ REASONS_OF = {RATE: "wrong_rate", DURATION: "wrong_rate", SCALE: "scale_unknown"
 
 @dataclass(frozen=True)
 class RecordFacts:
-    """Facts of a record: rate [Hz], numbers of samples, channels and records, and the units in use."""
+    """Facts of a record: rate [Hz], numbers of samples, channels and records, the units in use, names of channels."""
 
     rate: float
     n_sample: int
     n_channel: int
     n_record: int
     units: tuple[str, ...]
+    names: tuple[str, ...] = ()
 
     def explains(self, candidate: Candidate) -> bool:
         """Whether a candidate agrees with the record, or is too far from it to be about it.
@@ -144,6 +145,7 @@ def unexplained_entries(
             continue
         group = container_of(entry).rpartition("/")[2] if "/" in entry.place else ""
         texts = tuple(text[:MAX_TEXT] for text in _texts(entry.value, facts.n_sample))
+        texts = tuple(text for text in texts if text not in facts.names)  # ``stated_units`` compares these
         if candidate := _unexplained_candidate(entry.name, group, texts, facts, are_units_certain):
             yield entry, candidate
 
@@ -260,7 +262,8 @@ class EntryCheck:
         if not new_entries:
             self._last = record.entries, key
             return directions
-        facts = RecordFacts(rate, n_sample, len(record.names), n_record, self._units + with_stated_units(record).units)
+        units = self._units + with_stated_units(record).units
+        facts = RecordFacts(rate, n_sample, len(record.names), n_record, units, record.names)
         unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
         for entry, candidate in unexplained:
             if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):

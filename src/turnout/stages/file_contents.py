@@ -186,7 +186,7 @@ def _contents(path: Path, source: Source, format_name: str, raw: RawFile) -> Fil
 
 def _unexplained_names(record: RawRecord, rate: float, n_record: int) -> Iterator[tuple[str, str]]:
     units = with_stated_units(record).units
-    facts = RecordFacts(rate, len(record.samples[0]), len(record.names), n_record, units)
+    facts = RecordFacts(rate, len(record.samples[0]), len(record.names), n_record, units, record.names)
     for entry, candidate in unexplained_entries(record.entries, facts):
         yield entry.name, shown_text(entry, candidate)
 

@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from turnout.readers import read
 from turnout.readers.channel_units import resolve_unit
+from turnout.records import RawChannel, RawDescription
 from turnout.units import conversion, to_si
 
 G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
@@ -106,3 +109,41 @@ def test_a_unit_of_the_file_that_nobody_knows_is_no_licence_for_the_layouts():
     said = "the file says 'tf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
     assert str(caught.value) == said
     assert resolve_unit("tf", "kN!") == "kN"
+
+
+SENSITIVITIES = {
+    "rail 100 mV/g": True, "rail_100mV/g": True, "rail (100 mV/g)": True, "rail, 100 mV per g": True,
+    "100mV/g rail": True, "rail 10,2 mV/ms-2": True, "rail 10.2 mV/(m/s²)": True, "rail 100 mV/g [V]": True,
+    "rail [V] @100mV/g": True, "rail 35.3 mV/g": False, "rail [35.3 mV/g]": False, "rail 3.6 mV/(m/s²)": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SENSITIVITIES)
+@pytest.mark.parametrize("format", ["csv", "npz"])
+def test_a_sensitivity_in_the_name_of_a_channel_is_compared_and_is_no_unit(name, format, tmp_path):
+    """Before, the g of 100 mV/g was the unit of the samples."""
+    samples = np.random.default_rng(2).normal(size=(2, 40)).round(6)
+    if format == "csv":
+        rows = "".join(f"{f};{a}\n" for f, a in samples.T)
+        (tmp_path / "a.csv").write_text(f"force;{name}\n{rows}", encoding="utf-8")
+    else:
+        np.savez(tmp_path / "a.npz", samples=samples, channels=["force", name])
+    volts = {"unit": "V", "sensitivity": 100.0, "sensitivity_unit": "mV/g"}
+    sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", **volts))
+    result = read(f"a.{format}", tmp_path, RawDescription(sensors, rate=1e3))
+    if not SENSITIVITIES[name]:
+        assert not result.recordings and "the layout's sensitivity of 100 mV/g is none of these" in str(result.errors)
+        return
+    assert result.recordings[0].samples[1] == pytest.approx(98.0665 * samples[1], rel=1e-12) and not result.errors
+    if "[V]" not in name:
+        physical = (sensors[0], RawChannel("rail", 1, "acceleration", unit="m/s²"))
+        result = read(f"a.{format}", tmp_path, RawDescription(physical, rate=1e3))
+        assert result.recordings[0].samples[1] == pytest.approx(samples[1]) and not result.errors
+
+
+def test_the_value_of_a_count_and_a_unit_beside_a_sensitivity_still_count(tmp_path):
+    for name, problem in (("rail 0.3 mV/count", "count"), ("rail_100mV/g_mm/s2", "mm/s2"), ("rail_g", "g")):
+        (tmp_path / "a.csv").write_text(f"force;{name}\n" + "1.5;2.5\n3.5;1.5\n" * 20)
+        sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
+        (error,) = read("a.csv", tmp_path, RawDescription(sensors, rate=1e3)).errors
+        assert error.reason == "unit_unknown" and repr(problem) in str(error)
