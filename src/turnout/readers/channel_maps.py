@@ -55,7 +55,7 @@ def channel_mappings(
     """Assign the channels of the layout to rows of the file.
 
     ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and may
-    be absent.
+    be absent if the layout names them. A number that the file does not have shows that the layout counts otherwise.
 
     Parameters
     ----------
@@ -78,7 +78,11 @@ def channel_mappings(
     ReadError
         If file and layout disagree about channels or units.
     """
-    channels = [c for c in channels if c.quantity != IGNORED or _has_channel(record, c.source, where, source)]
+    channels = [
+        c
+        for c in channels
+        if c.quantity != IGNORED or isinstance(c.source, int) or _has_channel(record, c.source, where, source)
+    ]
     sources = [channel.source for channel in channels]
     indices = [index_of(record, wanted, where, source, sources) for wanted in sources]
     if len(set(indices)) < len(indices):

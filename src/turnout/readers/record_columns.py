@@ -13,7 +13,8 @@ from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import COPY_AGAIN, Source
 
 RECORD_NAME = re.compile(
-    r"(?:record|rec|segment|impact|hit|schlag)(?:[_ ]?(?:no|nr|num|number|id|index)\.?)?",
+    r"(?:record|rec|segment|impact|hit|shot|schlag|coup)"
+    r"(?P<number>[_ .-]?(?:no|nr|num|number|nummer|id|index|n°|#)\.?)?",
     re.IGNORECASE,
 )
 LOST_REMEDY = f"{COPY_AGAIN}; if that impact was rejected in the field, the others can be used as they are"
@@ -33,8 +34,8 @@ def may_number_records(name: str) -> bool:
 
     Examples
     --------
-    >>> [may_number_records(name) for name in ("record", "Impact No", "hit", "force")]
-    [True, True, True, False]
+    >>> [may_number_records(name) for name in ("record", "Impact No", "Schlag-Nr.", "hit", "force")]
+    [True, True, True, True, False]
     """
     return bool(RECORD_NAME.fullmatch(name.strip()))
 
@@ -43,7 +44,8 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     """Name of the column that numbers the records.
 
     Under another name than "record" it has whole numbers that never fall, in blocks of one length but for the last:
-    a force, or a flag that is set at the contact, may have such a name as well.
+    a force, or a flag that is set at the contact, may have such a name as well. A number of one impact alone, as
+    "Impact No", is constant.
 
     Parameters
     ----------
@@ -73,13 +75,20 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
         numbers = _signed_numbers(column)
         if _is_record(name) and not np.isfinite(numbers).all():
             raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
-        if _is_record(name) or _numbers_blocks(numbers):
+        is_single = _is_number(name) and len(numbers) > 0 and bool((numbers == np.rint(numbers[0])).all())
+        if _is_record(name) or is_single or _numbers_blocks(numbers):
             return name
     return None
 
 
 def _is_record(name: str) -> bool:
     return name.strip().lower() == "record"
+
+
+def _is_number(name: str) -> bool:
+    """Whether a name says that it is a number of records, as "Impact No"."""
+    match = RECORD_NAME.fullmatch(name.strip())
+    return match is not None and match["number"] is not None
 
 
 def _signed_numbers(numbers: Column) -> np.ndarray:

@@ -17,7 +17,7 @@ SENSORS = (
     RawChannel("force", "force", "force", unit="N"),
     RawChannel("rail", "rail", "acceleration", unit="m/s²"),
 )
-NAMES = ("record", "Record", "impact", "Impact No", "hit", "rec_nr", "segment", "Schlag")
+NAMES = ("record", "Record", "impact", "Impact No", "hit", "rec_nr", "segment", "Schlag-Nr.", "Hit #")
 
 
 def outcome(folder, format, name, numbers, lengths=None):
@@ -75,6 +75,28 @@ def test_numbers_that_fall_keep_all_records_in_the_order_of_the_file(kind, name,
 )
 def test_a_flag_of_the_contact_does_not_cut_a_record(format, numbers, lengths, tmp_path):
     assert outcome(tmp_path, format, "hit", numbers, lengths) == ([], [("record 1 of 1", "channel_unknown")])
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet"])
+@pytest.mark.parametrize("name", ["Impact No", "hit_nr", "Record #"])
+def test_the_number_of_a_single_impact_is_no_channel(format, name, tmp_path):
+    """The channels of a layout that counts them are the same in files of one impact and of several."""
+    assert outcome(tmp_path, format, name, (7,)) == ([N], [])
+
+
+@pytest.mark.parametrize("first", ["time", "Impact No"])
+def test_a_layout_that_counts_a_column_that_is_no_channel_is_an_error(first, tmp_path):
+    """Before, the last channel was ignored and missing, and each other one had the samples of its neighbour."""
+    numbers = np.repeat([1, 2], N) if first == "Impact No" else np.arange(2 * N) / 2e4
+    rows = "".join(f"{number:g};{k % 7};{k % 5};{k % 3}\n" for k, number in enumerate(numbers))
+    (tmp_path / "a.csv").write_text(f"{first};force;rail;web\n{rows}")
+    others = (RawChannel("first", 0, "ignored"), RawChannel("web", 3, "ignored"))
+    sensors = (RawChannel("force", 1, "force", unit="N"), RawChannel("rail", 2, "acceleration", unit="m/s²"))
+    result = read("a.csv", tmp_path, RawDescription((*others, *sensors), rate=2e4))
+    assert not result.recordings and "there is no channel 3; the file has 3" in str(result.errors[0])
+    absent = RawChannel("first", "aux", "ignored"), RawChannel("web", 2, "ignored")
+    moved = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
+    assert len(read("a.csv", tmp_path, RawDescription((*absent, *moved), rate=2e4)).recordings) > 0
 
 
 def test_records_that_texts_number_are_an_error_in_parquet(tmp_path):
