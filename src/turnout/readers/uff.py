@@ -207,7 +207,7 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,
         aliases=aliases,
-        undecided={i: text[0] for i, s in enumerate(sets) if (text := entry_statements(_entries([s]), [""]))},
+        undecided={i: of_ids[0] for i, s in enumerate(sets) if (of_ids := entry_statements(_entries([s]), [""]))},
         unit_conflicts={i: text for i, s in enumerate(sets) if (text := _unit_conflict(s.labels[1], stated_units))},
     )
 
