@@ -234,12 +234,12 @@ def _responses_of_table(
             rows.append(column)
             k += 1
         elif following is not None and (real := REAL.search(pair)) and (imaginary := IMAGINARY.search(pair)):
-            parts = (column, following) if real.start() < imaginary.start() else (following, column)
-            rows.append(parts[0].real + 1j * parts[1].real)
+            columns = (column, following) if real.start() < imaginary.start() else (following, column)
+            rows.append(columns[0].real + 1j * columns[1].real)
             k += 2
         elif following is not None and (phase := PHASE.search(pair)) and (magnitude := MAGNITUDE.search(pair)):
-            parts = (column, following) if magnitude.start() < phase.start() else (following, column)
-            rows.append(_magnitude(parts[0].real, pair) * np.exp(1j * _phase(parts[1].real, pair)))
+            columns = (column, following) if magnitude.start() < phase.start() else (following, column)
+            rows.append(_magnitude(columns[0].real, pair) * np.exp(1j * _phase(columns[1].real, pair)))
             k += 2
         else:
             k += 1

@@ -104,9 +104,9 @@ def hertz_of(unit: str) -> float | None:
     >>> hertz_of("kHz"), hertz_of("rpm") == 1 / 60, round(hertz_of("rad/s"), 4), hertz_of("ms"), hertz_of("order")
     (1000.0, True, 0.1592, None, None)
     """
-    known, plain = rate_unit(unit), unit.strip("[](){} .").casefold()
-    if known is not None:
-        return None if known.is_step or known.is_sampling else float(known.scale)
+    of_rate, plain = rate_unit(unit), unit.strip("[](){} .").casefold()
+    if of_rate is not None:
+        return None if of_rate.is_step or of_rate.is_sampling else float(of_rate.scale)
     if RADIANS_PER_SECOND.fullmatch(plain):
         return 1.0 / (2.0 * math.pi)
     return 1.0 / 60.0 if PER_MINUTE.fullmatch(plain) else None

@@ -64,10 +64,10 @@ def with_named_sensitivities(record: RawRecord) -> RawRecord:
         A sensitivity is no unit of the samples.
     """
     labels = list(zip(record.names, record.units))
-    found = [SENSITIVITY_IN_NAME.search(f"{name} | {unit}") for name, unit in labels]
+    matches = [SENSITIVITY_IN_NAME.search(f"{name} | {unit}") for name, unit in labels]
     entries = tuple(
         Entry(f"the name of channel {name!r}", "sensitivity", match[1])
-        for (name, _), match in zip(labels, found) if match
+        for (name, _), match in zip(labels, matches) if match
     )  # fmt: skip
     units = tuple("" if SENSITIVITY_IN_NAME.fullmatch(unit.strip()) else unit for unit in record.units)
     return replace(record, entries=(*record.entries, *entries), units=units) if entries else record
