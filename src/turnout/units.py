@@ -168,7 +168,10 @@ def conversion(unit: str) -> Conversion:
         factor, text = float(match[1]), match[2].strip()
     name = _CANONICAL.get(text)
     if name is None or not math.isfinite(factor) or factor == 0:
-        raise ValueError(f"the unit {unit!r} is not known; known are {', '.join(sorted(set(_CANONICAL.values())))}")
+        alike = sorted({known for spelling, known in _CANONICAL.items() if spelling.lower() == text.lower()})
+        hint = f" (did you mean {' or '.join(map(repr, alike))}?)" if alike else ""
+        known_units = ", ".join(sorted(set(_CANONICAL.values())))
+        raise ValueError(f"the unit {unit!r} is not known{hint}; known are {known_units}")
     dimension = next(d for d, units in UNITS.items() if name in units)
     scale, offset = UNITS[dimension][name]
     return Conversion(dimension, factor * scale, offset)

@@ -105,8 +105,14 @@ def _truth(args: argparse.Namespace) -> str:
 
 
 def _make(args: argparse.Namespace) -> None:
-    from turnout_blind.make import make_set
+    from pathlib import Path
 
+    from turnout_blind.make import make_set
+    from turnout_blind.seal import BlindError
+
+    for folder in args.effects:
+        if not any(path for path in Path(folder).glob("*.py") if not path.name.startswith("_")):
+            raise BlindError(folder, "--effects", "no file of an effect", "Name a folder with one file .py per effect")
     only = args.only.split(",") if args.only else None
     histories = (args.histories, args.passages) if args.histories else None
     sha = make_set(

@@ -154,6 +154,9 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
     if not first.startswith("-") and first not in (commands := [name.replace("_", "-") for name in COMMANDS]):
         close = "".join(f" Did you mean {name!r}?" for name in get_close_matches(first, commands, n=1))
         parser.exit(NOT_FOLLOWED, f"turnout: no command {first!r}.{close} 'turnout --help' lists the commands.\n")
+    if first.startswith("-") and not any(option.startswith(first) for option in ("-h", "--help", "--version")):
+        text = f"turnout: {first!r} before the command. Write options behind it: turnout COMMAND {first}"
+        parser.exit(NOT_FOLLOWED, f"{text}. 'turnout --help' lists the commands.\n")
     args, unknown = parser.parse_known_args(words)
     if unknown:
         known = [option for action in args.parser._actions for option in action.option_strings]

@@ -10,7 +10,7 @@ from turnout.config.filename_pattern import compile_pattern
 from turnout.config.schema import number_text, suggestion
 from turnout.config.settings_schema import settings_keys
 from turnout.errors import ConfigError
-from turnout.units import SI, volts_per_unit
+from turnout.units import IGNORED, SI, volts_per_unit
 
 # (quantity, unit, sensitivity, sensitivity_unit) -> conversion, as turnout.units.to_si
 ToSi = Callable[[str, str, float | None, str], Any]
@@ -44,8 +44,10 @@ def check_consistency(tree: Branch, to_si: ToSi | None = None) -> Iterator[Confi
         yield from _pattern_errors(tree["passages"], "passages", labels)
         yield from _channel_errors(tree["passages"], to_si)
         for channel in tree["passages"]["channels"].values():
-            leaf = channel["section"]
-            if leaf.value not in labels:
+            leaf = channel.get("section")
+            if leaf is None and channel["quantity"].value != IGNORED:
+                yield channel.place.error("'section' is missing", f"Add 'section:', one of {', '.join(labels)}")
+            elif leaf is not None and leaf.value not in labels:
                 yield leaf.place.error(f"no section {leaf.value!r}", suggestion(leaf.value, labels))
 
 

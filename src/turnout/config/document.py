@@ -22,6 +22,24 @@ if TYPE_CHECKING:  # imported late: a command that reads no YAML does not pay fo
 
 Scalar = str | int | float | bool | None
 
+# Part of a problem that the YAML parser states -> the problem and the remedy for people who do not know its terms.
+YAML_PROBLEMS = {
+    "'\\t'": ("a tab", "Write blanks: YAML does not allow tabs before a value"),
+    "could not find expected ':'": (
+        "a name without ':' behind it",
+        "Write 'name: value', with a blank behind it",
+    ),
+    "found '<block mapping start>'": (
+        "its indentation is not that of the lines above",
+        "Begin all lines of a block with the same number of blanks",
+    ),
+    "mapping values are not allowed": (
+        "a second ':' in one value, or more blanks in front of it than the line above has",
+        "Put a text with ': ' in quotes, and begin all lines of a block with the same number of blanks",
+    ),
+    "another document": ("a second document begins", "Remove the line '---', or keep one of the two"),
+}
+
 
 @contextmanager
 def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> Iterator[None]:
@@ -51,7 +69,9 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
         problem = f"cannot be read: {error.strerror}"
         raise ConfigError(path, where, problem, "Put a file of that name there, or remove it") from None
     except UnicodeDecodeError as error:
-        raise ConfigError(path, f"byte {error.start}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
+        before = error.object[: error.start]
+        byte = Place(str(path), before.count(b"\n") + 1, error.start - before.rfind(b"\n"))
+        raise byte.error("a byte that is not UTF-8", "Save the file as UTF-8") from None
     except ReaderError as error:
         problem = f"the character {chr(error.character)!r}, which no YAML file may hold"
         raise ConfigError(path, f"character {error.position + 1}", problem, "Remove it") from None
@@ -59,13 +79,15 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
         if not syntax_remedy:
             raise
         mark = error.problem_mark or error.context_mark
+        if error.context == "while scanning a simple key":  # the problem is the key, not what follows it
+            mark = error.context_mark
         place = str(Place(str(path), mark.line + 1, mark.column + 1)) if mark else where
-        problem = str(error.problem)
-        if "'\\t'" in problem:
-            raise ConfigError(path, place, "a tab", "Write blanks: YAML does not allow tabs before a value") from None
-        raise ConfigError(
-            path, place, problem.replace("'<stream end>'", "the end of the file"), syntax_remedy
-        ) from None
+        stated = str(error.problem)
+        problem, remedy = next(
+            (texts for part, texts in YAML_PROBLEMS.items() if part in stated),
+            (stated.replace("'<stream end>'", "the end of the file"), syntax_remedy),
+        )
+        raise ConfigError(path, place, problem, remedy) from None
     except RecursionError:
         problem = "content without an end, as of an anchor that holds itself"
         raise ConfigError(path, where, problem, "Write the values out there") from None
@@ -264,7 +286,8 @@ def load(path: Path, name: str | None = None) -> Branch:
         return Branch(Place(name, 1, 1))
     tree = _tree(node, name, constructor)
     if not isinstance(tree, Branch):
-        raise tree.place.error(f"{tree.value!r} where names with values are expected", "Write 'name: value' lines")
+        what = "a list" if isinstance(tree.value, tuple) else repr(tree.value)
+        raise tree.place.error(f"{what} where names with values are expected", "Write 'name: value' lines")
     return tree
 
 

@@ -44,6 +44,8 @@ def compile_pattern(pattern: str, branch: str, sections: tuple[str, ...] = (), f
     >>> match.fullmatch("hammer/2024-05-13/A7_2.uff").groupdict()
     {'campaign': '2024-05-13', 'section': 'A7', 'test': '2', 'ext': 'uff'}
     """
+    if "\\" in pattern or pattern.startswith("/") or {"", ".", ".."} & set(pattern.split("/")):
+        raise ValueError("it is a path below the raw folder of the turnout, with '/' between folders, without '..'")
     fields = dict(FIELDS[branch])
     if branch == "hammer":
         fields["section"] = "|".join(re.escape(s) for s in sorted(sections, key=len, reverse=True)) or "[^/]+"

@@ -76,7 +76,7 @@ def config_yaml(present: dict) -> str:
         keys = settings_keys()[name].spec
         for field in fields(cls):
             key, default = keys[field.name], default_of(field)
-            value = present.get(name, {}).get(field.name, default)
+            value = (present.get(name) or {}).get(field.name, default)
             changed = "" if value == default else f"default {yaml_text(default)}; "
             lines += textwrap.wrap(changed + describe_key(key), WIDTH, initial_indent="  # ", subsequent_indent="  # ")
             lines.append(f"  {field.name}: {yaml_text(value)}")

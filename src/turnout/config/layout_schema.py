@@ -22,7 +22,7 @@ CHANNEL = {
 }
 PASSAGE_CHANNEL = {
     **CHANNEL,
-    "section": Key("text", "section it watches", required=True, pattern=LABEL),
+    "section": Key("text", "section at which it is mounted; required unless quantity is ignored", pattern=LABEL),
 }
 # Minimum rates: below them a recording shows no mode of the track. They also catch a rate written in kHz.
 # Maximum rates: no converter for these sensors is faster. They catch a rate with a digit too many.

@@ -14,7 +14,7 @@ from turnout.config.file_names import file_key
 from turnout.config.frozen_mapping import Frozen
 from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
-from turnout.config.schema import NO_TURNOUT, check, suggestion
+from turnout.config.schema import NO_TURNOUT, check, fill_empty_groups, suggestion
 from turnout.config.settings_schema import check_ranges, settings_keys
 from turnout.config.turnout import TurnoutConfig
 from turnout.config.turnouts_table import NO_PROJECT, Row, read_table
@@ -188,6 +188,7 @@ class _ConfigurationReader:
         except ConfigError as error:
             self.errors.append(error)
             return empty
+        fill_empty_groups(spec, tree)
         if problems := list(check(spec, tree, whole)):
             self.errors += problems
             return empty

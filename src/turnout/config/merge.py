@@ -145,7 +145,7 @@ def passages(tree: Branch) -> PassageConfig | None:
     if "passages" not in tree:
         return None
     values = plain_values(tree["passages"])
-    sections = {name: channel["section"] for name, channel in values["channels"].items()}
+    sections = {name: channel["section"] for name, channel in values["channels"].items() if "section" in channel}
     positions = {name: float(tree["sections"][label]["position"].value) for name, label in sections.items()}
     return PassageConfig(values["files"], description(values, "passage", positions), Frozen(sections))
 
@@ -170,7 +170,8 @@ def description(values: dict, kind: str, positions: dict[str, float]) -> RawDesc
     channels = []
     for name, channel in values["channels"].items():
         fields = {k: _as_float(k, v) for k, v in channel.items() if k not in ("offset", "section") and v is not None}
-        position = None if channel["quantity"] == "force" else positions[name] + channel.get("offset", 0.0)
+        has_position = channel["quantity"] != "force" and name in positions
+        position = positions[name] + channel.get("offset", 0.0) if has_position else None
         channels.append(RawChannel(name=name, position=position, **fields))
     return RawDescription(
         channels=tuple(channels),

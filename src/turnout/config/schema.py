@@ -232,6 +232,39 @@ def _hint_at_other_unit(key: Key, value: float) -> str:
 DECIMAL_POINT = "If it belongs to the number before it, write a point in place of the comma, as in 24.6"
 
 
+def fill_empty_groups(spec: dict, tree: Branch) -> None:
+    """Give each name without anything below it an empty mapping, where its schema has names there.
+
+    So a section of config.yaml counts as empty when all of its lines are comments.
+
+    Parameters
+    ----------
+    spec : dict
+        Name -> Key, Group, NamedEntries or FleetWideKey.
+    tree : Branch
+        Tree of a file; it is changed.
+    """
+    for name, rule in spec.items():
+        if name in tree and isinstance(rule, Group | NamedEntries):
+            branch = _mapping_below(tree, name)
+            if branch is None:
+                continue
+            if isinstance(rule, Group):
+                fill_empty_groups(rule.spec, branch)
+                continue
+            for label in branch:
+                if (entry := _mapping_below(branch, label)) is not None:
+                    fill_empty_groups(rule.spec, entry)
+
+
+def _mapping_below(tree: Branch, name: str) -> Branch | None:
+    """The mapping below a name, a new one if nothing is there; None if a value is."""
+    value = tree[name]
+    if isinstance(value, Leaf) and value.value is None:
+        tree[name] = Branch(tree.place_of(name))
+    return tree[name] if isinstance(tree[name], Branch) else None
+
+
 def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
     """Compare a tree with its schema.
 
@@ -266,8 +299,7 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
             elif problem := value_problem(rule, value.value):
                 yield value.place.error(f"{name} is {problem[0]}", problem[1])
         elif isinstance(value, Leaf):
-            if value.value is not None or whole:
-                yield value.place.error(f"{name} is {quotation(value.value)}", "Write 'name: value' lines below it")
+            yield value.place.error(f"{name} is {quotation(value.value)}", "Write 'name: value' lines below it")
         elif isinstance(rule, Group):
             yield from check(rule.spec, value, whole and not rule.fragment)
         else:

@@ -12,7 +12,7 @@ from typing import Any
 from turnout.config.csv_table import TableError, header_of
 from turnout.config.document import Place
 from turnout.config.turnouts_table import NO_PROJECT, separator_problem
-from turnout.errors import ConfigError
+from turnout.errors import ConfigError, ConfigErrors
 from turnout.files import temporary_path, write_atomic
 from turnout.locks import folder_lock
 
@@ -43,7 +43,8 @@ def added_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -
     Raises
     ------
     ConfigError
-        If a value has no column in the header, the table has no valid header, or its folder does not exist.
+        If a value has no column in the header, the table has no valid header, or its folder does not exist. Errors of
+        the block in the new row name no line, because the table has no such line.
     TurnoutError
         If another command holds the folder for a minute, or without permission to write.
     """
@@ -55,10 +56,31 @@ def added_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -
         trial = temporary_path(path)
         try:
             _write(trial, content, path)
-            yield {path.name: trial}
+            with _errors_of_new_row(path, content):
+                yield {path.name: trial}
         finally:
             trial.unlink(missing_ok=True)
         _write(path.resolve(), content, path)
+
+
+@contextmanager
+def _errors_of_new_row(path: Path, content: bytes) -> Iterator[None]:
+    """Context in which errors at the last line of ``content`` are said of a new row that was not written."""
+    number = len(content.splitlines())
+
+    def of_new_row(error: Exception) -> Exception:
+        if not isinstance(error, ConfigError) or Path(error.path).name != path.name:
+            return error
+        if not re.fullmatch(rf"line {number}(, column \d+)?", error.place):
+            return error
+        return ConfigError(error.path, "the new row, which was not written", error.problem, error.remedy)
+
+    try:
+        yield
+    except ConfigErrors as errors:
+        raise ConfigErrors(map(of_new_row, errors.errors)) from None
+    except ConfigError as error:
+        raise of_new_row(error) from None
 
 
 def turnout_and_section(name: str) -> tuple[str, str]:
@@ -151,8 +173,8 @@ def _tsv_header(path: Path) -> tuple[str, ...]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        problem = "a byte that is not UTF-8"
-        raise ConfigError(path, f"byte {error.start}", problem, "Save the file as UTF-8") from None
+        line = error.object[: error.start].count(b"\n") + 1
+        raise ConfigError(path, f"line {line}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
     titles = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     if not titles:
         raise Place(str(path), 1, 1).error("an empty table", "Write a header: turnout<tab>layout<tab>...")

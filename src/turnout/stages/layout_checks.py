@@ -16,6 +16,7 @@ from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.parameter_ranges import improbable_values
 
+MAX_TURNOUT_LENGTH = 500.0  # m between two sections: no turnout is so long
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
 QUANTITIES_WITHOUT_POSITION = ("force", "temperature", "ignored")  # channels that need no position
@@ -112,7 +113,9 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
 
 
 def faults_of_sections(configuration: Configuration) -> Iterator[str]:
-    """Pairs of sections at one position of one track, each pair once: the copy of a line that was not changed.
+    """Pairs of sections at one position of one track, or farther apart than a turnout is long, each pair once.
+
+    The first is often the copy of a line that was not changed, the second a slipped decimal point.
 
     Parameters
     ----------
@@ -133,7 +136,14 @@ def faults_of_sections(configuration: Configuration) -> Iterator[str]:
             if first != label:
                 problem = f"sections {first} and {label} are both at {x:g} m, track {track}"
                 remedy = "Correct the position or the track of one of them, or make them one section"
-                faults[f"two sections in one place: {section['position'].place.error(problem, remedy)}"] = None
+                faults[f"two sections at one position: {section['position'].place.error(problem, remedy)}"] = None
+        positions = {label: section["position"] for label, section in variant.tree["sections"].items()}
+        first, last = (f(positions, key=lambda label: positions[label].value) for f in (min, max))
+        length = positions[last].value - positions[first].value
+        if length > MAX_TURNOUT_LENGTH:
+            problem = f"sections {first} and {last} are {length:g} m apart"
+            remedy = f"No turnout is longer than {MAX_TURNOUT_LENGTH:g} m: correct a position"
+            faults[f"sections too far apart: {positions[last].place.error(problem, remedy)}"] = None
     yield from faults
 
 
@@ -157,13 +167,11 @@ def _position_errors(tree: Branch, track: TurnoutTrack, path: Path) -> Iterator[
             yield tree["sections"][label]["position"].place.error(fault, f"Its track is {path}")
     first, last = track.track.start + END_MARGIN, track.track.end - END_MARGIN
     for name, channel in tree.get("passages", {}).get("channels", {}).items():
+        if channel["quantity"].value in QUANTITIES_WITHOUT_POSITION:
+            continue
         label = channel["section"].value
         leaf = channel.get("offset", tree["sections"][label]["position"])
         x = tree["sections"][label]["position"].value + (leaf.value if "offset" in channel else 0.0)
-        if (
-            channel["quantity"].value not in QUANTITIES_WITHOUT_POSITION
-            and not faults[label]
-            and not first <= x <= last
-        ):
+        if not faults[label] and not first <= x <= last:
             fault = f"sensor {name} at {x:.1f} m: wheels are wholly on the track of {path} only from {first:.1f} m to"
-            yield leaf.place.error(f"{fault} {last:.1f} m", "Correct its place, or lengthen the track")
+            yield leaf.place.error(f"{fault} {last:.1f} m", "Correct its position, or lengthen the track")

@@ -194,7 +194,7 @@ def _channel_lines(
         mounting = MOUNTING[branch][0 if quantity == "force" else 1]
         yield f"      mounting: {mounting}"
         yield f"      # limit:  range beyond which it clips [{SI[quantity]}], from the data sheet"
-    if branch == "passages":
+    if branch == "passages" and quantity != "ignored":
         label = next((label for label in labels if label in re.split(r"[^A-Za-z0-9-]+", channel.name)), labels[0])
         yield f"      section: {label}  {DECIDE} section at which the sensor is mounted"
 

@@ -5,6 +5,7 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import date, datetime
+from difflib import get_close_matches
 from functools import lru_cache
 from operator import attrgetter
 from pathlib import Path
@@ -23,6 +24,7 @@ from turnout.records import Unit
 UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
 IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
 FIRST_YEAR = 1990  # of a digital recording; the readers take an earlier start for an unset clock, too
+MIN_LIKENESS = 0.8  # of the name of a file to that of a table, from which it is taken for a misspelt one
 READABLE = 0o444  # mode of a file that everybody may read
 
 _name = attrgetter("name")
@@ -278,6 +280,8 @@ def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[
         finding = "its name follows no pattern of the layout"
         if detail := _wrong_field(inside, turnout):
             finding += f": {detail}"
+        elif tables := get_close_matches(inside.lower(), NOTE_FILES, 1, MIN_LIKENESS):
+            finding, remedy = "no file of this name is read", f"If it is the table {tables[0]}, rename it to that"
         yield ReadError(f"{turnout.raw}/{inside}", "file name", finding, remedy, "name_unknown")
     if not matched:
         remedy = (

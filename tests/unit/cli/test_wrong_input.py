@@ -97,6 +97,8 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
     [
         ("", "usage: turnout"),
         ("hamer", "no command 'hamer'. Did you mean 'hammer'?"),
+        ("--verison", "turnout: '--verison' before the command. Write options behind it: turnout COMMAND --verison"),
+        ("--json worklist", "turnout: '--json' before the command. Write options behind it: turnout COMMAND --json"),
         ("worklist --as-of 2026-05-14", "unknown: --as-of 2026-05-14. Did you mean --asof? 'turnout worklist --help'"),
         ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
         (
@@ -116,6 +118,11 @@ def test_a_wrong_command_line_ends_with_2(capsys, line, message):
     with pytest.raises(SystemExit) as end:
         main(line.split())
     assert end.value.code == 2 and message in capsys.readouterr().err
+
+
+def test_a_folder_without_effects_for_the_blind_proof_is_named(capsys):
+    assert main(["blind", "make", "--out", "proof", "--effects", "nowhere", "--limit", "1"]) == 2
+    assert "nowhere, --effects: no file of an effect. Name a folder with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", ["inspect ''", "hammer '' --turnout W1", "report --pages ''", "query ''", "init ''"])

@@ -166,11 +166,19 @@ def with_position_of_a7(folder, line):
 def test_two_sections_at_one_position_of_a_track_are_reported_once(folder, capsys):
     with_position_of_a7(folder, "A8:   {panel: CP,  track: main, position: 24.60}")
     code, text = checked(capsys)
-    (line,) = [line for line in text.splitlines() if "two sections in one place" in line]
+    (line,) = [line for line in text.splitlines() if "two sections at one position" in line]
     assert code == 1 and "config/layouts/tommerup.yaml, line 13" in line
     assert "sections A7 and A8 are both at 24.6 m, track main" in line
 
 
 def test_two_sections_at_one_position_of_two_tracks_are_no_fault(folder, capsys):
     with_position_of_a7(folder, "A8:   {panel: CP,  track: diverging, position: 24.6}")
-    assert "two sections in one place" not in checked(capsys)[1]
+    assert "two sections at one position" not in checked(capsys)[1]
+
+
+def test_two_sections_farther_apart_than_a_turnout_is_long_are_reported(folder, capsys):
+    with_position_of_a7(folder, "A8:   {panel: CP,  track: main, position: 2640}")
+    code, text = checked(capsys)
+    (line,) = [line for line in text.splitlines() if "too far apart" in line]
+    assert code == 1 and "config/layouts/tommerup.yaml, line 13" in line
+    assert "sections OT and A8 are 2652 m apart. No turnout is longer than 500 m" in line

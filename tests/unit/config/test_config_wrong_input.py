@@ -179,6 +179,35 @@ WRONG = {
     "unknown section": (layout("section: A8}", "section: A9}"), "line 18, column 55: no section 'A9'"),
     "unknown time zone": (layout("rate: 20000", "time_zone: Denmark/Odense"), "Write an IANA name"),
     "unknown format": (layout("rate: 20000", "format: ufo"), "line 9, column 11: format is 'ufo'. Allowed: auto, csv"),
+    "absolute pattern": (
+        layout('"hammer/', '"/hammer/'),
+        "line 8, column 10: files is '/hammer/{campaign}/{section}_{test}.{ext}': it is a path below the raw folder",
+    ),
+    "pattern that leaves the folder": (layout('"passages/', '"../passages/'), "without '..'. Write a pattern like"),
+    "pattern of Windows": (layout("passages/{time}", "passages\\\\{time}"), "with '/' between folders"),
+    "unit in other capitals": (layout("unit: V", "unit: kn"), "the unit 'kn' is not known (did you mean 'kN'?)"),
+    "channel of no section": (
+        layout(", section: A8}", "}"),
+        "line 18, column 10: 'section' is missing. Add 'section:', one of A7, A8",
+    ),
+    "sections without a line": (
+        {"layout": "sections:\n" + LAYOUT[LAYOUT.index("hammer:") :]},
+        "main.yaml, line 1, column 1: 'sections' is empty. Add at least one",
+    ),
+    "no colon": (
+        layout("  rate: 20000", "  rate 20000"),
+        "line 9, column 3: a name without ':' behind it. Write 'name: value'",
+    ),
+    "blanks too many": (
+        layout("  force: force", "    force: force"),
+        "line 10, column 10: a second ':' in one value, or more blanks in front of it than the line above has",
+    ),
+    "blanks too many in front of names": (
+        layout("  rate: 20000", "   rate: 20000"),
+        "line 9, column 4: its indentation is not that of the lines above. Begin all lines of a block with",
+    ),
+    "two documents": ({"settings": "trend: {}\n---\ntrend: {}\n"}, "line 2, column 1: a second document begins"),
+    "list for names": ({"settings": "- trend\n"}, "a list where names with values are expected. Write 'name: value'"),
     "YAML that is none": (layout("    panel: CP", "    panel: [CP"), "Correct the YAML syntax there"),
     "unknown setting": (
         {"settings": "receptance:\n  gate_levle: 0.9\n"},
@@ -271,6 +300,44 @@ WRONG = {
         "config/config.yaml, line 1, column 8: it contains itself. Write out what the alias stands for",
     ),
 }
+
+
+def test_a_section_whose_lines_are_all_comments_is_empty(tmp_path, capsys):
+    read = configuration(
+        tmp_path, settings="receptance:\n  # gate_level: 0.9\ntrend:\n", override=("t1.yaml", "hammer:\n")
+    )
+    assert read.turnout("t1").settings == read.turnout("t2").settings
+    (read.folder / "config.yaml").write_text("receptance:\nidentify: {duration: 0.04}\n")
+    assert main(["config", "generate", "--configuration", str(read.folder), "--docs", str(tmp_path / "no")]) == 0
+    assert "\n  duration: 0.04\n" in (read.folder / "config.yaml").read_text()
+
+
+def test_a_channel_of_a_passage_that_is_ignored_needs_no_section(tmp_path, capsys):
+    ignored = f"{LAYOUT}    rain: {{source: 1, quantity: ignored}}\n"
+    passages = configuration(tmp_path, layout=ignored).turnout("t1").passages
+    assert [(c.name, c.position) for c in passages.description.channels] == [("web", 26.4), ("rain", None)]
+    assert dict(passages.sections) == {"web": "A8"}
+
+
+def test_a_byte_that_is_not_utf_8_is_said_with_line_and_column(tmp_path):
+    folder = configuration(tmp_path).folder
+    (folder / "config.yaml").write_bytes(b"trend: {}\n# m/s\xb2\n")
+    with pytest.raises(ConfigErrors, match=r"config\.yaml, line 2, column 6: a byte that is not UTF-8"):
+        load_configuration(folder)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["add", "t3", "main", "--km", "3,4"], "turnouts.tsv, the new row, which was not written: km is '3,4'. Write"),
+        (["add", "t3", "mian"], "turnouts.tsv, the new row, which was not written: no layout 'mian'. Did you mean"),
+        (["events", "t1", "tampping", "2026-05-01"], "the new row, which was not written: kind is 'tampping'. Did you"),
+        (["add", "t1", "main"], "turnouts.tsv, line 2: there is a turnout 't1' already"),
+    ],
+)
+def test_an_error_of_a_new_row_names_no_line_that_the_table_lacks(tmp_path, capsys, words, said):
+    assert main([*words, "--configuration", str(configuration(tmp_path).folder)]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):

@@ -117,3 +117,12 @@ def test_a_file_where_the_folder_of_a_turnout_belongs_is_a_problem(fleet):
     turnouts, problems = planned(fleet)
     assert turnouts == ["t2"]
     assert problems[0] == ("t1", "folder", "Not a directory")
+
+
+@pytest.mark.parametrize("name", ["Campaigns.csv", "campaign.csv", "trains.CSV"])
+def test_a_table_whose_name_is_misspelt_is_named(fleet, name):
+    (fleet / "raw/t1" / name).write_bytes(b"x")
+    write_plans(load_configuration(fleet / "config"), fleet / "raw", fleet / "plan", 1, accept_vanished=True)
+    (problem,) = [p for _, p in read_problems(fleet / "plan/00of01.json")]
+    table = "trains.csv" if "train" in name else "campaigns.csv"
+    assert problem["path"] == f"t1/{name}" and problem["remedy"].startswith(f"If it is the table {table}, rename it")
