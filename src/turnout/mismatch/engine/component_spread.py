@@ -1,4 +1,4 @@
-"""Scatter of a component among those that are alike, such as the railpads of a turnout."""
+"""Scatter of the values of components of one kind, such as the railpads of a turnout."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def spread_of_others(case: Case, fit: Fit, component: Nuisance, without_outliers: bool = False) -> float | None:
-    r"""Standard deviation of the components that are like one, as fitted, the errors of the fit included.
+    r"""Standard deviation of the other components of the same kind, as fitted, with the errors of the fit.
 
     .. math:: s^2 = \overline{(v_j - \bar v)^2} + \overline{\sigma_j^2}
 
-    with :math:`v_j` their fitted values and :math:`\sigma_j` the standard errors of these.
+    :math:`v_j` are the fitted values, and :math:`\sigma_j` their standard errors.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ def spread_of_others(case: Case, fit: Fit, component: Nuisance, without_outliers
     fit : Fit
         Its covariance begins with the nuisances, in their order.
     component : Nuisance
-        With an index.
+        One of several, with its index.
     without_outliers : bool
-        The first part is that of the median absolute deviation, which a few components unlike the others do not widen.
+        Take the first term from the median absolute deviation, which a few unusual components do not widen.
 
     Returns
     -------
     float or None
-        In the unit of the component. None if fewer than ``THRESHOLDS.min_siblings`` are like it.
+        In the unit of the component. None with fewer than ``THRESHOLDS.min_siblings`` others.
     """
     others = [
         k for k, n in enumerate(case.nuisances) if n.group == component.group and n.index not in (None, component.index)

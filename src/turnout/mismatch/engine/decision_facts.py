@@ -78,17 +78,17 @@ class EffectEvidence:
     residual_excess : float
         Weighted mean square of the residual of the best candidate over the control level.
     disturbed : bool
-        Another source than a train shakes the sensors in some recordings. These are not among those fitted.
+        Another source than a train shakes the sensors in some recordings. These are not fitted.
     mismatched_trains : tuple of str
-        Trains, most recordings of which are not among those fitted, since they do not agree with the vehicle file.
+        Trains that do not agree with their vehicle file, so that most of their recordings are not fitted.
     strained : str
         Value of the base model that no tolerance explains, in words; "" if there is none.
     local_change : float
-        Evidence that a single component differs under trains from what impacts show. [nats]
+        Evidence that a single component has another value under trains than under impacts. [nats]
     local_deviation : float
-        Evidence that a single component differs from those that are alike, beyond their scatter. [nats]
+        Evidence that a single component differs from the others of its kind by more than their scatter. [nats]
     ambiguity : Ambiguity or None
-        Something that the recordings show and cannot tell what it is.
+        An effect that the recordings show and that may have several causes.
     """
 
     scores: Sequence[Score]
@@ -153,7 +153,7 @@ class EffectEvidence:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Whether the recordings show something beyond doubt that they cannot tell what it is."""
+        """Whether the recordings show an effect beyond doubt that may have several causes."""
         return self.ambiguity is not None and self.ambiguity.nats > self.settings.threshold
 
     @property
@@ -238,12 +238,23 @@ class NumericalError:
 
 @dataclass(frozen=True)
 class NameEvidence:
-    """What the grade of a name rests on: its ``score`` in the last fit, and the largest excess ratio of that fit.
+    """Facts that decide the grade of a name, all of the last fit.
 
-    ``free_share`` is the share of the gain on held-out recordings that all names miss, and free laws reach.
-    ``strained`` is the value that no tolerance explains in that fit, in words; "" if there is none. ``local_change`` is
-    the evidence that single components differ between kinds of recordings beside all names, less what errors in the
-    shape of names at a position or in a channel may leave. It counts beyond the ``threshold`` of a name. [nats]
+    Attributes
+    ----------
+    score : Score
+        Of the name.
+    excess : float
+        Largest excess ratio of the fit.
+    free_share : float
+        Share of the gain on held-out recordings that unconstrained force laws reach and all names together miss.
+    strained : str
+        Value that no tolerance explains, in words; "" if there is none.
+    local_change : float
+        Evidence that single components have another value under trains than under impacts, with all names in the fit.
+        The part that errors in the shape of the names may cause is subtracted. [nats]
+    threshold : float
+        A larger ``local_change`` withdraws a name without a position. [nats]
     """
 
     score: Score

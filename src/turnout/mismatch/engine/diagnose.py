@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.mismatch.engine.component_laws import evidence_of_any, local_changes, local_deviations
+from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes, local_deviations
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
     COMPONENT_UNUSUAL,
@@ -255,7 +255,7 @@ def grade_names(findings: Findings) -> Findings:
     leaders = [v.scores[0] for v in findings.verdicts if v.scores]
     local_gain = sum(s.gain for s in leaders if s.has_position or "sensor" in s.candidate.where)
     shape_errors = THRESHOLDS.shape_error_share * local_gain
-    local_change = evidence_of_any(local_changes(search.case, fit)) - shape_errors
+    local_change = evidence_of_any_component(local_changes(search.case, fit)) - shape_errors
     for verdict in findings.verdicts:
         is_refuted = verdict.answer == "a_or_b" and (strained or free_share > THRESHOLDS.max_free_law_share)
         if verdict.answer == "named" or is_refuted:

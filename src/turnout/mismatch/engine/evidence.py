@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.mismatch.engine.channel_levels import loud_recording, worst_channel_excess
-from turnout.mismatch.engine.component_laws import evidence_of_any, local_changes, local_deviations
+from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes, local_deviations
 from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.cross_validation import held_out_score, single_type_estimate, weighted_mean_square
 from turnout.mismatch.engine.decision import judge
@@ -240,7 +240,7 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
     facts["mismatched_trains"] = case.mismatched_trains
     for fact, gains in (("local_change", local_changes), ("local_deviation", local_deviations)):
-        facts[fact] = 0.0 if fit.candidates else evidence_of_any(gains(case, fit))
+        facts[fact] = 0.0 if fit.candidates else evidence_of_any_component(gains(case, fit))
     facts["ambiguity"] = None if fit.candidates else case.ambiguity()
     scores = tuple(s for s in scores if s.is_reportable)
     if not scores:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
-from turnout.mismatch.engine.component_laws import evidence_by_position
+from turnout.mismatch.engine.component_evidence import evidence_by_position
 from turnout.mismatch.engine.space_evidence import SpaceEvidence, weigh_spaces
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 

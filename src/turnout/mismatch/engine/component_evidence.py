@@ -1,11 +1,13 @@
-r"""Generic laws of single components, of any cause: what no candidate describes shows as another value of a component.
+r"""Evidence that the value of a single component is unusual, whatever the cause.
 
-Two laws need no simulation, as the derivatives of the fit tell their evidence:
+A component is one of several of a kind, such as one railpad. An effect that no candidate describes shows in its value:
 
-- *changes*: whatever depends on load, motion or preload acts on trains and not on impacts, or differently. To first
-  order it is then another value of a component in passages than in hammer tests;
-- *deviations*: a component differs from those that are alike by more than they differ among themselves. The base fit
-  has moved it and its neighbours to explain that, so the residual is as small as that of intact recordings.
+- *changes*: the value differs between passages and hammer tests. What depends on load, motion or preload does so,
+  because it acts on trains and impacts differently;
+- *deviations*: the value differs from those of the other components of its kind by more than these differ among
+  themselves. The base fit has moved the value to explain the effect, so the residual looks intact.
+
+Both need no simulation. Their evidence follows from the derivatives of the fit.
 """
 
 from __future__ import annotations
@@ -31,10 +33,10 @@ if TYPE_CHECKING:
     Gains = Sequence[tuple[Nuisance, float]]
 
 
-def evidence_of_any(gains: Gains) -> float:
-    """Evidence for one component, whichever it is.
+def evidence_of_any_component(gains: Gains) -> float:
+    """Evidence that one component is unusual, whichever it is.
 
-    All are equally probable: it is the mean of their likelihood ratios.
+    All components are equally probable, so it is the mean of their likelihood ratios.
 
     Parameters
     ----------
@@ -50,7 +52,7 @@ def evidence_of_any(gains: Gains) -> float:
 
 
 def evidence_by_position(gains: Gains) -> list[SpaceEvidence]:
-    """Evidence for each position that a component there is the one.
+    """Evidence for each position that an unusual component is there.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ def evidence_by_position(gains: Gains) -> list[SpaceEvidence]:
     Returns
     -------
     list of SpaceEvidence
-        The largest first. Components of which it is not known what they are fixed to are left out.
+        The largest first. Components without a known position or lock are left out.
     """
     by_level: dict[tuple[str, Any], list[float]] = {}
     for nuisance, nats in gains:
@@ -72,14 +74,14 @@ def evidence_by_position(gains: Gains) -> list[SpaceEvidence]:
 
 
 def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
-    r"""Components, and the gain of each by another value in expensive recordings than in cheap ones.
+    r"""Gain of each component by a value of its own in the recordings that are expensive to predict.
 
-    With c the column of a value on the expensive recordings alone, in units of a wide prior of the change, C the
-    covariance of errors and nuisances, and :math:`i = c^T C^{-1} c`, a change gains
+    In a turnout these are the passages, and hammer tests are cheap. The gain of a change is
 
-    .. math:: \frac{(c^T C^{-1} y)^2}{2 (1 + i)} - \frac12 \ln(1 + i)
+    .. math:: \frac{(c^T C^{-1} y)^2}{2 (1 + i)} - \frac12 \ln(1 + i), \quad i = c^T C^{-1} c
 
-    nats.
+    nats. c is the derivative of the expensive recordings by the value, in units of a wide prior of the change. C is the
+    covariance of errors and nuisances.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     Returns
     -------
     list of (Nuisance, float)
-        [nats]; [] without derivatives, alike components, or one of the two kinds of recordings.
+        [nats]; [] without derivatives, without components of one kind, or with one kind of recordings alone.
     """
     numbers = _components(case)
     if not numbers or not fit.jacobian:
@@ -108,10 +110,10 @@ def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
 
 
 def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
-    """Components, and the gain of each by a value beyond the ordinary scatter of those that are alike.
+    """Gain of each component by a value beyond the scatter of the other components of its kind.
 
-    The scatter is that of the prior, or ``spread_of_others`` without outliers where that is larger. A value beyond it
-    has a prior as wide as changes have in ``local_changes`` (``evidence_of_large_values``).
+    The scatter is that of the prior, or ``spread_of_others`` without outliers where that is larger. The prior of a
+    value beyond it is as wide as that of a change in ``local_changes`` (see ``evidence_of_large_values``).
 
     Parameters
     ----------
@@ -122,7 +124,7 @@ def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     Returns
     -------
     list of (Nuisance, float)
-        [nats]; [] without derivatives or alike components. 0 for components of which the data say nothing.
+        [nats]; [] without derivatives or components of one kind. 0 where the data do not determine the value.
     """
     components = [case.nuisances[k] for k in _components(case)]
     if not components or not fit.jacobian:
@@ -135,5 +137,5 @@ def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
 
 
 def _components(case: Case) -> list[int]:
-    """Numbers of the nuisances of single components that have their like."""
+    """Numbers of the nuisances that belong to one component of several."""
     return [k for k, n in enumerate(case.nuisances) if n.index is not None]

@@ -9,9 +9,9 @@ from scipy.stats import multivariate_normal
 
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.component_laws import (
+from turnout.mismatch.engine.component_evidence import (
     evidence_by_position,
-    evidence_of_any,
+    evidence_of_any_component,
     local_changes,
     local_deviations,
 )
@@ -89,20 +89,20 @@ def test_the_evidence_is_that_of_dense_covariances(changes):
         for c in trains.T
     ]
     expected = np.logaddexp.reduce(gains) - np.log(N_SUPPORT)
-    assert evidence_of_any(local_changes(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert evidence_of_any_component(local_changes(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 def test_impacts_or_trains_alone_show_no_difference():
     case = Supports(in_one(0.4))
     for name in ("hammer", "train"):
         case.observations = tuple(o for o in Supports(in_one(0.4)).observations if o.name == name)
-        assert evidence_of_any(local_changes(case, fit_jointly(case))) == 0.0
+        assert evidence_of_any_component(local_changes(case, fit_jointly(case))) == 0.0
 
 
 def test_components_that_are_not_alike_have_no_position():
     case = Supports(in_one(0.4))
     case.nuisances = tuple(replace(n, index=None) for n in case.nuisances)
-    assert evidence_of_any(local_changes(case, fit_jointly(case))) == 0.0
+    assert evidence_of_any_component(local_changes(case, fit_jointly(case))) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_the_evidence_of_a_deviation_is_that_of_dense_covariances():
         for c in wider.T
     ]
     expected = np.logaddexp.reduce(gains) - np.log(N_SUPPORT)
-    assert evidence_of_any(local_deviations(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    assert evidence_of_any_component(local_deviations(case, fit)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_component_within_the_prior_is_no_deviation_where_all_others_are_equal
     case = Supports(in_one(0.0), deviations=-Supports(in_one(0.0)).truth + np.array(in_one(2.0 * SD)))
     fit = fit_jointly(case)
     assert spread_of_others(case, fit, case.nuisances[2], without_outliers=True) < 0.7 * SD
-    assert evidence_of_any(local_deviations(case, fit)) < 1.0
+    assert evidence_of_any_component(local_deviations(case, fit)) < 1.0
 
 
 def test_what_the_data_do_not_show_is_no_deviation():
