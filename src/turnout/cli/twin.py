@@ -14,6 +14,7 @@ import math
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,7 +84,8 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
     """
     steps = model.history.used_steps
     n = sum(s.n_recordings for s in steps)
-    yield f"{turnout_id}: {n} recordings of {len(steps)} visits ({len(model.computed)} fitted now)"
+    visits = count_of(len(steps), "visit")
+    yield f"{turnout_id}: {count_of(n, 'recording')} of {visits} ({len(model.computed)} fitted now)"
     for step in model.history.steps:
         if not step.is_used:
             i = step.innovation
@@ -96,7 +98,7 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
     yield from (f"note: {note}" for note in model.notes)
     yield from _table(model, show_all)
     yield "against the file: " + ("; ".join(_differences(model)) or "nothing differs")
-    for change in (a for a in model.answers if a.question == "change"):
+    for change in (a for a in model.answers if a.question == "change" and model.changes):
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
     if model.reservation:
@@ -117,9 +119,9 @@ def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
         yield "ln: logarithm of the value divided by that of the track file; 0 is the file's value, -0.69 half of it"
     if waves:
         narrowed = sum(sd < MAX_SD_RATIO * p.sd for p, _, sd in waves)
-        yield f"running surface: {narrowed} of {len(waves)} waves are better known than by the file (--all lists them)"
+        yield f"running surface: {narrowed} of {len(waves)} waves are determined by the recordings (--all lists them)"
     if len(listed) < len(others):
-        yield f"{len(others) - len(listed)} more parameters are hardly better known than by the file (--all lists them)"
+        yield f"{len(others) - len(listed)} more parameters are hardly determined by the recordings (--all lists them)"
 
 
 def _unit(parameter: StateParameter | Deviation) -> str:

@@ -185,8 +185,14 @@ class Results:
         overview = "; ".join(
             f"{r['finding_id'][:12]} {r['sections']}: {r['verdict']} {r['term'] or ''}".strip() for r in rows
         )
-        reason = "several findings carry a term" if chosen else "no such finding carries a term"
-        raise SimulationError(f"{self.turnout_id}: {reason}; say which with --finding. There are {overview or 'none'}.")
+        if chosen:
+            problem = (
+                "several findings name an effect" if not finding_id else f"several findings begin with {finding_id}"
+            )
+        else:
+            problem = f"there is no finding {finding_id}" if finding_id else "no finding names an effect"
+        remedy = "Write one of them after --finding" if chosen or finding_id else "There is nothing to accept"
+        raise SimulationError(f"{self.turnout_id}: {problem}. {remedy}. The findings are: {overview or 'none'}.")
 
     def _rows(self) -> list[dict[str, Any]]:
         """Rows saved below ``work`` or those of the registry, whichever are of newer recordings."""

@@ -163,7 +163,7 @@ def _read_patterns(path: str, content: str) -> tuple[Pattern, ...]:
         if isinstance(error, KeyError) and len(message.split()) == 1:
             message = f"{message!r} is missing"
         elif isinstance(error, (TypeError, AttributeError)):
-            message = f"they are not two tables of names with values ({message})"
+            message = "they are not two tables of names with values"
         raise ConfigError(path, "vehicles and trains", message, "See docs/passages.md") from None
 
 

@@ -1,6 +1,7 @@
 """A finding written into a track file: readable, rejected where it is not sure, replaced and not doubled."""
 
 import json
+import re
 import shutil
 from datetime import datetime
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ from turnout.stages import mismatch
 from turnout.stages.accept_finding import accept
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
 from turnout.stages.mismatch_groups import Group
+from turnout.stages.mismatch_results import Results
 from turnout.stages.track_files import digest_of_model
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
@@ -320,3 +322,24 @@ def test_searches_take_accepted_effects_as_part_of_the_base_model():
 
 def fit_of(values, jacobian):
     return Fit(values, (), np.zeros(0), [], [], jacobian, {}, {}, 0.0, np.zeros((0, 0)), 0, [])
+
+
+@pytest.mark.parametrize(
+    ("effects", "finding_id", "message"),
+    [
+        ((None,), None, "t1: no finding names an effect. There is nothing to accept. The findings are: f0 A: named."),
+        ((None,), "x", "t1: there is no finding x. Write one of them after --finding. The findings are: f0 A: named."),
+        (("gap", "pad"), None, "several findings name an effect. Write one of them after --finding."),
+        (("gap", "pad"), "f", "several findings begin with f. Write one of them after --finding."),
+    ],
+)
+def test_a_finding_that_is_not_there_or_not_the_only_one_is_named(tmp_path, monkeypatch, effects, finding_id, message):
+    rows = [
+        {"finding_id": f"f{k}", "sections": "A", "verdict": "named", "term": effect, "term_json": effect}
+        for k, effect in enumerate(effects)
+    ]
+    results = Results(tmp_path, "t1")
+    monkeypatch.setattr(results, "_rows", lambda: rows)
+    monkeypatch.setattr(results, "_registry_rows", lambda table: [])
+    with pytest.raises(SimulationError, match=re.escape(message)):
+        results.finding(finding_id)

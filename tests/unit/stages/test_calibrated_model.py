@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -313,3 +314,17 @@ def test_a_turnout_without_recordings_says_so(turnout, capsys):
     with pytest.raises(SimulationError, match="no hammer test and no passage"):
         calibrated.calibrate_turnout("t1")
     assert main(["twin", "--turnout", "t1"]) == 2 and "nothing can be calibrated" in capsys.readouterr().err
+
+
+def test_of_one_visit_no_answer_on_changes_is_printed():
+    history = SimpleNamespace(
+        used_steps=[SimpleNamespace(n_recordings=2)], steps=[], parameters=[],
+        belief=SimpleNamespace(mean=np.zeros(0), sd=np.zeros(0)),
+    )  # fmt: skip
+    answers = [SimpleNamespace(question="change", verdict="none", visit=DAYS[0])]
+    model = SimpleNamespace(
+        history=history, computed=[1], held={}, notes=[], answers=answers, deviations=[], changes=(), reservation=""
+    )
+    text = "\n".join(model_text("t1", model))
+    assert text.startswith("t1: 2 recordings of 1 visit (1 fitted now)")
+    assert "changes: cannot tell from fewer than two visits" in text and "changes up to" not in text
