@@ -10,6 +10,8 @@ from pathlib import Path
 from turnout.config.layout_schema import QUANTITIES
 from turnout.config.schema import LABEL
 from turnout.errors import ConfigError
+from turnout.readers.directions import opposite_directions
+from turnout.records import RawChannel
 from turnout.stages.file_contents import ChannelContents, FileContents
 from turnout.units import SI, conversion
 
@@ -17,6 +19,7 @@ DECIDE = "# DECIDE:"  # marks what the files do not state
 TEST_NAME = re.compile(rf"({LABEL})_([A-Za-z0-9]+)")
 PANELS = {"OT": "open track", "SP": "switch", "CLP": "closure", "CP": "crossing", "AS": "after the crossing"}
 QUANTITY_OF_ROLE = {"force": "force", "response": "acceleration"}
+MAX_STATED = 40  # characters of a direction that the file states
 MOUNTING = {"hammer": ("hammer", "rail head at sleeper"), "passages": ("rail web", "rail web")}
 
 
@@ -193,10 +196,27 @@ def _channel_lines(
         yield from _unit_lines(channel, quantity, dimension)
         mounting = MOUNTING[branch][0 if quantity == "force" else 1]
         yield f"      mounting: {mounting}"
+        yield _sign_line(index, channel, quantity, first)
         yield f"      # limit:  range beyond which it clips [{SI[quantity]}], from the data sheet"
     if branch == "passages" and quantity != "ignored":
         label = next((label for label in labels if label in re.split(r"[^A-Za-z0-9-]+", channel.name)), labels[0])
         yield f"      section: {label}  {DECIDE} section at which the sensor is mounted"
+
+
+def _sign_line(index: int, channel: ChannelContents, quantity: str, first: FileContents) -> str:
+    """The sign of a channel: of a force by its impacts, of a response by the direction that the file states."""
+    if quantity == "force":
+        is_negative = channel.name == first.event_channel and all(event.size < 0.0 for event in first.events)
+        return (
+            "      sign: -1  # its impacts are negative"
+            if is_negative
+            else "      # sign: -1  if its impacts are negative"
+        )
+    raw = RawChannel(channel.name, index, quantity)
+    stated = next((text for _, _, text in opposite_directions(first.records[0], (raw,))), None)
+    if stated is None:
+        return "      # sign: -1  if the sensor is mounted upside down"
+    return f"      sign: -1  {DECIDE} the file states {' '.join(stated.split())[:MAX_STATED]!r}: is it upside down?"
 
 
 def _quantity(channel: ChannelContents) -> tuple[str, str]:

@@ -14,6 +14,8 @@ from turnout.config.acknowledgements import read_acknowledgements
 from turnout.config.campaign_notes import read_campaigns, read_trains
 from turnout.config.events import read_events
 from turnout.config.table_edits import added_row
+from turnout.config.turnouts_table import ROW
+from turnout.registry import schema as registry_schema
 
 HEADER = "turnout,section,date,kind,resets,note\n"
 
@@ -333,3 +335,10 @@ def test_none_beside_a_resonance_contradicts_it(tmp_path):
     (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},none ballast,\n")
     found, (error,), _ = read_events(tmp_path / "events.csv", "events.csv", None, {})
     assert not found and "resets is 'none ballast'. Write the resonances, or 'none' alone." in str(error)
+
+
+def test_the_table_of_turnouts_and_the_registry_have_the_same_limits():
+    columns = {column.name: column for column in registry_schema.tables()["turnouts"]}
+    limits = {name: (key.minimum, key.maximum) for name, key in ROW.items() if name in columns and key.maximum}
+    assert {"km", "lat_deg", "lon_deg"} <= set(limits)
+    assert limits == {name: (columns[name].minimum, columns[name].maximum) for name in limits}

@@ -202,3 +202,16 @@ def test_files_of_different_wiring_make_no_layout(tmp_path):
     write(renamed, second, "hdf5")
     with pytest.raises(ConfigError, match=r"its channels are hammer, rail, those of A7_1\.h5 force, rail"):
         layout_draft([file_contents(first), file_contents(second)])
+
+
+@pytest.mark.parametrize(("sign", "name"), [(1, "rail"), (-1, "rail -Z")])
+def test_the_signs_that_a_file_shows_are_in_the_draft(sign, name, tmp_path):
+    """Of the force by its impacts, of the response by its direction; the other signs are named in a comment."""
+    channels = (Channel("force", "force"), Channel(name, "acceleration"))
+    turned = [replace(r, samples=r.samples * [[sign], [1.0]], channels=channels) for r in hammer_test()]
+    write(turned, tmp_path / "A7_1.h5", "hdf5")
+    draft = layout_draft([file_contents(tmp_path / "A7_1.h5")])
+    assert len(re.findall(r"^ +# sign: -1  if", draft, re.MULTILINE)) == (2 if sign > 0 else 0)
+    signs = re.findall(r"^ +sign: (.*)", draft, re.MULTILINE)
+    assert [text.startswith("-1") for text in signs] == ([] if sign > 0 else [True, True])
+    assert any("the file states 'rail -Z'" in text for text in decisions(draft)) == (sign < 0)
