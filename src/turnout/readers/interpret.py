@@ -23,12 +23,14 @@ from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
-from turnout.readers.stated_counts import missing_samples
+from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import LongRecording, RawDescription, Recording
 
 MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
+
+VALID_REMEDY = "Export the measured samples alone; if the entry means something else, name it in 'checked_entries'"
 
 
 def _missing_sample_errors(
@@ -221,6 +223,8 @@ class _Conversion:
         description, source = self.description, self.source
         where = f"record {k + 1} of {self.n_record}"
         n_sample = _sample_count(record, where, description.n_samples, source)
+        if problem := unfilled_buffer(record, n_sample):
+            raise source.error(where, problem, VALID_REMEDY, reason="wrong_length")
         sensor_rows = self.assignments.sensor_rows(record, where)
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source)
         rate = resolve(statements, description.rate, where, source)

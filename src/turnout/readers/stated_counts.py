@@ -1,12 +1,22 @@
-"""The number of samples that a file states beside them, in any format: with fewer the file was cut off."""
+"""The number of samples that a file states beside them, in any format: with fewer the file was cut off.
+
+A number of valid samples that is less than theirs is that of a buffer that was not filled.
+"""
 
 import re
+from functools import lru_cache
 from typing import Any
 
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 
+# Words of names such as "valid_samples", "n_samples_used", "valid count", "last valid index".
+VALID_WORDS = frozenset("valid used actual written filled captured gultig gultige gultiger".split())
+SAMPLE_WORDS = frozenset("sample samples points values rows werte messwerte".split())
+COUNT_WORDS = frozenset("n nr no nb num number count counts length index anzahl".split())
+OTHER_WORDS = frozenset("of in the last total".split())
+FIRST_FREE = (frozenset(("write", "index")), frozenset(("write", "pointer")), frozenset(("nvalid",)))
 COUNT_NAMES = frozenset(("n_samples", *SAMPLE_COUNT_NAMES))
 
 
@@ -29,6 +39,42 @@ def missing_samples(record: RawRecord, n_sample: int) -> str:
         if "_".join(words_of(entry.name)) in COUNT_NAMES and (promised := _whole_number(entry.value)) > n_sample:
             return f"the file ends after {n_sample} of the {promised} samples that {entry.place} states"
     return ""
+
+
+def unfilled_buffer(record: RawRecord, n_sample: int) -> str:
+    """What the metadata of a record state about samples of a buffer that were never measured.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    n_sample : int
+        Samples of the record.
+
+    Returns
+    -------
+    str
+        The problem, for a message; "" if no entry states fewer valid samples.
+    """
+    for entry in record.entries:
+        if not _counts_valid_samples(entry.name):
+            continue
+        values = entry.value.ravel().tolist() if hasattr(entry.value, "ravel") else entry.value
+        numbers = [_whole_number(v) for v in (values if isinstance(values, (list, tuple)) else [values])]
+        n_free = 1 if "index" in words_of(entry.name) else 0  # an index may be that of the last sample
+        if fewer := [number for number in numbers if 1 < number < n_sample - n_free]:
+            place = f"{entry.name!r} in {entry.place}" if entry.place else repr(entry.name)
+            return f"{place} is {min(fewer)}, and there are {n_sample} samples: the others may be no measured ones"
+    return ""
+
+
+@lru_cache(maxsize=4096)
+def _counts_valid_samples(name: str) -> bool:
+    """Whether a name means a number of valid samples, and of nothing else."""
+    words = frozenset(words_of(name))
+    is_plain = words <= VALID_WORDS | SAMPLE_WORDS | COUNT_WORDS | OTHER_WORDS
+    is_count = bool(words & VALID_WORDS and words & SAMPLE_WORDS) or ("valid" in words and bool(words & COUNT_WORDS))
+    return words in FIRST_FREE or (is_plain and is_count)
 
 
 def _whole_number(value: Any) -> int:

@@ -1,6 +1,7 @@
 """A number of samples in the metadata of any format, names of a sampling rate in further languages, broken scales."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import nptdms
@@ -137,3 +138,40 @@ def test_a_text_without_any_character_is_empty(content, tmp_path):
     with pytest.raises(ReadError, match="there is no text") as raised:
         result_of(tmp_path, "a.csv")
     assert raised.value.reason == "empty"
+
+
+VALID = {
+    "valid_samples": True, "ValidSamples": True, "n_valid": True, "last_valid_index": True, "samples_written": True,
+    "Anzahl gültiger Werte": True, "used samples": True, "write_index": True,
+    "valid": False, "valid_until": False, "n_used": False, "used sensors": False, "number of valid impacts": False,
+    "actual position": False, "valid_bits": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", VALID)
+@pytest.mark.parametrize("format", ["hdf5", "npz"])
+def test_a_buffer_that_was_not_filled_is_no_recording(format, name, tmp_path):
+    """Before, the zeros behind the last measured sample were read as samples."""
+    samples = np.random.default_rng(3).normal(size=(2, 60))
+    samples[:, 45:] = 0.0
+
+    def problems(number):
+        if format == "hdf5":
+            with h5py.File(tmp_path / "a.hdf5", "w") as file:
+                file["force"], file["rail"] = samples
+                file["rail"].attrs[name] = number
+        else:
+            np.savez(tmp_path / "a.npz", force=samples[0], rail=samples[1], **{name: number})
+        sensors = (
+            RawChannel("force", "force", "force", unit="N"),
+            RawChannel("rail", "rail", "acceleration", unit="g"),
+        )
+        description = RawDescription(sensors, rate=1e3)
+        result = read(f"a.{format}", tmp_path, description)
+        checked = read(f"a.{format}", tmp_path, replace(description, checked_entries=(name,)))
+        assert len(checked.recordings) == 1
+        return [str(e) for e in result.errors if e.reason == "wrong_length"]
+
+    assert bool(problems(45)) == VALID[name]
+    assert all("is 45, and there are 60 samples" in text for text in problems(45))
+    assert not problems(60) and bool(problems(59)) == (VALID[name] and "index" not in name)
