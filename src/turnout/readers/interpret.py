@@ -13,6 +13,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistics, channel_error
+from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.channel_units import undecided_error
 from turnout.readers.lazy import Column
@@ -226,6 +227,8 @@ class _Conversion:
         if problem := unfilled_buffer(record, n_sample):
             raise source.error(where, problem, VALID_REMEDY, reason="wrong_length")
         sensor_rows = self.assignments.sensor_rows(record, where)
+        if problem := delay_problem(record, sorted(sensor_rows)):
+            raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source)
         rate = resolve(statements, description.rate, where, source)
         channel_maps = self.assignments.mappings(record, where)

@@ -1,10 +1,14 @@
 """Structures of MATLAB and groups of HDF5 that hold one channel each."""
 
+from dataclasses import replace
+
 import h5py
+import nptdms
 import numpy as np
 import pytest
 import scipy.io
 
+from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 
@@ -124,3 +128,63 @@ def test_groups_without_a_vector_are_named_with_what_they_hold(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"force": signal, "rail": signal})
     error, *_ = read("a.mat", tmp_path, RawDescription((RawChannel("f", "force", "force", "N"),), rate=1000.0)).errors
     assert "group 'force': it holds no vector of samples; in it are 'clock', 'trace'. Save each" in str(error)
+
+
+VERSIONS = {
+    ("raw", "filtered"): True, ("Rohdaten", "gefiltert"): True, ("data", "backup"): True, ("measured", "scaled"): True,
+    ("hit 1 raw", "hit 1 filtered"): True, ("impact 1", "impact 1 copy"): True,
+    ("A", "B"): False, ("raw 1", "raw 2"): False, ("rail left", "rail right"): False, ("filtered A", "raw B"): False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("names", VERSIONS, ids=" and ".join)
+@pytest.mark.parametrize("format", ["h5", "mat", "tdms"])
+def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
+    """Before, each impact counted twice, once as it was measured and once as a program changed it."""
+    samples = np.random.default_rng(5).normal(size=(2, 2, 50))
+    groups = {name: dict(zip(("force", "rail"), pair)) for name, pair in zip(names, samples)}
+    if format == "h5":
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            for name, channels in groups.items():
+                file[f"{name}/force"], file[f"{name}/rail"] = channels.values()
+    elif format == "mat":
+        scipy.io.savemat(tmp_path / "a.mat", {name.replace(" ", "_"): channels for name, channels in groups.items()})
+    else:
+        with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+            for name, channels in groups.items():
+                writer.write_segment([nptdms.ChannelObject(name, *item) for item in channels.items()])
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    description = RawDescription(sensors, rate=1e3)
+    if not VERSIONS[names]:
+        assert len(read(f"a.{format}", tmp_path, description).recordings) == 2
+        return
+    with pytest.raises(ReadError, match="have the same channels, and their names say that they are versions of one"):
+        read(f"a.{format}", tmp_path, description)
+
+
+DELAYS = {
+    "delay_samples": True, "latency_us": True, "Verzögerung [ms]": True, "time shift": True, "group delay": True,
+    "trigger_delay": False, "settling delay": False, "delay unit": False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DELAYS)
+def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_path):
+    """Before, it was read without a message, and the phase between force and response was wrong."""
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    description = RawDescription((*sensors, RawChannel("aux", "aux", "ignored")), rate=1e3)
+
+    def delays(of_channels):
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            for channel, samples in zip(("force", "rail", "aux"), np.random.default_rng(5).normal(size=(3, 50))):
+                file[channel] = samples
+                if channel in of_channels:
+                    file[channel].attrs[name] = of_channels[channel]
+        result = read("a.h5", tmp_path, description)
+        checked = read("a.h5", tmp_path, replace(description, checked_entries=(name,)))
+        assert len(checked.recordings) == 1
+        return [str(error) for error in result.errors if error.reason == "clock_drift"]
+
+    assert bool(delays({"rail": 12})) == DELAYS[name] and bool(delays({"rail": "12", "force": "3"})) == DELAYS[name]
+    assert not delays({"force": 12, "rail": 12}) and not delays({"aux": 12}) and not delays({"rail": 0.0})
+    assert all(f"{name}: 'force' 0, 'rail' 12" in text for text in delays({"rail": 12}))
