@@ -134,6 +134,7 @@ VERSIONS = {
     ("raw", "filtered"): True, ("Rohdaten", "gefiltert"): True, ("data", "backup"): True, ("measured", "scaled"): True,
     ("hit 1 raw", "hit 1 filtered"): True, ("impact 1", "impact 1 copy"): True,
     ("A", "B"): False, ("raw 1", "raw 2"): False, ("rail left", "rail right"): False, ("filtered A", "raw B"): False,
+    ("measurement", "samples"): False,
 }  # fmt: skip
 
 
