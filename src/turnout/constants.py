@@ -8,4 +8,3 @@ Z95 = 1.96  # half width of a 95 % interval in standard errors, rounded as on th
 Z95_EXACT = 1.959964  # the same with the digits that the texts of a finding use
 MAD_TO_SD = 1.4826  # standard deviation of normal values over their median absolute deviation
 DAYS_PER_YEAR = 365.25  # d, of the Julian calendar
-MAX_KM = 10_000  # km, position of a turnout along its line: a larger number is in metres

@@ -10,7 +10,6 @@ from turnout.config.document import Place, as_config_errors
 from turnout.config.file_names import file_key, name_problem
 from turnout.config.layout_schema import HAMMER_RATE, PASSAGE_RATE
 from turnout.config.schema import ID, Key, suggestion, value_problem
-from turnout.constants import MAX_KM
 from turnout.errors import ConfigError
 
 NO_TABLE = "Run 'turnout add ID LAYOUT' to begin one"
@@ -21,7 +20,7 @@ ROW = {
     "raw": Key("text", "folder of its raw files below the raw root; empty: its id"),
     "name": Key("text", "name for display"),
     "line": Key("text", "railway line"),
-    "km": Key("number", "position along the line", unit="km", minimum=0, maximum=MAX_KM),
+    "km": Key("number", "position along the line", unit="km", minimum=0, maximum=10000),
     "lat_deg": Key("number", "latitude, WGS 84", unit="°", minimum=-90, maximum=90),
     "lon_deg": Key("number", "longitude, WGS 84", unit="°", minimum=-180, maximum=180),
     "external_id": Key("text", "the owner's id"),

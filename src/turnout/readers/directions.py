@@ -23,6 +23,8 @@ AGAINST_AXIS = re.compile(
 UPSIDE_DOWN = re.compile(
     r"upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
 )
+# In the name of a channel itself; "down" there may be a place.
+INVERTED = re.compile(r"upside.?down|(?<![a-z])(?:inverted|invertiert|negated|flipped)(?![a-z])", re.IGNORECASE)
 DIRECTION_NAME = re.compile(
     r"direction|richtung|orient|ausricht|^dof$|degreeoffreedom|axis$|achse$|mount|montage|einbau"
 )
@@ -49,10 +51,10 @@ def is_against_axis(text: str) -> bool:
 
     Examples
     --------
-    >>> [is_against_axis(text) for text in ("12 -Z", "rail:Z-", "neg_z", "rail-z", "+Z", "Z-axis")]
-    [True, True, True, False, False, False]
+    >>> [is_against_axis(text) for text in ("12 -Z", "rail:Z-", "neg_z", "rail inverted", "rail-z", "+Z", "Z-axis")]
+    [True, True, True, True, False, False, False]
     """
-    return len(text) <= MAX_TEXT and bool(AGAINST_AXIS.search(text))
+    return len(text) <= MAX_TEXT and bool(AGAINST_AXIS.search(text) or INVERTED.search(text))
 
 
 @lru_cache(maxsize=4096)

@@ -11,6 +11,7 @@ from turnout.readers.claims import check_claims
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 from turnout.readers.start_columns import with_axis_start
+from turnout.readers.stated_scales import with_named_factors
 from turnout.readers.stated_sensitivities import with_named_sensitivities
 from turnout.readers.stated_units import with_stated_units
 from turnout.readers.stated_zones import with_stated_zone
@@ -48,7 +49,8 @@ class Format:
         check_claims(self.module, source)
         raw = import_module(f"turnout.readers.{self.module}").read_raw(source)
         records = tuple(
-            with_stated_units(with_named_sensitivities(r)) if isinstance(r, RawRecord) else r for r in raw.records
+            with_stated_units(with_named_sensitivities(with_named_factors(r))) if isinstance(r, RawRecord) else r
+            for r in raw.records
         )
         records = with_stated_starts(records)
         records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)

@@ -8,8 +8,9 @@ import numpy as np
 from turnout.readers.lazy import Column
 from turnout.readers.source import BLOCK_SIZE
 
-# Nulls of well logs; lowest codes of converters with 16, 24 and 32 bits. The highest code is clipping.
-OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31)
+# Nulls of well logs; lowest codes of converters with 16, 24 and 32 bits, of which the highest code is clipping; fill
+# value of masked arrays.
+OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31, 1e20)
 MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
 
 
@@ -36,7 +37,7 @@ def missing_code(value: float) -> float | None:
     digits, _, decimals = text.partition(".")
     if len(digits) >= MIN_NINES and set(digits + decimals) == {"9"}:
         return math.copysign(float(text), value)
-    return next((math.copysign(code, value) for code in OTHER_CODES if math.isclose(size, code)), None)
+    return next((math.copysign(code, value) for code in OTHER_CODES if math.isclose(size, code, rel_tol=1e-7)), None)
 
 
 def count_alone(column: Column, code: float) -> int:

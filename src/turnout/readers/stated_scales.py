@@ -7,6 +7,7 @@ unit in the layout ends with "!".
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,7 +30,7 @@ from turnout.readers.scale_words import (
     scale_meaning,
     value_of_word,
 )
-from turnout.readers.source import MEANINGLESS_UNITS
+from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.stated_numbers import MAX_CHANNELS, finite_numbers, number_and_unit
 from turnout.readers.statements import PLACEHOLDERS
 from turnout.units import conversion
@@ -281,6 +282,34 @@ def _scale_name(entry: Entry, names: Sequence[str]) -> str:
 def _is_inside(inner: str, outer: str) -> bool:
     """Whether a place lies in a group of another place."""
     return inner != outer and inner.startswith(f"{outer}/" if outer else "")
+
+
+# A power of ten by which the numbers of a channel may be multiplied: "force x100", "rail*10", "rail ×0.1".
+FACTOR_IN_NAME = re.compile(r"(?:(?:^|[\s_(\[])[xX]|\s?[×*])\s?(10+|0[.,]0*1)(?=$|[\s_)\]])")
+
+
+def with_named_factors(record: RawRecord) -> RawRecord:
+    """The record with a statement about the scale of each channel whose name has a factor.
+
+    A number that tells the channels of the file apart, as in "acc x10" beside "acc x11", is none.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        The same record if no name has a factor.
+    """
+    stems = [re.sub(r"\d+", "0", name) for name in record.names]
+    factors = {
+        i: scale_problem(f"a factor in the name of the channel, {match[0].strip(' _([')!r}")
+        for i, name in enumerate(record.names)
+        if (match := FACTOR_IN_NAME.search(name)) and stems.count(stems[i]) == 1
+    }
+    return replace(record, undecided={**factors, **record.undecided}) if factors else record
 
 
 def scale_text(facts: Mapping[str, Any]) -> str:

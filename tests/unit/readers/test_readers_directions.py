@@ -58,7 +58,9 @@ def test_a_direction_in_the_metadata_is_reported_for_its_channel(format, name, v
     assert [f"channel 'rail': its {name!r} is {value!r}" in text for text in texts] == [True] * ENTRIES[name, value]
 
 
-@pytest.mark.parametrize("name", ["rail -Z", "Rail:12:-Z", "rail_-z", "rail (-Z)", "rail Z-", "neg Z rail"])
+@pytest.mark.parametrize(
+    "name", ["rail -Z", "Rail:12:-Z", "rail_-z", "rail (-Z)", "rail Z-", "neg Z rail", "rail inverted"]
+)
 def test_a_direction_in_the_name_of_a_channel_is_reported(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     (remark,) = remarks(tmp_path / "a.npz", replace(RAIL, source=name))
@@ -66,7 +68,7 @@ def test_a_direction_in_the_name_of_a_channel_is_reported(name, tmp_path):
     assert remarks(tmp_path / "a.npz", replace(RAIL, source=name, sign=-1)) == []
 
 
-@pytest.mark.parametrize("name", ["rail-Z", "rail_z", "rail +Z", "Z-axis", "a-x-2"])
+@pytest.mark.parametrize("name", ["rail-Z", "rail_z", "rail +Z", "Z-axis", "a-x-2", "inverter"])
 def test_a_hyphen_in_a_name_is_no_minus(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     assert remarks(tmp_path / "a.npz", replace(RAIL, source=name)) == []

@@ -50,7 +50,7 @@ def reason_of(root, name, description=HAMMER):
 
 
 @pytest.mark.parametrize("samples", [[700], [0], [N - 1], [700, 701, 702, 2000]])
-@pytest.mark.parametrize("code", [-9999.0, 999.0, -999.25, 99999.9, -32768.0, 9999.99])
+@pytest.mark.parametrize("code", [-9999.0, 999.0, -999.25, 99999.9, -32768.0, 9999.99, 1e20])
 def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_path):
     rail = RAIL.copy()
     rail[samples] = code

@@ -368,3 +368,25 @@ def test_a_number_that_may_be_a_scale_is_rejected_by_name(format, tmp_path):
         assert is_read(outcome(written(format, tmp_path, [(name, neutral)]), tmp_path, LAYOUT)), name
     for name, value in OTHER_SCALES:
         assert is_read(outcome(written(format, tmp_path, [(name, value)]), tmp_path, LAYOUT)), name
+
+
+FACTORS = {
+    ("force x100", "rail"): [0], ("force", "rail*10"): [1], ("force_x1000", "rail ×0.1"): [0, 1],
+    ("acc x10", "acc x11"): [], ("acc x1", "acc x2"): [], ("force", "max10"): [], ("force", "rail x"): [],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("names", FACTORS, ids=" and ".join)
+def test_a_factor_in_the_name_of_a_channel_is_a_scale_of_which_nothing_says_whether_it_is_applied(names, tmp_path):
+    """Before, the numbers were read without a message, a hundred times too large or too small."""
+    rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(6).normal(size=(40, 2)).round(4))
+    (tmp_path / "a.csv").write_text(f"{';'.join(names)}\n{rows}", encoding="utf-8")
+    rejected = []
+    for i in range(2):
+        units = ["g!", "g!"]
+        units[i] = "g"
+        sensors = tuple(RawChannel(f"s{k}", k, "acceleration", unit=unit) for k, unit in enumerate(units))
+        result = read("a.csv", tmp_path, RawDescription(sensors, rate=1e3))
+        assert len(result.recordings) + len(result.errors) == 1
+        rejected += [i for error in result.errors if "a factor in the name of the channel" in str(error)]
+    assert rejected == FACTORS[names]
