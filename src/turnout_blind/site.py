@@ -197,7 +197,7 @@ def with_switch(rng: np.random.Generator, site: Site) -> Site:
         The same site, changed.
     """
     _lay_bearers(rng, site)
-    true_switch, site.switch = draw_switch(rng, site.world.position)
+    true_switch, site.switch = draw_switch(rng, site.world.position, site.world.grid)
     add_switch(rng, site.world, true_switch, site.trains)
     site.chains = tuple(replace(c, full_scale=5.0 * c.full_scale) for c in site.chains)  # impacts at the change
     return site

@@ -31,6 +31,7 @@ BLADE_POWER, STOCK_POWER = 1.3, 1.8  # exponents of both tops; the owner's file 
 ONLY_BLADE = 0.25  # length behind the planed part from which wheels cannot touch the stock rail [m]
 FIRST_CHAIR = 0.2  # no chair lies nearer behind the toe: its force is spread over the nodes about it [m]
 BESIDE_SUPPORT = 0.07  # a toe this near behind a bearer would count as on it [m]
+TOE_ERROR = 0.01  # of the owner's file: the blade creeps and expands [m]
 WHEEL_DEPTH_SPREAD, WHEEL_SHIFT = 0.1, 0.03  # each wheel sinks differently and changes elsewhere [-, m]
 
 
@@ -162,8 +163,8 @@ class TrueBlade:
         return np.array([f * self.switch.stock_top(x - shift) for f, shift in wheels]), np.tile(top, (n, 1))
 
 
-def clear_of_bearers(toe: float, bearers: np.ndarray) -> float:
-    """The toe, moved by up to a third of a bay so that every bearer behind it has a chair.
+def clear_of_bearers(toe: float, bearers: np.ndarray, nodes: np.ndarray) -> float:
+    """The node nearest to a toe at which every bearer behind it has a chair, and none is at the toe.
 
     Parameters
     ----------
@@ -171,6 +172,8 @@ def clear_of_bearers(toe: float, bearers: np.ndarray) -> float:
         Drawn position. [m]
     bearers : (n,) array of float
         Positions of the bearers. [m]
+    nodes : (m,) array of float
+        Nodes of the grid; the blade begins at one of them. [m]
 
     Returns
     -------
@@ -179,17 +182,17 @@ def clear_of_bearers(toe: float, bearers: np.ndarray) -> float:
 
     Examples
     --------
-    >>> [round(clear_of_bearers(toe, np.array([2.4, 3.0, 3.6])), 2) for toe in (2.42, 2.6, 2.9, 3.0)]
-    [2.47, 2.6, 2.79, 2.79]
+    >>> bearers, nodes = np.array([2.4, 3.0, 3.6]), np.linspace(2.0, 4.0, 21)
+    >>> [round(clear_of_bearers(toe, bearers, nodes), 2) for toe in (2.42, 2.61, 2.83, 3.0)]
+    [2.5, 2.6, 2.7, 3.1]
     """
-    behind = bearers[bearers >= toe]
-    if behind.size and behind[0] - toe <= FIRST_CHAIR:
-        return float(behind[0] - FIRST_CHAIR - 0.01)
-    before = bearers[bearers < toe]
-    return max(toe, float(before[-1]) + BESIDE_SUPPORT) if before.size else toe
+    distance = nodes[:, None] - bearers
+    is_clear = ~np.any((distance > -FIRST_CHAIR - 0.01) & (distance < BESIDE_SUPPORT), axis=1)
+    clear = nodes[is_clear]
+    return float(clear[np.argmin(np.abs(clear - toe))])
 
 
-def draw_switch(rng: np.random.Generator, bearers: np.ndarray) -> tuple[Switch, Switch]:
+def draw_switch(rng: np.random.Generator, bearers: np.ndarray, grid: Grid) -> tuple[Switch, Switch]:
     """Switch with its heel and the change of the wheels near the sensors, which lie from 2 to 9 m.
 
     Parameters
@@ -198,6 +201,8 @@ def draw_switch(rng: np.random.Generator, bearers: np.ndarray) -> tuple[Switch, 
         Source of the random numbers.
     bearers : (n,) array of float
         Positions of the bearers. [m]
+    grid : Grid
+        Grid of the stock rail; the blade begins at one of its nodes.
 
     Returns
     -------
@@ -205,7 +210,8 @@ def draw_switch(rng: np.random.Generator, bearers: np.ndarray) -> tuple[Switch, 
         True and nominal switch.
     """
     heel, length = float(rng.uniform(7.2, 8.0)), float(rng.uniform(2.2, 3.0))
-    toe = clear_of_bearers(heel - float(rng.uniform(4.6, 5.8)), bearers)
+    nodes = grid.start + grid.step * np.arange(grid.n)
+    toe = clear_of_bearers(heel - float(rng.uniform(4.6, 5.8)), bearers, nodes)
     chair, damping = float(rng.uniform(2e8, 4e8)), float(rng.uniform(1.5e4, 3.5e4))
     true = Switch(
         toe, heel, float(rng.uniform(12e-3, 18e-3)), length, toe + float(rng.uniform(0.3, 0.8)),
@@ -219,7 +225,7 @@ def draw_switch(rng: np.random.Generator, bearers: np.ndarray) -> tuple[Switch, 
         toe, heel, perturb(true.depth, 0.1), perturb(length, 0.05), true.fall_start + 0.05 * float(rng.normal()),
         perturb(true.fall, 0.1), true.fall_length, perturb(chair, 0.15), perturb(damping, 0.3),
     )  # fmt: skip
-    return true, nominal
+    return true, replace(nominal, toe=toe + TOE_ERROR * float(np.clip(rng.normal(), -3.0, 3.0)))
 
 
 def add_switch(rng: np.random.Generator, world: World, switch: Switch, trains: Mapping[str, Train]) -> None:

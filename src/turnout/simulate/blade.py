@@ -143,6 +143,27 @@ class Blade:
             return (bay + round(share)) * per_bay
         return bay * per_bay + min(max(round(share * per_bay), 1), per_bay - 1)
 
+    def toe_limits(self, track: Track) -> tuple[float, float] | None:
+        """How far the toe may move so that the same chairs are behind it.
+
+        Parameters
+        ----------
+        track : Track
+            The track with the stock rail.
+
+        Returns
+        -------
+        (float, float) or None
+            Lowest and highest shift [m]; None for a toe on a support, which has no free end.
+        """
+        position = float(np.interp(self.toe, track.support, np.arange(track.support.size)))
+        bay = min(int(position), track.support.size - 2)
+        if not AT_SUPPORT < position - bay < 1.0 - AT_SUPPORT:
+            return None
+        start, end = track.support[bay : bay + 2].tolist()
+        margin = AT_SUPPORT * (end - start)
+        return start + margin - self.toe, end - margin - self.toe
+
     def element_rail(self, track: Track, start: float, end: float) -> Rail:
         """Section of an element of the blade; several sections are combined in series.
 

@@ -17,6 +17,7 @@ from turnout.mismatch.turnout.priors import CASE, RECEPTANCE
 from turnout.mismatch.turnout.rail_parameters import with_rail
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit
+from turnout.mismatch.turnout.toe_position import with_toe
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.simulate.sensor import Sensor
 
@@ -119,7 +120,8 @@ def _with_lifting_chairs(
 ) -> tuple[Predictor, ObservedTests]:
     """Predictor and tests with chairs that open and differ, on the track of ``values``; the same without chairs."""
     zone, pairs = predictor.site.nominal, list(tests.frf_pairs.values())
-    lifting = lifting_chairs(track_with(with_rail(zone, values).turnout.track_of("main"), zone, values), pairs)
+    track = track_with(with_rail(zone, values).turnout.track_of("main"), zone, values)
+    lifting = lifting_chairs(with_toe(track, values), pairs)
     if lifting is None:
         return predictor, tests
     errors = chair_errors(predictor, values, pairs)

@@ -64,6 +64,7 @@ class TrackPriors:
         0.5, "ln", "largest deviation of an unsprung mass: beyond, it is an effect", "numerical")
     gain_sd: float = prior(0.02, "-", "gain of a sensor: calibration", "convention")
     seat_sd: float = prior(0.02, "m", "position of a sensor along the rail", ERROR_MODES)
+    toe_sd: float = prior(0.03, "m", "toe of a blade: drawing, creep and temperature", SWITCH_PANELS)
     load_sd: float = prior(0.05, "-", "sprung mass whose load was measured or noted, as a share of it", "convention")
     load_bound_sds: float = prior(
         2.0, "prior sd", "bounds of an unknown load: a seventh beyond empty and full", "convention")
@@ -137,7 +138,7 @@ class ReceptancePriors:
     n_drawn_starts: int = prior(4, "starts", "drawn from the priors, of the fit to all tests together", MINIMA)
     lifting_rate: float = prior(5e3, "Hz", "steps of an impact that opens slide chairs: five for a period", "numerical")
     lifting_error: float = prior(
-        0.65, "share of the change", "by chairs that open, rms of 81 receptances of five intact panels",
+        0.5, "share of the change", "by chairs that open, rms of 167 receptances of twelve panels",
         SWITCH_PANELS)
     tangent_motion: float = prior(1e-6, "m", "under an impact, for the secant of a port", FRICTION)
     free_rate: float = prior(
@@ -154,6 +155,7 @@ class ReceptancePriors:
     relative_step: float = prior(
         1e-3, "-", "change of a support's value, for derivatives of links that follow it", "numerical")
     seat_step: float = prior(0.01, "m", "of the derivative by the position of a sensor", "numerical")
+    toe_step: float = prior(0.01, "m", "of the derivative by the position of the toe", "numerical")
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 from turnout.mismatch.turnout.site import Site
 from turnout.mismatch.turnout.site_model import SiteModel, drop_oldest
+from turnout.mismatch.turnout.toe_position import TOE, with_toe
 from turnout.mismatch.turnout.track_parameters import track_value_key, track_with
 from turnout.simulate.track import Track
 
@@ -122,11 +123,13 @@ class ReceptancePredictor(SiteModel):
             repr(track_terms),
             tuple(rail.values()),
             track_value_key(self.zone, values),
+            values.get(TOE, 0.0),
             pair_keys,
             tuple(seats.items()),
         )
         if key not in self._sensitivities:
-            model = ReceptanceModel(track_with(self._track_near(rail), self.zone, values), track_terms)
+            track = with_toe(track_with(self._track_near(rail), self.zone, values), values)
+            model = ReceptanceModel(track, track_terms)
             self._sensitivities[key] = ReceptanceSensitivity(model, pair_keys, seats, self.zone)
             # all positions at once: rounding depends on what is solved together
             model.solve((*(position for position, _ in pair_keys), *seats.values()))

@@ -14,7 +14,9 @@ from scipy.sparse import csr_array
 
 from turnout.kernel_cache import kernel
 from turnout.mismatch.turnout.priors import RECEPTANCE
+from turnout.mismatch.turnout.receptance_model import ReceptanceModel
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
+from turnout.mismatch.turnout.toe_position import TOE, with_toe
 from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS
 from turnout.mismatch.turnout.zone import casting_elements
 from turnout.simulate.rail import element_mass
@@ -22,7 +24,6 @@ from turnout.simulate.rail import element_mass
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from turnout.mismatch.turnout.receptance_model import ReceptanceModel
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.zone import Zone
     from turnout.simulate.rail import Rail
@@ -137,6 +138,18 @@ class ReceptanceSensitivity:
     def rail_gradients(self) -> np.ndarray:
         """(n_pair, n_line, n) derivatives by the logarithms of the uncertain rail values (``rail_sds``)."""
         return np.concatenate([self._by_rail, self._by_castings], axis=-1)
+
+    @cached_property
+    def toe_gradients(self) -> np.ndarray:
+        """(n_pair, n_line) derivatives by the position of the toe of a blade [1/N]; 0 without one."""
+        track = self.model.track
+        limits = track.blade.toe_limits(track) if track.blade is not None else None
+        if limits is None:
+            return np.zeros_like(self.receptances)
+        step = RECEPTANCE.toe_step if limits[1] > -limits[0] else -RECEPTANCE.toe_step
+        moved = ReceptanceModel(with_toe(track, {TOE: step}), self.model.terms)
+        beside = ReceptanceSensitivity(moved, self.row, self.seats, self.zone)
+        return (beside.receptances - self.receptances) / step
 
     @property
     def gradients(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from turnout.mismatch.turnout.pseudo_forces import support_columns, support_moti
 from turnout.mismatch.turnout.rail_roughness import wave_columns
 from turnout.mismatch.turnout.site_model import drop_oldest
 from turnout.mismatch.turnout.surface_priors import TOP_SHAPE
+from turnout.mismatch.turnout.toe_position import TOE
 from turnout.mismatch.turnout.wheel_line import has_blade
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def pair_jacobians(
     rail = np.empty((2 * factors.size, len(predictor.rail)))
     samples.write(samples.at(sensitivity.rail_gradients) * factors[:, None], rail)
     stacked[:, [index[name] for name in predictor.rail]] = rail
-    for name, gradient in chair_gradients(sensitivity).items():
+    for name, gradient in (chair_gradients(sensitivity) | {TOE: sensitivity.toe_gradients}).items():
         if name in index:
             samples.write(samples.at(gradient)[:, None] * factors[:, None], stacked[:, index[name] : index[name] + 1])
     seat_columns = samples.to_observations(samples.at(sensitivity.seat_gradients) * factors)

@@ -13,6 +13,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.chair_parameters import chair_nuisances, chair_values, with_chairs
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.rail_parameters import RAIL_SDS, rail_meanings, rail_sds
+from turnout.mismatch.turnout.toe_position import toe_nuisances
 from turnout.mismatch.turnout.zone import Zone
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     Returns
     -------
     list of Nuisance
-        First those of ``track_value_names``, then rail, chairs of a blade and wheelsets.
+        First those of ``track_value_names``, then rail, chairs and toe of a blade, and wheelsets.
     """
     nuisances = [
         Nuisance(
@@ -101,7 +102,8 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
         at = WHOLE_TRACK if (name, sd) in RAIL_SDS else None  # a casting's value may stand for a cause beside it
         nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail", at=at))
-    nuisances += chair_nuisances((zone.turnout.track, *zone.turnout.tracks.values()))
+    tracks = zone.turnout.track, *zone.turnout.tracks.values()
+    nuisances += [*chair_nuisances(tracks), *toe_nuisances(tracks)]
     for train in trains:
         nuisances.append(
             Nuisance(
