@@ -135,7 +135,7 @@ def _analyse_train(
     else:
         count = count_without_distance(envelopes, patterns, settings)
     if count is None:
-        return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "sound, but no axles in it")))
+        return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "vibration, but no axles in it")))
     motion, axles, train_type = count
     passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)

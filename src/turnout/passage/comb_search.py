@@ -35,7 +35,7 @@ def continues_beyond(envelopes: SensorEnvelopes, motion: Motion, first: float, l
     """Whether the sensors record more than ``MIN_BEYOND_AMPLITUDE`` times the row's own amplitude beyond either end.
 
     A row that is a part of the train fits that part as well as the train's own row does. It fits better where the
-    remaining vehicles sound different: coaches without their locomotive.
+    remaining vehicles vibrate differently: coaches without their locomotive.
 
     Parameters
     ----------

@@ -24,7 +24,9 @@ The [blind proof](blind.md) states which concealed effects were named, and at wh
 |---|---|---|---|---|---|
 """
 PAGE_FOOT = """
-Three more effects are possible in simulations and track files, but are not tested by a diagnosis: {}.
+Three more effects are possible in simulations and track files, but are not tested by a diagnosis:
+
+{}
 """
 
 
@@ -33,7 +35,7 @@ def page() -> str:
     effects = sorted(physics.TERMS, key=lambda effect: effect.name)
     rows = "".join(_row(effect) for effect in effects if effect.asked)
     names = [effect.title() for effect in effects if not effect.asked]
-    return PAGE_HEAD + rows + PAGE_FOOT.format(", ".join(name[0].lower() + name[1:] for name in names))
+    return PAGE_HEAD + rows + PAGE_FOOT.format("\n".join(f"- {name}" for name in names))
 
 
 def _row(effect: type[physics.PhysicsTerm]) -> str:
