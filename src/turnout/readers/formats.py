@@ -11,6 +11,7 @@ from turnout.readers.claims import check_claims
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 from turnout.readers.start_columns import with_axis_start
+from turnout.readers.stated_ends import with_stated_duration
 from turnout.readers.stated_scales import with_named_factors
 from turnout.readers.stated_sensitivities import with_named_sensitivities
 from turnout.readers.stated_units import with_stated_units
@@ -54,6 +55,8 @@ class Format:
         )
         records = with_stated_starts(records)
         records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)
+        if len(records) == 1:
+            records = tuple(with_stated_duration(r) if isinstance(r, RawRecord) else r for r in records)
         return replace(raw, records=records)
 
 

@@ -175,3 +175,22 @@ def test_a_buffer_that_was_not_filled_is_no_recording(format, name, tmp_path):
     assert bool(problems(45)) == VALID[name]
     assert all("is 45, and there are 60 samples" in text for text in problems(45))
     assert not problems(60) and bool(problems(59)) == (VALID[name] and "index" not in name)
+
+
+ENDS = {  # name and time of the end of a record of 1 s from 10:00:00.25, and whether it is reported
+    ("Stop", "10:00:01.25"): False, ("End time", "10:00:01.03"): True, ("Messende", "10:00:02.25"): True,
+    ("end of recording", "10:00:01.50"): True, ("Calibration end", "10:00:02.25"): False,
+    ("End of warranty", "10:00:02.25"): False, ("Stop", "14:00:00.00"): False, ("Stop", "10:00:00.27"): False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "time"), ENDS)
+def test_the_duration_between_start_and_end_is_compared_with_the_samples(name, time, tmp_path):
+    """An end that is hours later is that of the session, and a short time is known to a few steps of the clock only."""
+    n_row = 25 if time == "10:00:00.27" else 500
+    rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(1).normal(size=(n_row, 2)).round(4))
+    head = f"Start: 2026-05-13 10:00:00.25\n{name}: 2026-05-13 {time}\nforce;rail\n"
+    (tmp_path / "a.csv").write_text(head + rows)
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=500.0))
+    assert len(result.recordings) == 1
+    assert [f"duration until {name}" in str(e) for e in result.errors] == [True] * ENDS[name, time]
