@@ -7,6 +7,7 @@ from typing import Any
 
 from turnout.counts import first_texts
 from turnout.errors import ReadError
+from turnout.readers.channel_descriptions import exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_units import rate_unit
@@ -99,6 +100,8 @@ def channel_mappings(
             f"Add it to the layout, with 'quantity: {IGNORED}' if it is not wanted",
             reason="channel_unknown",
         )
+    if problem := exchanged_channels(record, indices, channels):
+        raise source.error(where, problem, EXCHANGED_REMEDY, reason="unit_unknown")
     return tuple(
         _channel_mapping(i, record, channel, where, source)
         for i, channel in zip(indices, channels)
@@ -106,6 +109,9 @@ def channel_mappings(
     )
 
 
+EXCHANGED_REMEDY = (
+    "Correct 'source' of these channels in the layout; if it is right, set their units with '!', as 'unit: N!'"
+)
 MAX_LISTED = 12  # channels that a message names
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from mmap import mmap
 from typing import NamedTuple
 
+from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import (
     BLANK,
     DECIMAL_COMMA_REMEDY,
@@ -309,12 +310,19 @@ def entries_of_lines(
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
-        if len(cells) > 2 and (is_unit_name(cells[0]) or is_quantity_name(cells[0])):
+        is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
+        if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
         is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
         if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
+
+
+def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line has a text for each column behind a word for such texts, as "Sensor;hammer;accelerometer"."""
+    texts = cells[1:]
+    return len(texts) == len(names) and is_description_name(cells[0]) and not any(map(is_number, texts))
 
 
 def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
