@@ -25,7 +25,7 @@ def outcome(path, first=0, second=1, unit="N"):
 NAMES = {
     "force;rail": False, "Kraft;Beschleunigung": False, "CH1;CH2": False, "hammer acc;acc": False, "rail;web": False,
     "force;force 2": False, "Volt 1;Volt 2": False, "rail;force": True, "Beschleunigung;Kraft": True,
-    "Acc rail;Hammer": True,
+    "Acc rail;Hammer": True, "acc;hammer acc": False, "Acc;Velocity": False,
 }  # fmt: skip
 
 
