@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_registry, add_use
 from turnout.constants import KMH
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -92,14 +93,15 @@ def _load_lines(
     settings: PassageSettings,
 ) -> list[str]:
     """The calibrations of one turnout in words."""
+    n_trains = f"{count_of(len(trains), 'train')} of known weight"
     if not calibrations:
         n_required = settings.load_trains_minimum
-        return [f"{name}: {len(trains)} trains of known weight, {n_required} are needed: axle loads stay unavailable"]
-    lines = [f"{name}: {len(trains)} trains of known weight, {min(t['load'] for t in trains):.1f} to "]
+        return [f"{name}: {n_trains}, {n_required} are needed: axle loads stay unavailable"]
+    lines = [f"{name}: {n_trains}, {min(t['load'] for t in trains):.1f} to "]
     lines[0] += f"{max(t['load'] for t in trains):.1f} t per axle"
     for channel, c in calibrations.items():
         lines.append(
-            f"  {channel:<6} one train scatters by {100 * c.scatter:.1f} %, amplitude with speed to the power "
+            f"  {channel:<6} load of one train ± {100 * c.scatter:.1f} % (sd), amplitude with speed to the power "
             f"{c.exponent:.2f}, {KMH * c.slowest:.0f} to {KMH * c.fastest:.0f} km/h, n = {c.n}"
         )
     return lines
