@@ -21,12 +21,12 @@ START_SHARE = 0.1  # of the channel's peak in the band
 
 @dataclass(frozen=True)
 class Hum(PhysicsTerm):
-    r"""A line at the mains frequency, also without a train.
+    r"""A spectral line at the mains frequency, also without a train.
 
     .. math:: a \sin(2 \pi f t + \varphi) + b \cos(2 \pi f t + \varphi)
 
-    ``start`` is the time from the start of the record to the first sample of the signal [s]. ``phase`` is that of the
-    line at the start of the record [rad]: no record begins at a fixed phase of the mains.
+    ``start`` is the time from the start of the record to the first sample of the signal [s]. ``phase`` is the phase of
+    the line at the start of the record [rad], which differs from record to record.
     """
 
     channel_name: str

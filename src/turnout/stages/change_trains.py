@@ -185,9 +185,9 @@ def stretch_finding(case: TrackCase, settings: MismatchSettings, answer: ModelAn
 
     The fit of the visit has absorbed the change. Without it is the fit with the change taken back and all else fitted
     again to first order, so that what other parameters explain as well is no evidence. No effect of the library acts
-    on several supports; that trains feel the change names it if the fit of those held out rises by
-    ``MIN_GAIN_ERRORS`` standard errors. "gain_nats" is the logarithm of the ratio of their likelihoods. Trains share
-    errors of the model, so that n of them count as few.
+    on several supports. The change has a name if the fit of held-out trains rises by ``MIN_GAIN_ERRORS`` standard
+    errors. "gain_nats" is the logarithm of the ratio of their likelihoods. Trains share errors of the model, so n of
+    them count as few.
 
     Parameters
     ----------

@@ -243,8 +243,8 @@ def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, S
 def _with_model_error(effect: ChangeEffect, size: tuple[float, float]) -> tuple[float, float]:
     """Size and its standard deviation with the error of the model, which is a share of the size.
 
-    Under load it is larger. Visits are linear about stiffness without the effect, and a spring in series acts by its
-    compliance: of a loss that is x by derivatives, ln(1 - x) is left if compliance is what signals are linear in.
+    The share is larger for stiffness under load. The model of a visit is linear in the stiffness about its value
+    without the effect, but signals may be linear in the compliance. A loss x of the linear model is then ln(1 - x).
     """
     share = CALIBRATION.linear_error if is_under_load(effect) else CALIBRATION.size_error
     return size[0], float(np.hypot(size[1], share * size[0]))

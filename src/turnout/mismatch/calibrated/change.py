@@ -16,11 +16,20 @@ from turnout.mismatch.calibrated.history import History, Step
 class ChangeEffect:
     """An effect that appears at an unknown visit.
 
-    ``direction``: parameter -> change per unit of size. ``sd`` is the prior standard deviation of the size; of one that
-    ``grows``, whose size is per year, that of the change at the last visit: its course tells it from a step, and not
-    its prior. ``group`` and ``position`` are those of an effect on several parameters of one group; of an effect on one
-    parameter they are known from it. ``not_before``: time before which it cannot begin, since an accepted change
-    explains what happened until then. [years]
+    Attributes
+    ----------
+    name : str
+    direction : mapping of str to float
+        Parameter -> change per unit of size.
+    sd : float
+        Prior standard deviation of the size. For an effect that grows, that of the change at the last visit, so that
+        growth and step differ in their course and not in their prior.
+    grows : bool
+        Whether the size is one per year.
+    group, position : str, float or None
+        Of an effect on several parameters of one group. An effect on one parameter has those of the parameter.
+    not_before : float
+        Time before which it cannot begin, because an accepted change explains what happened until then. [years]
     """
 
     name: str

@@ -1,13 +1,13 @@
-r"""Stiffness as trains feel it: under load it may differ from what impacts feel on the unloaded track.
+r"""Stiffness under load: under trains it may differ from that under impacts on the unloaded track.
 
-Pads and ballast stiffen under load (Wu and Thompson 1999, Proc. IMechE F 213). What trains tell of a parameter is then
-information on the sum of its value and of an offset that impacts do not have. No further simulation is needed:
+Pads and ballast stiffen under load (Wu and Thompson 1999, Proc. IMechE F 213). Passages then determine the sum of the
+value of a parameter and of an offset that impacts do not have. No further simulation is needed:
 
 .. math:: x_{train} = x + o, \quad \Lambda' = T^T \Lambda T, \quad T = (1, 1)
 
-A constant offset is an error of the model as well: that of all pads, or of all ballast, has the prior of an effect,
-that of one support the scatter of supports, also where the file is unsure of its value.
-So only what differs between visits is evidence of a change.
+A constant offset may be an error of the model. That of all pads, or of all ballast, has the prior of an effect. That
+of one support has the scatter of supports, also where the tolerance of the file is larger. So only a difference between
+visits is evidence of a change.
 """
 
 from __future__ import annotations

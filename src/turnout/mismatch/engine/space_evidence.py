@@ -149,7 +149,8 @@ class _Marginal:
     the covariance of the data is :math:`C = I + J A^{-1} J^T`, in units of their errors. Its inverse is
     :math:`I - J N J^T` with :math:`N = (A + J^T J)^{-1}`, and the residual of the fit is :math:`r = C^{-1} y`.
     So :math:`B^T C^{-1} B = B^T B - B^T J N J^T B`, :math:`B^T C^{-1} y = B^T r`, and
-    :math:`y^T C^{-1} y = r^T C r = r^T r + r^T J A^{-1} J^T r`: what nuisances pay for imitating a cause counts.
+    :math:`y^T C^{-1} y = r^T C r = r^T r + r^T J A^{-1} J^T r`. The last term is the prior cost of nuisances that
+    imitate a cause.
     """
 
     def __init__(self, projector: Projector) -> None:

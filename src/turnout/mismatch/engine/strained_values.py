@@ -35,19 +35,21 @@ class StrainedValue:
 
 
 def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | None:
-    r"""The value that has paid more than a name costs.
+    r"""The value farthest from its file, if its conflict with the prior exceeds the evidence that a name needs.
 
-    A value with the prior :math:`N(\mu, \sigma^2)` is fitted at :math:`\eta` with the standard error s. Before, this
-    estimate has the variance :math:`\sigma^2 - s^2`, as a prior holds back what the data do not determine fully, and
+    A value with the prior :math:`N(\mu, \sigma^2)` is fitted at :math:`\eta` with the standard error s. Before the data
+    are known, the estimate has the variance :math:`\sigma^2 - s^2`. The conflict of prior and data is (Evans and
+    Moshonas 2006, Bayesian Analysis 1, 893)
 
     .. math:: z^2 / 2, \quad z = (\eta - \mu) / \sqrt{\sigma^2 - s^2}
 
-    nats are paid (a conflict of prior and data: Evans and Moshonas 2006, Bayesian Analysis 1, 893). Of a value that is
-    fixed to nothing known, s = 0: its tolerance may be rough. The largest of n counts if it exceeds the threshold by
-    :math:`\ln n`. Values that the data say nothing of, values of a single recording, those with many alike, such as the
-    stiffness of each railpad, those of waves and of the running surface, and those that an effect of the library
-    describes as well are left out: the first are no property of the track, one of many is often far from its mean, and
-    the last are judged as effects.
+    nats. For a value without a lock s = 0, because its tolerance may be rough. The largest of n values counts if it
+    exceeds the threshold by :math:`\ln n`. These values are left out:
+
+    - those that the data do not determine, and those of a single recording: they are no property of the track;
+    - those of one component of many, such as each railpad, of waves and of the running surface: one of many is often
+      far from its mean;
+    - those that an effect of the library describes as well: they are judged as effects.
 
     Parameters
     ----------

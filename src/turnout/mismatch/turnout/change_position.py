@@ -1,10 +1,9 @@
 r"""Where both tops of a switch are level: the number of its running surface that trains measure.
 
-Wheels touch both rails for 5 to 20 cm. Depth and length of a top and its exponent are extrapolated from there: the
-depth of a blade at its toe may come out as 1.5 times that of the file although its top is right to 0.1 mm where wheels
-meet it. The position :math:`x` of the change follows from all of them with its own error: with the gradient g, the
-covariance C of the fit and the prior variances D, its variances are :math:`g^T C g` with and :math:`g^T D g` without
-the recordings.
+Wheels touch both rails for 5 to 20 cm. Depth, length and exponent of a top are extrapolated from there. So the depth of
+a blade at its toe may come out as 1.5 times that of the file, although its top is right to 0.1 mm where wheels meet it.
+The position :math:`x` of the change follows from all of them with its own error. With its gradient g, the covariance C
+of the fit and the prior variances D, its variance is :math:`g^T C g`, and :math:`g^T D g` without the recordings.
 """
 
 from __future__ import annotations

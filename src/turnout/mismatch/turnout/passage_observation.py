@@ -27,8 +27,8 @@ class AlignedPassage:
     """One passage aligned with its simulation; its observation holds the sensors one after the other.
 
     ``time`` (n,) [s] counts from the start of the recording. At ``reference`` [s] the first wheel reaches the first
-    sensor. ``speed`` [m/s] is that after alignment. ``hum_phases`` are the phases of a line of the mains at the start
-    of the recording by channel [rad], as each shows it where no wheel is near.
+    sensor. ``speed`` [m/s] is that after alignment. ``hum_phases`` [rad] has the phase of the mains frequency at the
+    start of the recording for each channel, estimated where no wheel is near.
     """
 
     name: str
@@ -163,7 +163,7 @@ def observe_passage(
 
 
 def _beside_train(quiet: Sequence[tuple[float, float]], reference: float) -> list[tuple[float, float]]:
-    """Equal parts of the quiet times, those next to the train: a line drifts least there, before as much as behind."""
+    """Quiet times of one length next to the train, before and behind it: there the mains have drifted least."""
     length = min(PASSAGE.hum_time, *(end - start for start, end in quiet))
     return [(start, start + length) if start > reference else (end - length, end) for start, end in quiet]
 

@@ -1,8 +1,8 @@
 r"""Errors of wheels that leave the rail: how single wheels depart from the path of the file, by simulation.
 
 A wheel that falls fast over a deep nose loses the rail and lands some decimetres further. Where and how hard it lands
-depends on its own path, far more than linearly: at a nose 1.6 mm deep under a locomotive at 37 m/s a standard deviation
-of depth changes the signal behind the nose by four times the linear response, with another shape. With the simulated
+depends on its own path, far more than linearly. At a nose 1.6 mm deep, under a locomotive at 37 m/s, a standard
+deviation of depth changes the signal by four times the linear response, with another shape. With the simulated
 signals :math:`y_\pm` of all wheels that deviate by plus and minus one standard deviation, and the signal y of none,
 
 .. math:: y(\eta) \approx y + a\,\eta + b\,\eta^2, \quad a = \tfrac12 (y_+ - y_-), \quad b = \tfrac12 (y_+ + y_-) - y

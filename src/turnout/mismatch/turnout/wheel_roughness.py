@@ -4,9 +4,9 @@ Every wheel has its own waves round its tread, at an unknown angle, so that no o
 is known to a few per cent only: within the range of the sensors the waves are those of any rough surface. Their effect
 depends on the mass of the wheels. Where a fit finds another mass than the file, the modes are computed again.
 
-At a nose, blade or joint each wheel takes its own path, whereas the file has one for all. Where a wheel leaves the wing
-rail and how deep it falls depend on its profile, new or hollow worn (Palsson and Nielsen 2012, Vehicle System Dynamics
-50), and the shape in the file is only approximate.
+At a nose, blade or joint each wheel takes its own path, whereas the file has one for all. Its profile, new or hollow
+worn, decides where it leaves the wing rail and how deep it falls (Palsson and Nielsen 2012, Vehicle System Dynamics
+50). The shape in the file is only approximate.
 """
 
 from __future__ import annotations
