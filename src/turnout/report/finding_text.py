@@ -129,6 +129,8 @@ def _where(finding: Mapping[str, Any]) -> str:
     if finding["verdict"] in ("named", "a_or_b"):
         return "everywhere among these sensors"
     low, high = finding["place_low_m"], finding["place_high_m"]
+    if finding["verdict"] == "none":
+        return f"examined: {low:.1f} to {high:.1f} m"
     return f"somewhere in {low:.1f} to {high:.1f} m" if high - low > 0.1 else f"about {low:.1f} m"
 
 

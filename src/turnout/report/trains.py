@@ -6,6 +6,7 @@ from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from turnout.constants import Z95
+from turnout.counts import count_of
 from turnout.registry.schema import literal
 from turnout.report.panels.train_bars import train_bars
 from turnout.report.panels.weekly_peaks import weekly_peaks_panel
@@ -131,20 +132,20 @@ def score_words(scores: Sequence[Mapping[str, Any]]) -> str:
     n = sum(s["n"] for s in scores)
     count = {status: sum(s["n"] for s in scores if s["status"] == status) for status in {s["status"] for s in scores}}
     sentences = [
-        f"{n} records of single sensors were compared with the model of their section: "
-        f"in {count.get('accepted', 0)} it predicts more than random models do and the wheels act as impacts on it, "
-        f"in {count.get('not_an_impulse', 0)} it predicts more although they do not, "
-        f"in {count.get('null_explains', 0)} random models reach as much."
+        f"{count_of(n, 'record')} of single sensors, compared with the model of the section.",
+        f"Better than random models, and the wheels act as impacts: {count.get('accepted', 0)}.",
+        f"Better than random models, but the wheels do not act as impacts: {count.get('not_an_impulse', 0)}.",
+        f"No better than random models: {count.get('null_explains', 0)}.",
     ]
     rolling = sum(s["n_no_impulse"] for s in scores)
     if rolling:
         sentences.append(
-            f"In {rolling} the wheels did not act as single impacts: they press and shake the rail all the time."
+            f"In {count_of(rolling, 'record')} the wheels are no single impacts: they load the rail all the time."
         )
     n_compared, n_best = (sum(s[k] for s in scores) for k in ("n_compared", "n_best"))
     if n_compared:
         sentences.append(
-            f"The own section's model predicts more than that of any other section in {n_best} of {n_compared}."
+            f"The model of the section itself predicts more than that of any other section in {n_best} of {n_compared}."
         )
     sentences.append("A score within its null carries no information about the track, neither good nor bad.")
     return " ".join(sentences)

@@ -311,6 +311,7 @@ def test_a_rejected_name_is_not_offered_as_what_was_left_out():
 def test_one_fit_alone_is_a_sentence_and_no_chart():
     """Nothing is compared with the fit of an intact turnout; of a named effect four are compared."""
     quiet = page(finding("none"))
+    assert re.search(r"examined: [\d.]+ to [\d.]+ m", quiet) and "somewhere in" not in quiet
     assert "Fit on held-out recordings" not in quiet and "fit 41 % on 2 held-out recordings" in quiet
     assert "It is fixed to" not in quiet and "Largest deviation" in quiet
     text = page(named())

@@ -58,8 +58,9 @@ def test_one_passage_has_a_bar_without_spread_or_interval():
 def test_the_words_count_what_the_scores_are_worth():
     shared = {"n_best": 3, "n_compared": 10, "n_no_impulse": 7}
     words = score_words([{"status": "null_explains", "n": 10} | shared, {"status": "accepted", "n": 2} | shared])
-    assert words.startswith("12 records of single sensors") and "in 2 it predicts more" in words
-    assert "in 10 random models reach as much" in words and "in 6 of 20" in words
+    assert words.startswith("12 records of single sensors, compared with the model of the section.")
+    assert "Better than random models, and the wheels act as impacts: 2." in words
+    assert "No better than random models: 10." in words and "in 6 of 20" in words
     assert score_words([]) == ""
 
 
