@@ -17,6 +17,7 @@ FAILED_RULE = re.compile(
 )
 FINISHED_JOB = re.compile(r"^Finished jobid: (\d+) ", re.M)
 STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
+EXCEPTION = re.compile(r"^\w+(?:Error|Exception): .+$", re.M)  # the last line of a traceback
 MAX_REASON_LENGTH = 300  # characters of a message in the report
 
 
@@ -24,7 +25,8 @@ def failure_reason(since: int = 0) -> str:
     """Reason of a failed run in a few words.
 
     It is the first failed rule with its log. If only the rule verdict failed, it is the first complaint of the quality
-    gate. If no rule failed, it is the message that stopped the run before any job.
+    gate. If no rule failed, it is the message that stopped the run before any job, or the exception of a traceback.
+    Without either it is the name of the log.
 
     Parameters
     ----------
@@ -34,7 +36,7 @@ def failure_reason(since: int = 0) -> str:
     Returns
     -------
     str
-        The reason, "" if unknown.
+        The reason, "" without a log of the run.
     """
     written = sorted((path.stat().st_mtime_ns, path) for path in LOGS.glob("*.snakemake.log"))
     texts = [path.read_text(encoding="utf-8", errors="replace") for time, path in written if time >= since]
@@ -47,7 +49,10 @@ def failure_reason(since: int = 0) -> str:
     if failed:
         return _first_complaint()
     stopped = [match for text in texts if (match := STOP_MESSAGE.search(text))]
-    return stopped[0][1].strip()[:MAX_REASON_LENGTH] if stopped else ""
+    if stopped:
+        return stopped[0][1].strip()[:MAX_REASON_LENGTH]
+    exceptions = [line for text in texts for line in EXCEPTION.findall(text)]
+    return exceptions[-1][:MAX_REASON_LENGTH] if exceptions else f"see {written[-1][1]}" if texts else ""
 
 
 def _failed_jobs(text: str) -> list[tuple[str, str]]:

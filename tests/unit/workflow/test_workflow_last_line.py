@@ -132,6 +132,15 @@ def test_a_run_that_was_stopped_before_any_job_says_what_it_met(folder):
     assert failure_reason(since=log.stat().st_mtime_ns + 1) == ""  # of an earlier run
 
 
+def test_a_run_that_ended_in_a_traceback_says_its_exception_or_its_log(folder):
+    write("run", "Building DAG of jobs...\n")
+    assert failure_reason() == "see .snakemake/log/run.snakemake.log"
+    write(
+        "then", "Traceback (most recent call last):\n\nNotADirectoryError: [Errno 20] Not a directory: 'results'\n", 5
+    )
+    assert failure_reason() == "NotADirectoryError: [Errno 20] Not a directory: 'results'"
+
+
 def write(name, text, later=0):
     log = Path(".snakemake/log") / f"{name}.snakemake.log"
     log.parent.mkdir(parents=True, exist_ok=True)
