@@ -109,14 +109,14 @@ PLACES = ("Frequency [{}];Real;Imag", "Freq in {};Real;Imag", "Frequency;Real;Im
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("head", PLACES)
 def test_frequencies_of_a_text_are_in_the_unit_that_it_states(head, unit, tmp_path):
-    rows = [";".join((f"{UNITS[unit] * f:.12g}", *cells(h))) for f, h in zip(F, H)]
+    rows = [";".join((f"{UNITS[unit] * f:.12g}", *cells(h))) for f, h in zip(F[:60], H)]
     (tmp_path / "a.csv").write_text("\n".join((head.format(unit), *rows)) + "\n", encoding="utf-8")
-    assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F, rel=1e-9)
+    assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F[:60], rel=1e-9)
 
 
 @pytest.mark.parametrize("unit", ["ms", "order", "V"])
 def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
-    rows = [";".join((f"{f}", *cells(h))) for f, h in zip(F, H)]
+    rows = [";".join((f"{f}", *cells(h))) for f, h in zip(F[:60], H)]
     (tmp_path / "a.csv").write_text("\n".join((f"Frequency [{unit}];Real;Imag", *rows)) + "\n")
     with pytest.raises(ReadError, match=f"'{unit}' is no unit of a frequency") as error:
         find_responses("a.csv", tmp_path)
