@@ -138,8 +138,13 @@ VERSIONS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("names", VERSIONS, ids=" and ".join)
-@pytest.mark.parametrize("format", ["h5", "mat", "tdms"])
+@pytest.mark.parametrize(
+    ("format", "names"),
+    [
+        *(("tdms", names) for names in VERSIONS),
+        *((f, n) for f in ("h5", "mat") for n in (("raw", "filtered"), ("A", "B"))),
+    ],
+)
 def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
     """Before, each impact counted twice, once as it was measured and once as a program changed it."""
     samples = np.random.default_rng(5).normal(size=(2, 2, 50))
