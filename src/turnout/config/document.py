@@ -37,6 +37,7 @@ YAML_PROBLEMS = {
         "a second ':' in one value, or more blanks in front of it than the line above has",
         "Put a text with ': ' in quotes, and begin all lines of a block with the same number of blanks",
     ),
+    "duplicate key": ("a name for the second time", "Keep one of them"),
     "another document": ("a second document begins", "Remove the line '---', or keep one of the two"),
 }
 

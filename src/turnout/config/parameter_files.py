@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from turnout.config.document import Place, as_config_errors, compose, place_of_node
 from turnout.config.parameters import KEYS, Entries, Entry, Number, ParameterSet
+from turnout.config.schema import DECIMAL_POINT, suggestion
 from turnout.units import PARAMETER_UNITS
 
 if TYPE_CHECKING:
@@ -132,10 +133,13 @@ def _number(entry: dict, place: Place, sources: dict) -> Number:
     for key in ("unit", "source"):
         if isinstance(entry.get(key), (list, dict, type(None))):
             raise place.error(f"a number without {key}", f"Give its {key}")
-    if unknown := set(entry) - KEYS:
-        raise place.error(f"unknown key {min(unknown)!r}", f"Use {', '.join(sorted(KEYS))}")
+    if unknown := sorted(map(str, set(entry) - KEYS)):
+        remedy = DECIMAL_POINT if unknown[0].isdecimal() else suggestion(unknown[0], KEYS)
+        raise place.error(f"unknown key {unknown[0]!r}", remedy)
     if entry["unit"] not in PARAMETER_UNITS:
-        raise place.error(f"unknown unit {entry['unit']!r}", f"Use one of {', '.join(PARAMETER_UNITS)}")
+        alike = [unit for unit in PARAMETER_UNITS if unit.lower() == str(entry["unit"]).lower()]
+        hint = f"Did you mean {' or '.join(map(repr, alike))}? " if alike else ""
+        raise place.error(f"unknown unit {entry['unit']!r}", f"{hint}Use one of {', '.join(PARAMETER_UNITS)}")
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
     spread = None if prior is None else _finite(prior, place)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn, TypeVar
 
 from turnout.config.document import Branch, Place
+from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, SimulationError
 
 T = TypeVar("T")
@@ -279,7 +280,7 @@ class ParameterSet(Branch):
         """
         for key in self:
             if key not in allowed:
-                raise self.error(None, f"unknown key {key!r}", f"Use one of {', '.join(sorted(allowed))}", key)
+                raise self.error(None, f"unknown key {key!r}", suggestion(str(key), allowed), key)
         return self
 
     def numbers(self) -> Iterator[tuple[str, Number]]:

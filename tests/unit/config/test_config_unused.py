@@ -54,7 +54,10 @@ def test_a_layout_that_no_turnout_uses_is_checked(folder, capsys, old, new, word
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("spacing:", "spacin:", "unknown key 'spacin'"),
+        ("spacing:", "spacin:", "unknown key 'spacin'. Did you mean 'spacing'?"),
+        ("spacing:", "layers: 2\nspacing:", "a name for the second time. Keep one of them"),
+        ("value: 0.6, unit: m", "value: 0,6, unit: m", "unknown key '6'. If it belongs to the number before it"),
+        ("unit: m,", "unit: M,", "unknown unit 'M'. Did you mean 'm'?"),
         ("unit: m,", "unit: furlong,", "furlong"),
         ("spacing:", "spacing: [", "Correct the YAML"),
         ("spacing:", "extends: nobody\nspacing:", "no file config/tracks/nobody.yaml"),
