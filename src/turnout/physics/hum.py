@@ -74,12 +74,13 @@ class Hum(PhysicsTerm):
         return self.left_out.format(**vars(self), amplitude=float(np.hypot(self.sine, self.cosine)))
 
     def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
-        """The term with the start time of the signal of this recording, and the phase of its channel there.
+        """The term with the start time of the signal of this recording, and the line of its channel there.
 
-        ``conditions["hum_phases"]`` has the phase of each channel [rad], 0 for others.
+        ``conditions["hum_lines"]`` has the frequency [Hz] and phase [rad] of each channel; others have the nominal
+        frequency and phase 0.
         """
-        phase = conditions.get("hum_phases", {}).get(self.channel_name, 0.0)
-        return replace(self, start=float(conditions.get("start", 0.0)), phase=float(phase))
+        frequency, phase = conditions.get("hum_lines", {}).get(self.channel_name, (self.frequency, 0.0))
+        return replace(self, start=float(conditions.get("start", 0.0)), frequency=frequency, phase=phase)
 
     def channel(self, signal: np.ndarray, rate: float, sensor: Sensor) -> np.ndarray:
         """The signal with the line added."""

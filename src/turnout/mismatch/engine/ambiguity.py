@@ -22,7 +22,7 @@ class Ambiguity:
     level : str
         At which value of that.
     low, high : float or None
-        Where it shows [m]; None of a train.
+        Where it shows [m]; None of a train or channel.
     """
 
     nats: float

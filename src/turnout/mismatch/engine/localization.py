@@ -131,7 +131,8 @@ def location_of_ambiguity(case: Case) -> Location | None:
     if u is None:
         return None
     if u.low is None or u.high is None:
-        return Location(u.frame, u.level, u.nats, train=u.level if u.frame == "train" else None)
+        train, sensor = (u.level if u.frame == frame else None for frame in ("train", "sensor"))
+        return Location(u.frame, u.level, u.nats, train=train, sensor=sensor)
     return Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
 
 

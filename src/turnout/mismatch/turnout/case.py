@@ -20,6 +20,7 @@ from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect
 from turnout.mismatch.turnout.campaign import CampaignInput
 from turnout.mismatch.turnout.candidates.catalogue import distant_starts, is_testable, list_candidates
 from turnout.mismatch.turnout.case_data import CaseData, case_data
+from turnout.mismatch.turnout.channel_lines import line_without_wheel
 from turnout.mismatch.turnout.disturbances import independent_of_trains
 from turnout.mismatch.turnout.hammer_case import HammerCase, hammer_case
 from turnout.mismatch.turnout.observed_passages import with_errors
@@ -252,11 +253,11 @@ class TrackCase(PredictedCase):
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
 
     def ambiguity(self) -> Ambiguity | None:
-        """Impacts of wheels, or a line in the level of all passages; the likelier one, None without any."""
+        """The likeliest of impacts of wheels, a line in the level of all passages and one of a channel; else None."""
         from turnout.mismatch.turnout.candidates.short_corrugation import ambiguous_line
 
         has_corrugation = self.families is None or RailCorrugation.name in self.families
-        possible = (wheel_impacts(self), ambiguous_line(self) if has_corrugation else None)
+        possible = (wheel_impacts(self), ambiguous_line(self) if has_corrugation else None, line_without_wheel(self))
         return max((a for a in possible if a is not None), key=lambda a: a.nats, default=None)
 
     def tolerated_effects(self, fit: Fit) -> tuple[Candidate, ...]:

@@ -13,6 +13,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import PassageInput
+from turnout.mismatch.turnout.channel_lines import SteadyLine, mains_lines, strongest_lines
 from turnout.mismatch.turnout.passage_band import band_end, band_signals, limit_band, read_at, sample_rate_of, upsample
 from turnout.mismatch.turnout.priors import PASSAGE, SIMULATION, TRACK
 from turnout.physics.hum import MAINS
@@ -27,8 +28,9 @@ class AlignedPassage:
     """One passage aligned with its simulation; its observation holds the sensors one after the other.
 
     ``time`` (n,) [s] counts from the start of the recording. At ``reference`` [s] the first wheel reaches the first
-    sensor. ``speed`` [m/s] is that after alignment. ``hum_phases`` [rad] has the phase of the mains frequency at the
-    start of the recording for each channel, estimated where no wheel is near.
+    sensor. ``speed`` [m/s] is that after alignment. ``hum_lines`` has, by channel, the frequency [Hz] of
+    the mains and its phase at the start of the recording [rad], ``steady_lines`` the strongest line at any frequency,
+    both as the channel shows them where no wheel is near.
     """
 
     name: str
@@ -37,7 +39,8 @@ class AlignedPassage:
     time: np.ndarray
     reference: float
     speed: float
-    hum_phases: Mapping[str, float] = field(default_factory=dict)
+    hum_lines: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    steady_lines: Mapping[str, SteadyLine] = field(default_factory=dict)
 
     @property
     def high(self) -> float:
@@ -156,9 +159,17 @@ def observe_passage(
     noise = np.zeros(len(sensors))
     if quiet:
         noise = np.std(read_at(signals, rate, np.arange(*quiet[0], step)), axis=1)
-        near_times = np.concatenate([np.arange(*ends, step) for ends in _beside_train(quiet, reference)])
-        phases = line_phases(read_at(signals, rate, near_times), near_times, MAINS)
-        aligned = replace(aligned, hum_phases=dict(zip((s.name for s in sensors), phases)))
+        stretches = [np.arange(*ends, step) for ends in _beside_train(quiet, reference)]
+        near_times = np.concatenate(stretches)
+        near = read_at(signals, rate, near_times)
+        names = [sensor.name for sensor in sensors]
+        ends = np.cumsum([s.size for s in stretches])[:-1]
+        steady = strongest_lines(np.split(near, ends, axis=1), step, aligned.high)
+        aligned = replace(
+            aligned,
+            hum_lines=dict(zip(names, mains_lines(near, near_times, MAINS))),
+            steady_lines=dict(zip(names, steady)),
+        )
     return aligned, observation_of(aligned, data, noise, tolerance, _clipped_samples(recording, sensors, time))
 
 
@@ -166,29 +177,6 @@ def _beside_train(quiet: Sequence[tuple[float, float]], reference: float) -> lis
     """Quiet times of one length next to the train, before and behind it: there the mains have drifted least."""
     length = min(PASSAGE.hum_time, *(end - start for start, end in quiet))
     return [(start, start + length) if start > reference else (end - length, end) for start, end in quiet]
-
-
-def line_phases(samples: np.ndarray, time: np.ndarray, frequency: float) -> list[float]:
-    r"""Phase of a line in each signal, by least squares: that of :math:`\sin(2\pi f t + \varphi)` at t = 0.
-
-    Parameters
-    ----------
-    samples : (n_channel, n) array of float
-        Signals.
-    time : (n,) array of float
-        Times of the samples, also with gaps. [s]
-    frequency : float
-        Frequency of the line. [Hz]
-
-    Returns
-    -------
-    list of float
-        For each signal, between -π and π. [rad]
-    """
-    turns = 2.0 * np.pi * frequency * time
-    lines = np.column_stack([np.sin(turns), np.cos(turns), np.ones(time.size)])
-    sine, cosine, _ = np.linalg.lstsq(lines, samples.T, rcond=None)[0]
-    return [float(phase) for phase in np.arctan2(cosine, sine)]
 
 
 def _wheel_free_times(aligned: AlignedPassage) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -113,7 +113,7 @@ class PassagePredictor(SiteModel):
             [m/s²]
         """
         start = _start_time(values, aligned)
-        conditions = {"name": aligned.name, "start": start, "hum_phases": aligned.hum_phases}
+        conditions = {"name": aligned.name, "start": start, "hum_lines": aligned.hum_lines}
         for term in terms:
             if term.effect_type == "channel":
                 signal = term.under_conditions(conditions).channel(signal, 4.0 * self.solver.rate, sensor)

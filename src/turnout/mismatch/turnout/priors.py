@@ -176,7 +176,18 @@ class PassagePriors:
     record_margin: float = prior(0.02, "s", "at both ends of a recording that is no noise", "convention")
     min_quiet_time: float = prior(0.1, "s", "without a wheel, at least, for a channel's noise", "convention")
     hum_time: float = prior(
-        0.5, "s", "before and behind a train, at most, that tell the phase of hum: mains drift by 0.1 Hz", "convention")
+        0.5, "s", "before and behind a train, at most, that tell frequency and phase of hum: mains drift", "convention")
+    mains_sd: float = prior(
+        0.03, "Hz", "deviation of the mains: the European grid keeps 0.05 Hz in ordinary operation", "convention")
+    mains_range: float = prior(4.0, "prior sd", "largest deviation of the mains that is tried", "numerical")
+    mains_steps: float = prior(20.0, "-", "trial frequencies of a line for each Hz and second", "numerical")
+    lowest_line: float = prior(5.0, "Hz", "of a steady source in a channel: slower is drift", "convention")
+    line_step: float = prior(0.5, "Hz", "between trial frequencies of such a line, in stretches of half a second",
+                             "numerical")
+    most_explained: float = prior(0.999, "-", "share of a channel's power by a line, at most", "numerical")
+    clear_share: float = prior(
+        0.17, "share of the rms response", "of a line without a wheel that is reported, as of a clear effect",
+        "convention")
     clipping_blur: float = prior(0.03, "s", "about a sample at the range, which is disturbed by clipping", "numerical")
     range_share: float = prior(0.999, "share of the range", "from which a sample counts as clipped", "numerical")
     coupling_corner_sd: float = prior(0.7, "Hz", "lower corner of an amplifier without a data sheet", ERROR_MODES)
