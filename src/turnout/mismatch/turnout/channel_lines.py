@@ -54,8 +54,8 @@ def mains_lines(samples: np.ndarray, time: np.ndarray, nominal: float) -> list[t
     fits = [_fit_line(samples, time, nominal + d) for d in deviations]
     squares = np.array([residual for _, residual in fits])  # (n_deviation, n_channel)
     variance = np.maximum(np.min(squares, axis=0), 1e-300) / max(time.size - 3, 1)
-    best = np.argmin(squares / variance + (deviations / PASSAGE.mains_sd)[:, None] ** 2, axis=0)
-    return [(nominal + float(deviations[k]), float(fits[k][0][channel])) for channel, k in enumerate(best)]
+    likeliest = np.argmin(squares / variance + (deviations / PASSAGE.mains_sd)[:, None] ** 2, axis=0)
+    return [(nominal + float(deviations[k]), float(fits[k][0][channel])) for channel, k in enumerate(likeliest)]
 
 
 def _fit_line(samples: np.ndarray, time: np.ndarray, frequency: float) -> tuple[np.ndarray, np.ndarray]:
@@ -95,11 +95,11 @@ def strongest_lines(stretches: Sequence[np.ndarray], step: float, high: float) -
         for s in centred
     ]
     power = np.mean(powers, axis=0)
-    best = np.argmax(power, axis=1)
+    strongest = np.argmax(power, axis=1)
     total = np.mean(np.concatenate(centred, axis=1) ** 2, axis=1)
     n = sum(s.shape[1] for s in stretches)
     lines = []
-    for channel, k in enumerate(best):
+    for channel, k in enumerate(strongest):
         line, all_power = float(power[channel, k]), max(float(total[channel]), 1e-300)
         share = min(line / all_power, PASSAGE.most_explained)
         lines.append(SteadyLine(float(frequencies[k]), float(np.sqrt(line)), float(-0.5 * n * np.log1p(-share))))
@@ -127,8 +127,8 @@ def line_without_wheel(case: TrackCase) -> Ambiguity | None:
     Ambiguity or None
         That of the channel with the most evidence.
     """
-    found = [a for sensor in case.predictor.site.sensors if (a := _line_of_channel(case, sensor.name)) is not None]
-    return max(found, key=lambda ambiguity: ambiguity.nats, default=None)
+    of_channels = (_line_of_channel(case, sensor.name) for sensor in case.predictor.site.sensors)
+    return max((a for a in of_channels if a is not None), key=lambda ambiguity: ambiguity.nats, default=None)
 
 
 def _line_of_channel(case: TrackCase, channel: str) -> Ambiguity | None:
