@@ -7,6 +7,7 @@ can be moved to a track whose supports are numbered differently.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from turnout.errors import SimulationError
@@ -43,8 +44,10 @@ class Link:
     def __post_init__(self) -> None:
         if not self.ends:
             raise SimulationError(f"link {self.tag!r}: acts on no degree of freedom.")
+        if isfinite(self.stiffness + self.damping + self.mass + self.loss_factor):
+            return  # so each of them is; links are made by the hundred thousand
         for value in (self.stiffness, self.damping, self.mass, self.loss_factor):
-            if not abs(value) < float("inf"):
+            if not isfinite(value):
                 raise SimulationError(f"link {self.tag!r} at {self.ends}: {value!r} is not a finite number.")
 
 
@@ -128,10 +131,11 @@ def with_links(track: Track, links: Sequence[Link]) -> Track:
     """
     values: dict = {}
     for link in links:
-        j = link.ends[0][0][1]
-        tags = (k.tag for k in track.support_links(j) if k.ends == link.ends and k.tag in SPRING_FIELDS)
-        for name, addition in zip(SPRING_FIELDS.get(next(tags, ""), ()), (link.stiffness, link.damping)):
-            values.setdefault(name, getattr(track, name).copy())[j] += addition
+        j, names = link.ends[0][0][1], SPRING_FIELDS.get(track.spring_between(link.ends), ())
+        for name, addition in zip(names, (link.stiffness, link.damping)):
+            if name not in values:
+                values[name] = getattr(track, name).copy()
+            values[name][j] += addition
     return track.with_(**values) if values else track
 
 

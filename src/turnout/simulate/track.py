@@ -245,13 +245,15 @@ class Track:
         Link
             Between rail and sleeper; with one layer between rail and ground.
         """
+        values = self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j]
+        return Link(self._pad_ends(j), *values, "pad")
+
+    def _pad_ends(self, j: int) -> tuple:
         ends: tuple = ((("rail", j), 1.0),)
         if self.pad_width and 0 < j < self.support.size - 1:
             before, behind = self._pad_shares(j)
             ends = ((("rail", j, -1), before), (("rail", j), 1.0 - before - behind), (("rail", j, 1), behind))
-        if self.layers > 1:
-            ends = (*ends, (("sleeper", j), -1.0))
-        return Link(ends, self.pad_stiffness[j], self.pad_damping[j], 0.0, self.pad_loss_factor[j], "pad")
+        return ends if self.layers == 1 else (*ends, (("sleeper", j), -1.0))
 
     def _pad_shares(self, j: int) -> list[float]:
         """Shares of the nodes before and after support ``j`` in its pad.
@@ -284,11 +286,32 @@ class Track:
         """
         if self.layers == 1:
             raise SimulationError(f"{self.name}: a track of one layer has no ballast under support {j}.")
-        ends: tuple = ((("sleeper", j), 1.0),)
-        if self.layers == 3:
-            ends = (*ends, (("ballast", j), -1.0))
         values = self.ballast_stiffness[j], self.ballast_damping[j], 0.0, self.ballast_loss_factor[j]
-        return Link(ends, *values, "ballast")
+        return Link(self._ballast_ends(j), *values, "ballast")
+
+    def _ballast_ends(self, j: int) -> tuple:
+        sleeper = ((("sleeper", j), 1.0),)
+        return (*sleeper, (("ballast", j), -1.0)) if self.layers == 3 else sleeper
+
+    def spring_between(self, ends: tuple) -> str:
+        """Which spring of a support acts on the degrees of freedom of a link with the same weights.
+
+        Parameters
+        ----------
+        ends : tuple
+            ``ends`` of the link, the first of them at the support.
+
+        Returns
+        -------
+        str
+            "pad", "ballast" or "subgrade"; "" if none does.
+        """
+        j = ends[0][0][1]
+        if ends == self._pad_ends(j):
+            return "pad"
+        if self.layers > 1 and ends == self._ballast_ends(j):
+            return "ballast"
+        return "subgrade" if self.layers == 3 and ends == ((("ballast", j), 1.0),) else ""
 
     def support_links(self, j: int) -> list[Link]:
         """Springs, dampers and masses of support ``j``, which terms can scale or remove.
