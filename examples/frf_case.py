@@ -255,12 +255,14 @@ class FrfCase(Case):
         jacobians = []
         for o in observations:
             place, stretch, gain = self._impact(values, terms, o)
-            all_lines = self._lines(frequencies * stretch, damping, loss)
+            all_lines = self._resonance_lines(frequencies * stretch, damping, loss)
             through = gain * self._through_sensors(np.ones((self.n_sensor, self.frequency.size), complex), terms)
             jacobian = np.zeros((o.data.size, len(self.nuisances)), order="F")
 
-            def put(name, rows, jacobian=jacobian, through=through):
-                jacobian[:, numbers[name]] += split_complex(through * rows) / steps[name]
+            def put(name, rows, s=slice(None), jacobian=jacobian, through=through):
+                change, column = through[s] * rows, jacobian[:, numbers[name]].reshape(2, *through.shape)
+                column[0, s] += change.real / steps[name]
+                column[1, s] += change.imag / steps[name]
 
             for k, label in modes:
                 f, zeta, lines, both = frequencies[k], damping[k], all_lines[k], heard[k, :, None] * shapes[k, place]
@@ -269,11 +271,12 @@ class FrfCase(Case):
                 if k < self.n_mode:  # that of the rigid body is given
                     name = f"log_damping_{label}"
                     put(name, both * (self._lines(f * stretch, zeta * np.exp(steps[name]), loss) - lines))
-                for s in range(self.n_place):
+                for s in {*range(self.n_sensor), place}:
                     moved = shapes[k].copy()
                     moved[s] += steps[f"shape_{label}_{s}"]
                     change = moved[: self.n_sensor] * moved[place] - heard[k] * shapes[k, place]
-                    put(f"shape_{label}_{s}", change[:, None] * lines)
+                    changed = slice(None) if s == place else s
+                    put(f"shape_{label}_{s}", change[changed, None] * lines, changed)
             product = (heard * shapes[:, place, None]).T
             put(f"hammer@{o.name}", product @ all_lines * (steps[f"hammer@{o.name}"] / gain))
             stretched = self._lines(frequencies * (stretch + steps[f"stretch@{o.name}"]), damping, loss)

@@ -57,6 +57,7 @@ def law_candidates(without=()):
     return tuple(result)
 
 
+N_STORED = 64  # simulated motions of one record each
 # Stiffness and damping of any form: even and odd powers, which together follow any law of the state.
 FREE_LAWS = ("absolute_quadratic_spring", "cubic_spring", "quadratic_spring", "dry_friction", "quadratic_drag",
              "state_damping")  # fmt: skip
@@ -150,6 +151,7 @@ class OscillatorCase(Case):
         self.rate, self.skipped, self.effective = rate, skipped, effective
         self.scale = 3.0 * float(np.sqrt(np.mean(np.concatenate([y for *_, y in records]) ** 2)))
         self.inputs = {name: (_step_inputs(u), y) for name, _, u, y in (*records, *reserved)}
+        self._motions = {}
         self.observations = tuple(self._observation(*r, tolerance) for r in records)
         self.reserved = tuple(self._observation(*r, tolerance) for r in reserved)
         if not frequency[0] > 0.0:
@@ -172,13 +174,22 @@ class OscillatorCase(Case):
         omega = 2.0 * np.pi * values["frequency"]
         law_indices = np.array([t.law_index for t in terms], dtype=np.int64)
         amounts = np.array([t.amount for t in terms], dtype=float)
-        gain = values["gain"] * omega**2
+        system = omega, values["damping"], values["gain"] * omega**2
         predictions = []
         for o in observations:
-            force, _ = self.inputs[o.name]
-            y = _simulate(force, 1.0 / self.rate, omega, values["damping"], gain, law_indices, amounts, self.scale)
+            y = self._motion(o.name, system, law_indices, amounts)
             predictions.append(y[self.skipped : self.skipped + o.data.size] + values.get("offset", 0.0))
         return predictions
+
+    def _motion(self, name, system, law_indices, amounts):
+        """Displacement of a record without the offset, which is the same for any offset and simulated once."""
+        key = name, *system, law_indices.tobytes(), amounts.tobytes()
+        if key not in self._motions:
+            if len(self._motions) >= N_STORED:
+                self._motions.pop(next(iter(self._motions)))
+            force, _ = self.inputs[name]
+            self._motions[key] = _simulate(force, 1.0 / self.rate, *system, law_indices, amounts, self.scale)
+        return self._motions[key]
 
     def latent_covariates(self, fit):
         """Missing feedback from the recorded motion: the residual of the equation of motion over ω²."""
