@@ -30,7 +30,7 @@ IDENTITY = {"finding_id": "f", "turnout_id": "t", "section_id": None, "found_at_
 @pytest.fixture(scope="module")
 def plan():
     small = small_plan((5.0, 25.0), passages=False, hammer_positions=(21.6, 24.0))
-    turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
+    turnout = TurnoutTrack(uniform_track(21.6, start=12.0), {"main": ((),)})
     return replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
 
 
@@ -158,6 +158,7 @@ def test_an_impact_is_not_compared_at_sensors_far_from_it():
 def test_an_impact_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, most):
     """Time histories with dry friction against its secant: one rate for both leaves 0.77 and 0.54 of the change
     at 20 mm/s, 0.98 and 0.41 at 2 mm/s."""
+    plan = replace(plan, turnout=TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)}))
     support = plan.turnout.track.nearest_support(22.2)
     case = TrackCase(measured_campaign(plan, (physics.DryFriction(support, limit),), 3))
     values = {n.name: n.mean for n in case.nuisances}
