@@ -5,13 +5,13 @@ The samples were taken at 25.6 kHz.
 """
 
 import json
-import time
 from dataclasses import replace
 
 import nptdms
 import numpy as np
 import pytest
 import soundfile
+from tests.unit.readers.cpu_limit import ended_after
 from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSORS, TRUE, UNITS, described, plain
 
 from turnout.errors import ReadError
@@ -127,11 +127,11 @@ def test_a_name_without_a_word_of_frequency_keeps_its_meaning():
     assert not says_no_scale("0.4") and not says_no_scale("1:10") and not says_no_scale("inverted")
 
 
-@pytest.mark.parametrize("text", [" " * 1000, " " * 500 + ":" + " " * 499, "a" + " " * 995 + "1:1x9", "a: " * 330])
+@pytest.mark.parametrize("text", [" " * 9000, " " * 4500 + ":" + " " * 4499, "a" + " " * 8995 + "1:1x9", "a: " * 3000])
 def test_a_comment_of_many_blanks_is_searched_quickly(text):
-    started = time.process_time()
-    assert len(list(entries_of_text(text, "comment"))) <= 1
-    assert time.process_time() - started < 0.5  # s; a search that tries every division of the blanks takes 5 s
+    """A search that tries every division of the blanks takes minutes."""
+    with ended_after(60.0):
+        assert len(list(entries_of_text(text, "comment"))) <= 1
 
 
 COMMENTS = (

@@ -46,10 +46,9 @@ def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
         "    Path('results/registry/_generation.json').write_text('{}')\n"
         "else:\n    lock.mkdir(parents=True)\n    Path('work/launched').write_text('')\n    time.sleep(60)\n"
     )
-    began = time.monotonic()
     (tmp_path / "work").mkdir()
-    code = module._run([], 6.0, tmp_path / "work")
-    assert code == EXIT_TIME_LIMIT and module.GENERATION.exists() and time.monotonic() - began < 12.0
+    assert module._run([], 6.0, tmp_path / "work") == EXIT_TIME_LIMIT  # 0 if the run is waited for
+    assert module.GENERATION.exists()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
