@@ -105,7 +105,9 @@ def rolling_noise(
     for row in times:
         power = np.zeros(n)
         for t in row:
-            power += np.exp(-np.abs(time - t) * (speed + acceleration * (t - lead)) / 0.4)
+            at_wheel = speed + acceleration * (t - lead)
+            near = slice(*np.searchsorted(time, t + np.array([-40.0, 40.0]) / at_wheel))  # beyond: exp(-100)
+            power[near] += np.exp(-np.abs(time[near] - t) * at_wheel / 0.4)
         rows.append(np.sqrt(power) * rng.standard_normal(n) + noise * rng.standard_normal(n))
     return recording_of(np.array(rows), positions)
 
