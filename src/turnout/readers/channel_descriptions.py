@@ -10,7 +10,7 @@ from turnout.readers.entry_owners import owners_of
 from turnout.readers.rate_units import words_of
 from turnout.readers.scale_words import plain_word
 from turnout.readers.source import RawRecord
-from turnout.readers.stated_quantities import MAX_TEXT, quantity_of_text
+from turnout.readers.stated_quantities import MAX_TEXT, quantity_of_text, texts_of_value
 from turnout.records import RawChannel
 
 DESCRIPTION_NAME = re.compile(
@@ -60,7 +60,7 @@ def exchanged_channels(record: RawRecord, indices: Sequence[int], channels: Sequ
         The problem, for a message; "" without such a pair.
     """
     quantities = {c.name.strip().casefold(): c.quantity for c in channels}
-    described: dict[int, dict[str, str]] = {
+    described: dict[int, dict[str, str]] = {  # row -> quantity -> text
         i: {quantity: record.names[i]}
         for i in indices
         if (quantity := _quantity_of_description(record.names[i], quantities))
@@ -80,6 +80,29 @@ def exchanged_channels(record: RawRecord, indices: Sequence[int], channels: Sequ
     return ""
 
 
+def describing_entries(entries: Sequence[Entry], channels: Sequence[RawChannel]) -> tuple[Entry, ...]:
+    """Entries on which ``exchanged_channels`` may depend: those with a text that speaks of a sensor.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Metadata of a record.
+    channels : sequence of RawChannel
+        Channels of the layout.
+
+    Returns
+    -------
+    tuple of Entry
+        Under any name, because a channel may have it.
+    """
+    quantities = {c.name.strip().casefold(): c.quantity for c in channels}
+    return tuple(
+        entry
+        for entry in entries
+        if any(_quantity_of_description(t, quantities) for t in texts_of_value(entry.value) if len(t) <= MAX_TEXT)
+    )
+
+
 def _descriptions(entry: Entry, record: RawRecord) -> dict[int, str]:
     """Texts of an entry by the channel that each describes."""
     if isinstance(entry.value, str):
@@ -90,10 +113,9 @@ def _descriptions(entry: Entry, record: RawRecord) -> dict[int, str]:
             return dict.fromkeys(named, entry.value)
         owners = owners_of(entry, record.entries, record.names) if is_description_name(entry.name) else ()
         return dict.fromkeys(owners, entry.value) if len(owners) == 1 else {}
-    if isinstance(entry.value, (list, tuple)) and len(entry.value) == len(record.names) > 1:
-        texts = entry.value if is_description_name(entry.name) else ()
-        return {i: text for i, text in enumerate(texts) if isinstance(text, str) and len(text) <= MAX_TEXT}
-    return {}
+    texts = texts_of_value(entry.value) if is_description_name(entry.name) else []
+    is_of_channels = len(texts) == len(record.names) > 1
+    return {i: text for i, text in enumerate(texts) if len(text) <= MAX_TEXT} if is_of_channels else {}
 
 
 def _quantity_of_description(text: str, quantities: dict[str, str]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from turnout.counts import first_texts
 from turnout.errors import ReadError
-from turnout.readers.channel_descriptions import exchanged_channels
+from turnout.readers.channel_descriptions import describing_entries, exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_units import rate_unit
@@ -264,7 +264,7 @@ class Assignments:
     def _key(self, record: RawRecord) -> tuple:
         """What the assignment depends on; aliases only if a channel of the layout is called by one.
 
-        Only entries that state a unit or a sensitivity count, with those that may name its channel.
+        Only entries that state a unit, a sensitivity or a sensor count, with those that may name its channel.
         """
         if self._keyed is not None and self._keyed[0] is record:
             return self._keyed[1]
@@ -280,12 +280,13 @@ class Assignments:
         return record.names, record.units, aliases, open_scales, self._stated[1]
 
     def _stated_of(self, record: RawRecord) -> tuple:
-        """What the entries of a record state about units, quantities and sensitivities."""
+        """What the entries of a record state about units, quantities, sensitivities and sensors."""
         sensitivities: tuple[str, ...] = ()
         if self._has_sensitivity and sensitivity_entries(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         quantities = tuple((e.place, e.name, str(e.value)) for e in quantity_entries(record.entries))
-        return sensitivities, key_of_units(record.entries), quantities
+        sensors = tuple((e.place, e.name, str(e.value)) for e in describing_entries(record.entries, self.channels))
+        return sensitivities, key_of_units(record.entries), quantities, sensors
 
     def mappings(self, record: RawRecord, where: str) -> tuple[ChannelMapping, ...]:
         """As ``channel_mappings``.

@@ -20,6 +20,7 @@ many decimals as all others.
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from datetime import datetime
 from mmap import mmap
 
@@ -173,6 +174,7 @@ def _records(
         promised = int(rows)
     of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
+    entries = tuple(_of_channels(entry, selected, len(names)) for entry in entries)
     for k, span in enumerate(spans):
         if span is None:
             yield missing_record(k, n, source)
@@ -203,6 +205,14 @@ def _records(
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,
         )
+
+
+def _of_channels(entry: Entry, selected: Sequence[int], n_column: int) -> Entry:
+    """An entry that lists a text for each column, or for each but the first, with those of the channels alone."""
+    n_before = n_column - len(entry.value) if isinstance(entry.value, list) else -1
+    if n_before not in (0, 1) or not selected or selected[0] < n_before:
+        return entry
+    return replace(entry, value=[entry.value[i - n_before] for i in selected])
 
 
 def _label(names: Sequence[str], units: Sequence[str], i: int) -> str:

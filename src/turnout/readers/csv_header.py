@@ -320,9 +320,14 @@ def entries_of_lines(
 
 
 def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether a line has a text for each column behind a word for such texts, as "Sensor;hammer;accelerometer"."""
+    """Whether a line has texts of columns behind a word for such texts, as "Sensor;hammer;accelerometer".
+
+    There is one for each column, or for each but the first, which is often that of the time.
+    """
     texts = cells[1:]
-    return len(texts) == len(names) and is_description_name(cells[0]) and not any(map(is_number, texts))
+    return (
+        len(texts) in (len(names), len(names) - 1) and is_description_name(cells[0]) and not any(map(is_number, texts))
+    )
 
 
 def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:

@@ -10,6 +10,7 @@ from turnout.readers.entry_owners import owners_of
 from turnout.readers.rate_units import words_of
 from turnout.readers.scale_words import plain_word
 from turnout.readers.source import RawRecord
+from turnout.readers.texts import decode_text
 from turnout.units import conversion
 
 # Names of entries that state the quantity of the numbers, and of the sensor or channel, whose numbers may be volts.
@@ -128,17 +129,29 @@ def contradicting_quantity(record: RawRecord, index: int, quantity: str, unit: s
 
 def _quantity_of_channel(entry: Entry, record: RawRecord, index: int) -> str:
     """The quantity that an entry states for a channel; "" if it belongs to another one or to none."""
-    values = _texts(entry.value)
+    values = texts_of_value(entry.value)
     if len(values) == len(record.names) > 1:
         return quantity_of_text(values[index])
     owners = owners_of(entry, record.entries, record.names)
     return quantity_of_text(values[0]) if len(values) == 1 and owners == {index} else ""
 
 
-def _texts(value: Any) -> list[str]:
+def texts_of_value(value: Any) -> list[str]:
+    """The texts of a value.
+
+    Parameters
+    ----------
+    value : any
+        Value of an entry: a text, or a list or an array with texts.
+
+    Returns
+    -------
+    list of str
+        Without what is no text.
+    """
     values = value.ravel().tolist() if hasattr(value, "ravel") else value
     values = values if isinstance(values, (list, tuple)) else [values]
-    return [str(v) for v in values if isinstance(v, str)]
+    return [decode_text(v) if isinstance(v, bytes) else str(v) for v in values if isinstance(v, (str, bytes))]
 
 
 def _dimension(unit: str) -> str:

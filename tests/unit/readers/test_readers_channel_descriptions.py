@@ -1,5 +1,6 @@
 """Channels that a layout exchanges: the file's names and descriptions of its sensors say so."""
 
+import h5py
 import nptdms
 import numpy as np
 import pytest
@@ -51,6 +52,34 @@ def test_a_table_of_channels_contradicts_a_layout_that_exchanges_them(head, tmp_
     rows = "".join(f"{f};{a}\n" for f, a in SAMPLES.T)
     (tmp_path / "a.csv").write_text(f"{head}\nCH1;CH2\n{rows}", encoding="utf-8")
     assert bool(outcome(tmp_path / "a.csv", "CH1", "CH2")) == HEADS[head]
+
+
+@pytest.mark.parametrize("label", ["Sensor;", "Sensor;clock;"])
+@pytest.mark.parametrize("texts", ["Accelerometer;Hammer", "Hammer;Accelerometer"])
+def test_a_line_of_sensors_has_one_for_each_column_or_for_each_but_the_time(label, texts, tmp_path):
+    rows = "".join(f"{k / 1e3};{f};{a}\n" for k, (f, a) in enumerate(SAMPLES.T))
+    (tmp_path / "a.csv").write_text(f"{label}{texts}\ntime [s];CH1;CH2\n{rows}", encoding="utf-8")
+    assert bool(outcome(tmp_path / "a.csv", "CH1", "CH2")) == texts.startswith("Acc")
+
+
+@pytest.mark.parametrize("is_bytes", [False, True])
+def test_an_array_of_texts_describes_the_channels(is_bytes, tmp_path):
+    for texts in (["accelerometer", "hammer"], ["hammer", "accelerometer"]):
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["CH1"], file["CH2"] = SAMPLES
+            file.attrs["sensors"] = np.array(texts, dtype="S") if is_bytes else texts
+        assert bool(outcome(tmp_path / "a.h5", "CH1", "CH2")) == texts[0].startswith("acc")
+
+
+def test_each_record_is_compared_with_its_own_descriptions(tmp_path):
+    """Before, those of the first record counted for all with the same names and units."""
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        for group, texts in (("1", ("hammer", "accelerometer")), ("2", ("accelerometer", "hammer"))):
+            channels = zip(("CH1", "CH2"), SAMPLES, texts)
+            writer.write_segment([nptdms.ChannelObject(group, c, x, {"sensor": text}) for c, x, text in channels])
+    sensors = RawChannel("force", "CH1", "force", "N"), RawChannel("rail", "CH2", "acceleration", "m/s²")
+    result = read("a.tdms", tmp_path, RawDescription(sensors, rate=1e3))
+    assert len(result.recordings) == 1 and "record 2 of 2: the layout takes" in str(*result.errors)
 
 
 @pytest.mark.parametrize("name", ["description", "NI_ChannelName", "comment", "serial"])
