@@ -5,20 +5,24 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from turnout.readers.entries import Entry
-from turnout.readers.entry_owners import owners_of
+from turnout.readers.entry_owners import owners_of, spaced_words
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 
-DELAY = re.compile(r"delay|latenc|skew$|^lag$|verzog|retard|forsink|fordroj|vertrag|^timeshift$")
+DELAY = re.compile(r"delay|latenc|skew$|^lag$|verzog|retard|forsink|fordroj|vertraging|^timeshift$")
 # Delays before a recording begins, and what is beside a delay.
 OTHER_DELAY = re.compile(r"trig|start|hold|wait|settl|warm|auslos|unit|einheit|type|mode|name|enabl|max|toler|alarm")
 MAX_LISTED = 4  # channels in one message
+MAX_SHARE = 0.01  # of a sampling step that delays may differ: 1.8° of phase at half the sampling rate
 DELAY_REMEDY = "Let the export shift the samples; if they are in time already, name the entry in 'checked_entries'"
 
 
-def delay_problem(record: RawRecord, rows: Sequence[int]) -> str:
+def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     """What the metadata of a record state about delays that differ between its channels.
+
+    Units of delays are not interpreted. No unit in use is longer than a second, so a difference far below a sampling
+    step in seconds is negligible in any of them.
 
     Parameters
     ----------
@@ -26,6 +30,8 @@ def delay_problem(record: RawRecord, rows: Sequence[int]) -> str:
         The record as it is in the file.
     rows : sequence of int
         Numbers of the channels that the layout wants, from 0.
+    rate : float
+        Sampling rate. [Hz]
 
     Returns
     -------
@@ -33,19 +39,31 @@ def delay_problem(record: RawRecord, rows: Sequence[int]) -> str:
         The problem, for a message; "" if all these channels have the same delay, or none is stated.
     """
     delays: dict[str, dict[int, float]] = {}
+    labels: dict[str, str] = {}
     for entry in (e for e in record.entries if _is_delay_name(e.name)):
         numbers = _numbers(entry)
         owners = owners_of(entry, record.entries, record.names)
+        name = _without_channels(entry.name, [record.names[i] for i in owners])
+        labels.setdefault(name, entry.name)
         if len(numbers) == len(record.names) > 1:
-            delays[entry.name] = dict(enumerate(numbers))
+            delays[name] = dict(enumerate(numbers))
         elif owners and len(numbers) == 1:
-            delays.setdefault(entry.name, {}).update(dict.fromkeys(owners, numbers[0]))
+            delays.setdefault(name, {}).update(dict.fromkeys(owners, numbers[0]))
     for name, of_channels in delays.items():
-        values = {record.names[i]: of_channels.get(i, 0.0) for i in rows}
-        if len(set(values.values())) > 1:
-            listed = ", ".join(f"{channel!r} {value:g}" for channel, value in [*values.items()][:MAX_LISTED])
-            return f"its metadata state different delays ({name}: {listed}), and nothing says that they are corrected"
+        values = [of_channels.get(i, 0.0) for i in rows]
+        if values and (max(values) - min(values)) * rate > MAX_SHARE:
+            listed = ", ".join(f"{record.names[i]!r} {value:g}" for i, value in [*zip(rows, values)][:MAX_LISTED])
+            problem = f"its metadata state different delays ({labels[name]}: {listed})"
+            return f"{problem}, and nothing says that they are corrected"
     return ""
+
+
+def _without_channels(name: str, channels: Sequence[str]) -> str:
+    """The words of a name without those of channels, so that "force_delay" and "rail delay" are one quantity."""
+    words = f" {spaced_words(name)} "
+    for channel in channels:
+        words = words.replace(f" {spaced_words(channel)} ", " ")
+    return words.strip()
 
 
 @lru_cache(maxsize=4096)

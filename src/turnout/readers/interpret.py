@@ -227,10 +227,10 @@ class _Conversion:
         if problem := unfilled_buffer(record, n_sample):
             raise source.error(where, problem, VALID_REMEDY, reason="wrong_length")
         sensor_rows = self.assignments.sensor_rows(record, where)
-        if problem := delay_problem(record, sorted(sensor_rows)):
-            raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source)
         rate = resolve(statements, description.rate, where, source)
+        if problem := delay_problem(record, sorted(sensor_rows), rate):
+            raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")

@@ -192,3 +192,21 @@ def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_pat
     of_rail = delays({"rail": "12"})
     assert bool(of_rail) == DELAYS[name] and all(f"{name}: 'force' 0, 'rail' 12" in text for text in of_rail)
     assert not delays({"rail": 12}, (name,)) and not delays({"force": 12, "rail": 12, "aux": 3})
+
+
+OF_NAMES = {  # entries, and whether the channels differ by more than a hundredth of a step of 1 ms
+    ("force_delay", 12.0, "rail_delay", 12.0): False, ("force_delay", 12.0, "rail_delay", 11.0): True,
+    ("force delay", 0.0, "rail delay", 9e-6): False, ("force delay", 0.0, "rail delay", 11e-6): True,
+    ("Vertragsnummer force", 1.0, "Vertragsnummer rail", 2.0): False,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("entries", OF_NAMES)
+def test_delays_whose_names_have_a_channel_are_compared_with_each_other(entries, tmp_path):
+    """Before, each name counted as a delay of one channel, and that of the others as none."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["force"], file["rail"] = np.random.default_rng(5).normal(size=(2, 50))
+        file.attrs.update(dict(zip(entries[::2], entries[1::2])))
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    result = read("a.h5", tmp_path, RawDescription(sensors, rate=1e3))
+    assert any(error.reason == "clock_drift" for error in result.errors) == OF_NAMES[entries]
