@@ -224,7 +224,7 @@ class _Conversion:
         description, source = self.description, self.source
         where = f"record {k + 1} of {self.n_record}"
         n_sample = _sample_count(record, where, description.n_samples, source)
-        if problem := unfilled_buffer(record, n_sample):
+        if problem := unfilled_buffer(record, n_sample, self.n_record):
             raise source.error(where, problem, VALID_REMEDY, reason="wrong_length")
         sensor_rows = self.assignments.sensor_rows(record, where)
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source)

@@ -41,8 +41,10 @@ def missing_samples(record: RawRecord, n_sample: int) -> str:
     return ""
 
 
-def unfilled_buffer(record: RawRecord, n_sample: int) -> str:
+def unfilled_buffer(record: RawRecord, n_sample: int, n_record: int = 1) -> str:
     """What the metadata of a record state about samples of a buffer that were never measured.
+
+    A number under a name without a word for samples, as "n_valid", may count the records of a file of several.
 
     Parameters
     ----------
@@ -50,6 +52,8 @@ def unfilled_buffer(record: RawRecord, n_sample: int) -> str:
         The record as it is in the file.
     n_sample : int
         Samples of the record.
+    n_record : int
+        Records of the file.
 
     Returns
     -------
@@ -61,8 +65,10 @@ def unfilled_buffer(record: RawRecord, n_sample: int) -> str:
             continue
         values = entry.value.ravel().tolist() if hasattr(entry.value, "ravel") else entry.value
         numbers = [_whole_number(v) for v in (values if isinstance(values, (list, tuple)) else [values])]
-        n_free = 1 if "index" in words_of(entry.name) else 0  # an index may be that of the last sample
-        if fewer := [number for number in numbers if 1 < number < n_sample - n_free]:
+        words = frozenset(words_of(entry.name))
+        n_free = 1 if "index" in words else 0  # an index may be that of the last sample
+        n_counted = 1 if words & SAMPLE_WORDS or "index" in words else n_record
+        if fewer := [number for number in numbers if n_counted < number < n_sample - n_free]:
             place = f"{entry.name!r} in {entry.place}" if entry.place else repr(entry.name)
             return f"{place} is {min(fewer)}, and there are {n_sample} samples: the others may be no measured ones"
     return ""

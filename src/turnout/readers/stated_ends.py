@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from datetime import datetime
 from functools import lru_cache
 
 from turnout.readers.entries import Entry
@@ -15,6 +16,8 @@ BESIDE_END = frozenset(
     "de la mesure heure utc".split()
 )
 MIN_STEPS = 50  # of the clock in a duration, so that it is known to 2 %
+CLOCK = re.compile(r"\d:\d\d(?P<seconds>:\d\d(?:[.,](?P<decimals>\d+))?)?")
+MIN_STEP = 1e-3  # s: computers keep time no better, whatever digits they write
 
 
 def with_stated_duration(record: RawRecord) -> RawRecord:
@@ -32,23 +35,36 @@ def with_stated_duration(record: RawRecord) -> RawRecord:
     """
     start = record.started_at
     ends = {
-        time: entry
+        time: (text, entry)
         for entry in record.entries
         if _is_end_name(entry.name)
-        for _, time in times_of_entry(entry)
+        for text, time in times_of_entry(entry)
         if time is not None
     }
     if start is None or len(ends) != 1:
         return record
-    ((end, entry),) = ends.items()
+    ((end, (text, entry)),) = ends.items()
     if (end.tzinfo is None) != (start.tzinfo is None):
         return record
     duration = (end - start).total_seconds()
-    step = 1e-3 if start.microsecond or end.microsecond else 1.0
-    if duration < MIN_STEPS * step:
+    if duration < MIN_STEPS * _clock_step(text, start, end):
         return record
     of_duration = Entry(entry.place, f"duration until {entry.name}", f"{duration:.9g} s")
     return replace(record, entries=(*record.entries, of_duration))
+
+
+def _clock_step(text: str, start: datetime, end: datetime) -> float:
+    """Step [s] of the coarser of two times; ``text`` is that of the end.
+
+    A start or an end that was rounded to a full second has no fraction.
+    """
+    clock = CLOCK.search(text)
+    if clock is not None and clock["seconds"] is None:
+        return 60.0
+    if not start.microsecond or not end.microsecond:
+        return 1.0
+    decimals = clock["decimals"] if clock is not None else None
+    return max(MIN_STEP, 10.0 ** -len(decimals)) if decimals else MIN_STEP
 
 
 @lru_cache(maxsize=4096)

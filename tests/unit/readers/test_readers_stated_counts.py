@@ -176,16 +176,36 @@ def test_a_buffer_that_was_not_filled_is_no_recording(format, name, tmp_path):
     )
 
 
+COUNTS = {"n_valid": (2, 3), "valid_count": (2, 3), "valid_samples": (None, 2)}  # accepted and rejected numbers
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_number_of_valid_ones_in_a_file_of_several_records_may_be_that_of_records(name, tmp_path):
+    def problems(number):
+        with h5py.File(tmp_path / "a.hdf5", "w") as file:
+            for k in range(2):
+                file[f"run{k}/force"], file[f"run{k}/rail"] = SAMPLES.T
+            file.attrs[name] = number
+        return [e for e in result_of(tmp_path, "a.hdf5").errors if e.reason == "wrong_length"]
+
+    accepted, rejected = COUNTS[name]
+    assert len(problems(rejected)) == 2 and (accepted is None or not problems(accepted))
+
+
 ENDS = {  # name and time of the end of a record of 1 s from 10:00:00.25, and whether it is reported
     ("Stop", "10:00:01.25"): False, ("End time", "10:00:01.03"): True, ("Messende", "10:00:02.25"): True,
     ("end of recording", "10:00:01.50"): True, ("Calibration end", "10:00:02.25"): False,
     ("End of warranty", "10:00:02.25"): False, ("Stop", "14:00:00.00"): False, ("Stop", "10:00:00.27"): False,
+    ("Stop", "10:00:02"): False, ("Stop", "10:00:01.5"): False, ("Stop", "10:02"): False,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "time"), ENDS)
 def test_the_duration_between_start_and_end_is_compared_with_the_samples(name, time, tmp_path):
-    """An end that is hours later is that of the session, and a short time is known to a few steps of the clock only."""
+    """An end that is hours later is that of the session, and a short time is known to a few steps of the clock only.
+
+    An end without a fraction or without seconds was rounded.
+    """
     n_row = 25 if time == "10:00:00.27" else 500
     rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(1).normal(size=(n_row, 2)).round(4))
     head = f"Start: 2026-05-13 10:00:00.25\n{name}: 2026-05-13 {time}\nforce;rail\n"
