@@ -24,7 +24,9 @@ UPSIDE_DOWN = re.compile(
     r"upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
 )
 # In the name of a channel itself; "down" there may be a place.
-INVERTED = re.compile(r"upside.?down|(?<!non)(?<!no[nt][ _-])(?:inverted|invertiert|negated|flipped)", re.IGNORECASE)
+INVERTED = re.compile(
+    r"upside.?down|(?<!non)(?<!un)(?<!no[nt][ _-])(?<!nicht[ _-])(?:inverted|invertiert|negated|flipped)", re.IGNORECASE
+)
 DIRECTION_NAME = re.compile(
     r"direction|richtung|orient|ausricht|^dof$|degreeoffreedom|axis$|achse$|mount|montage|einbau"
 )

@@ -284,6 +284,7 @@ def _is_inside(inner: str, outer: str) -> bool:
     return inner != outer and inner.startswith(f"{outer}/" if outer else "")
 
 
+AXIS = re.compile(r"(?<![^\W_])[xyzXYZ](?=\s?\d)")  # before the number of a sensor
 # A power of ten by which the numbers of a channel may be multiplied: "force x100", "rail*10", "rail ×0.1".
 FACTOR_IN_NAME = re.compile(r"(?:(?:^|[\s_(\[])[xX]|\s?[×*])\s?(10+|0[.,]0*1)(?=$|[\s_)\]])")
 
@@ -291,7 +292,8 @@ FACTOR_IN_NAME = re.compile(r"(?:(?:^|[\s_(\[])[xX]|\s?[×*])\s?(10+|0[.,]0*1)(?
 def with_named_factors(record: RawRecord) -> RawRecord:
     """The record with a statement about the scale of each channel whose name has a factor.
 
-    A number that tells the channels of the file apart, as in "acc x10" beside "acc x11", is none.
+    A number that tells the channels of the file apart, as in "acc x10" beside "acc x11", is none. An x that is an
+    axis is none either, as in "acc x10" beside "acc y10".
 
     Parameters
     ----------
@@ -303,7 +305,7 @@ def with_named_factors(record: RawRecord) -> RawRecord:
     RawRecord
         The same record if no name has a factor.
     """
-    stems = [re.sub(r"\d+", "0", name) for name in record.names]
+    stems = [re.sub(r"\d+", "0", AXIS.sub("x", name)) for name in record.names]
     factors = {
         i: scale_problem(f"a factor in the name of the channel, {match[0].strip(' _([')!r}")
         for i, name in enumerate(record.names)

@@ -68,7 +68,19 @@ def test_a_direction_in_the_name_of_a_channel_is_reported(name, tmp_path):
     assert remarks(tmp_path / "a.npz", replace(RAIL, source=name, sign=-1)) == []
 
 
-@pytest.mark.parametrize("name", ["rail-Z", "rail_z", "rail +Z", "Z-axis", "a-x-2", "rail non-inverted"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rail-Z",
+        "rail_z",
+        "rail +Z",
+        "Z-axis",
+        "a-x-2",
+        "rail non-inverted",
+        "rail uninverted",
+        "Schiene nicht invertiert",
+    ],
+)
 def test_a_hyphen_in_a_name_is_no_minus(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     assert remarks(tmp_path / "a.npz", replace(RAIL, source=name)) == []

@@ -373,6 +373,7 @@ def test_a_number_that_may_be_a_scale_is_rejected_by_name(format, tmp_path):
 FACTORS = {
     ("force x100", "rail"): [0], ("force", "rail*10"): [1], ("force_x1000", "rail ×0.1"): [0, 1],
     ("acc x10", "acc x11"): [], ("acc x1", "acc x2"): [], ("force", "max10"): [], ("force", "rail x"): [],
+    ("acc x10", "acc y10"): [], ("acc_Z10", "acc_X10"): [], ("force x10", "acc y10"): [0],
 }  # fmt: skip
 
 
