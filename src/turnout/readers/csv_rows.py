@@ -126,7 +126,7 @@ def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) 
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
         line = data[start:end].strip()
-        if line and not re.match(rb'["#;,\t|]*[A-Za-z\x80-\xff](?!an\b|nf)', line):
+        if line and not re.match(rb'["#;,\t|]*(?!(?i:nan|inf(?:inity)?)\b)[A-Za-z\x80-\xff]', line):
             break
         has_number = any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:])
         if has_number and not STATISTICS.match(decode_line(line)):

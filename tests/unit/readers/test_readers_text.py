@@ -612,6 +612,14 @@ def test_statistics_below_the_samples_are_none_of_them(summary, is_lazy, tmp_pat
     assert not any(entry.name.casefold() in ("min", "max") for entry in raw.records[0].entries)
 
 
+@pytest.mark.parametrize("word", ["NaN", "nan", "inf", "-Infinity"])
+def test_missing_samples_above_a_closing_line_are_samples(word, tmp_path):
+    """They are no words that end the text, as "Information" is one."""
+    (tmp_path / "a.csv").write_text("force;rail\n" + "1.5;2.5\n" * 60 + f"{word};{word}\nInformation\nEnd of data\n")
+    _, _, raw = read_unconverted("a.csv", tmp_path)
+    assert [len(column) for column in raw.records[0].samples] == [61, 61]
+
+
 def test_a_damaged_row_at_the_end_is_no_statistic(tmp_path):
     rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(4).normal(size=(60, 2)))
     for row in ("maxwell;0.1;0.2\n", "m;0.1\n", "0.1;max\n"):
