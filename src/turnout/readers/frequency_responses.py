@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.rate_units import hertz_of
+from turnout.readers.rate_units import hertz_of, rate_unit
 from turnout.readers.source import Source, load
-from turnout.readers.stated_units import is_meaningless
+from turnout.readers.stated_units import is_meaningless, known_unit
 from turnout.readers.uff import FREQUENCY_RESPONSE, TIME_RESPONSE, read_frf
 from turnout.readers.uff_datasets import read_datasets
 
@@ -253,11 +253,17 @@ def _responses_of_table(
 
 
 def _hertz_per_number(title: str, source: Source) -> float:
-    """Hertz of one unit of the column of frequencies, by its title: in brackets or its last word; else 1."""
+    """Hertz of one unit of the column of frequencies, by its title: in brackets or its last word; else 1.
+
+    A word in round brackets may be a remark, as in "Frequency (FFT)", unless it is another unit.
+    """
     in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", title)
-    unit = in_brackets[-1] if in_brackets else re.split(r"[\s_,]+", title.strip())[-1]
-    scale = hertz_of(unit)
-    if scale is None and in_brackets and not is_meaningless(unit):
+    in_brackets = [text for text in in_brackets if not is_meaningless(text)]
+    last_word = re.split(r"[\s_,]+", title.strip())[-1]
+    scale = next((s for text in (*in_brackets, last_word) if (s := hertz_of(text)) is not None), None)
+    other_units = [text for text in in_brackets if f"[{text}]" in title or rate_unit(text) or known_unit(text)]
+    if scale is None and other_units:
+        unit = other_units[-1]
         problem = f"the title of the frequencies is {title[:60]!r}, and {unit[:20]!r} is no unit of a frequency"
         remedy = "Export frequency responses with their frequencies in Hz, kHz, rad/s or rpm"
         raise source.error("the line of titles", problem, remedy, reason="wrong_rate")

@@ -103,9 +103,13 @@ def hertz_of(unit: str) -> float | None:
     --------
     >>> hertz_of("kHz"), hertz_of("rpm") == 1 / 60, round(hertz_of("rad/s"), 4), hertz_of("ms"), hertz_of("order")
     (1000.0, True, 0.1592, None, None)
+    >>> hertz_of("mHz"), hertz_of("MHz")
+    (0.001, 1000000.0)
     """
     of_rate, plain = rate_unit(unit), unit.strip("[](){} .").casefold()
     if of_rate is not None:
+        if plain == "mhz" and "MHz" not in unit:  # without case, milli and mega are the same
+            return 1e-3
         return None if of_rate.is_step or of_rate.is_sampling else float(of_rate.scale)
     if RADIANS_PER_SECOND.fullmatch(plain):
         return 1.0 / (2.0 * math.pi)

@@ -114,6 +114,16 @@ def test_frequencies_of_a_text_are_in_the_unit_that_it_states(head, unit, tmp_pa
     assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F[:60], rel=1e-9)
 
 
+TITLES = {"Frequency [Hz] (bin)": 1.0, "Frequency (FFT) [kHz]": 1e-3, "Frequency (FFT)": 1.0, "Frequency [mHz]": 1e3}
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_remark_in_the_title_of_the_frequencies_is_no_unit(title, tmp_path):
+    rows = [";".join((f"{TITLES[title] * f:.12g}", *cells(h))) for f, h in zip(F[:60], H)]
+    (tmp_path / "a.csv").write_text("\n".join((f"{title};Real;Imag", *rows)) + "\n")
+    assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F[:60], rel=1e-9)
+
+
 @pytest.mark.parametrize("unit", ["ms", "order", "V"])
 def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
     rows = [";".join((f"{f}", *cells(h))) for f, h in zip(F[:60], H)]
@@ -121,6 +131,10 @@ def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
     with pytest.raises(ReadError, match=f"'{unit}' is no unit of a frequency") as error:
         find_responses("a.csv", tmp_path)
     assert error.value.reason == "wrong_rate"
+    if unit != "order":
+        (tmp_path / "a.csv").write_text("\n".join((f"Frequency ({unit});Real;Imag", *rows)) + "\n")
+        with pytest.raises(ReadError, match=f"'{unit}' is no unit of a frequency"):
+            find_responses("a.csv", tmp_path)
 
 
 @pytest.mark.parametrize(
