@@ -17,7 +17,7 @@ FAILED_RULE = re.compile(
 )
 FINISHED_JOB = re.compile(r"^Finished jobid: (\d+) ", re.M)
 STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
-EXCEPTION = re.compile(r"^\w+(?:Error|Exception): .+$", re.M)  # the last line of a traceback
+EXCEPTION = re.compile(r"^[\w.]+(?:Error|Exception)(?:: .+)?$", re.M)  # the last line of a traceback
 MAX_REASON_LENGTH = 300  # characters of a message in the report
 
 

@@ -139,6 +139,8 @@ def test_a_run_that_ended_in_a_traceback_says_its_exception_or_its_log(folder):
         "then", "Traceback (most recent call last):\n\nNotADirectoryError: [Errno 20] Not a directory: 'results'\n", 5
     )
     assert failure_reason() == "NotADirectoryError: [Errno 20] Not a directory: 'results'"
+    write("last", "Traceback (most recent call last):\n\nturnout.errors.StateError: no state\n", 10)
+    assert failure_reason() == "turnout.errors.StateError: no state"
 
 
 def write(name, text, later=0):
