@@ -54,6 +54,12 @@ def test_a_table_of_channels_contradicts_a_layout_that_exchanges_them(head, tmp_
     assert bool(outcome(tmp_path / "a.csv", "CH1", "CH2")) == HEADS[head]
 
 
+def test_two_channels_of_one_quantity_are_not_exchanged(tmp_path):
+    (tmp_path / "a.csv").write_text("acc 1;acc 2\n" + "".join(f"{a};{b}\n" for a, b in SAMPLES.T))
+    sensors = tuple(RawChannel(f"rail{i}", i, "acceleration", "m/s²") for i in (1, 0))
+    assert not read("a.csv", tmp_path, RawDescription(sensors, rate=1e3)).errors
+
+
 @pytest.mark.parametrize("label", ["Sensor;", "Sensor;clock;"])
 @pytest.mark.parametrize("texts", ["Accelerometer;Hammer", "Hammer;Accelerometer"])
 def test_a_line_of_sensors_has_one_for_each_column_or_for_each_but_the_time(label, texts, tmp_path):

@@ -20,6 +20,7 @@ from pyarrow import parquet
 from turnout.errors import ReadError
 from turnout.readers import read, read_unconverted
 from turnout.readers.interpret import errors_without_layout
+from turnout.readers.missing_codes import missing_code
 from turnout.records import RawChannel, RawDescription
 
 N = 3000
@@ -319,3 +320,9 @@ def test_a_packed_file_is_named_as_such(program, name, tmp_path):
     (tmp_path / name).write_bytes(packed(program))
     _, message = reason_of(tmp_path, name)
     assert program in message and "Unpack it" in message
+
+
+def test_a_code_of_single_precision_is_one_and_its_neighbours_are_measured_values():
+    """The highest code of a converter with 16 bits is clipping, and 1000 is no null of a well log."""
+    assert missing_code(float(np.float32(1e20))) == 1e20 and missing_code(-32768.0) == -32768.0
+    assert [missing_code(value) for value in (32767.0, -32767.0, 1000.0, 1.0001e20)] == [None] * 4

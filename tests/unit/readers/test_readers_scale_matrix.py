@@ -391,3 +391,13 @@ def test_a_factor_in_the_name_of_a_channel_is_a_scale_of_which_nothing_says_whet
         assert len(result.recordings) + len(result.errors) == 1
         rejected += [i for error in result.errors if "a factor in the name of the channel" in str(error)]
     assert rejected == FACTORS[names]
+
+
+def test_a_scale_of_the_second_record_alone_is_no_part_of_the_first(tmp_path):
+    """The assignment of channels is computed once for records that state the same, and only for these."""
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        for group, properties in (("1", {}), ("2", {"gain": 10.0})):
+            samples = np.random.default_rng(6).normal(size=40)
+            writer.write_segment([nptdms.ChannelObject(group, "rail", samples, properties)])
+    result = read("a.tdms", tmp_path, RawDescription((RawChannel("rail", "rail", "acceleration", "g"),), rate=1e3))
+    assert len(result.recordings) == 1 and "record 2 of 2" in str(*result.errors) and "gain = 10" in str(*result.errors)

@@ -213,3 +213,18 @@ def test_the_duration_between_start_and_end_is_compared_with_the_samples(name, t
     result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=500.0))
     assert len(result.recordings) == 1
     assert [f"duration until {name}" in str(e) for e in result.errors] == [True] * ENDS[name, time]
+
+
+def test_an_end_of_several_records_or_in_another_zone_and_two_ends_state_no_duration(tmp_path):
+    start, end, other = "2026-05-13 10:00:00.25", "2026-05-13 10:00:02.25", "2026-05-13 10:00:02.75"
+
+    def problems(n_record, **entries):
+        with h5py.File(tmp_path / "a.hdf5", "w") as file:
+            for k in range(n_record):
+                file[f"run{k}/force"], file[f"run{k}/rail"] = SAMPLES.T
+            file.attrs.update(start=start, **entries)
+        result = read("a.hdf5", tmp_path, RawDescription(CHANNELS, rate=400.0))
+        return [e for e in result.errors if "duration until" in str(e)]
+
+    assert problems(1, stop=end) and not problems(2, stop=end)
+    assert not problems(1, stop=f"{end}+02:00") and not problems(1, stop=end, end_time=other)

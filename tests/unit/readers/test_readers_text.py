@@ -628,6 +628,14 @@ def test_a_damaged_row_at_the_end_is_no_statistic(tmp_path):
             read_unconverted("a.csv", tmp_path)
 
 
+def test_a_short_table_has_no_summary(tmp_path):
+    """Its first rows are too few to say what is usual: flags of two contacts are samples."""
+    rows = ["0;1", "1;0", "0;1", "1;0", "0;1", "1;0", "1;1", "0;0", "1;0"]
+    (tmp_path / "a.csv").write_text("left;right\n" + "".join(f"{row}\n" for row in rows))
+    _, _, raw = read_unconverted("a.csv", tmp_path)
+    assert len(raw.records[0].samples[0]) == len(rows)
+
+
 def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path):
     numbers = np.random.default_rng(4).normal(size=(60, 2)).round(6)
     rows = [*numbers, numbers.mean(axis=0), numbers.max(axis=0), numbers.min(axis=0)]
