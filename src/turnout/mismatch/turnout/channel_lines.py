@@ -106,13 +106,6 @@ def strongest_lines(stretches: Sequence[np.ndarray], step: float, high: float) -
     return lines
 
 
-def _line_power(signals: np.ndarray, step: float, frequencies: np.ndarray) -> np.ndarray:
-    """(n_channel, n_frequency) mean square of a line at each frequency."""
-    n = signals.shape[1]
-    spectrum = signals @ np.exp(-2j * np.pi * step * np.outer(np.arange(n), frequencies))
-    return 2.0 * np.abs(spectrum / n) ** 2
-
-
 def line_without_wheel(case: TrackCase) -> Ambiguity | None:
     """A channel in which a steady line makes up a clear part of the response in most passages, also without a wheel.
 
