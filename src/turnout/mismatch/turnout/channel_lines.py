@@ -69,8 +69,8 @@ def _fit_line(samples: np.ndarray, time: np.ndarray, frequency: float) -> tuple[
 def strongest_lines(stretches: Sequence[np.ndarray], step: float, high: float) -> list[SteadyLine]:
     r"""Strongest line of each channel below a frequency: that with the largest mean power over several stretches.
 
-    Evidence for a line that leaves the share :math:`1 - R` of the power of n samples is
-    :math:`-\tfrac12 n \ln(1 - R)`.
+    A line that has the share R of the power in a band of width B about it, over the time T, has the evidence
+    :math:`-B T \ln(1 - R) - \ln n` for n trial frequencies.
 
     Parameters
     ----------
@@ -84,32 +84,35 @@ def strongest_lines(stretches: Sequence[np.ndarray], step: float, high: float) -
     Returns
     -------
     list of SteadyLine
-        For each channel.
+        For each channel; none for stretches that are too short for a line below that frequency.
     """
-    frequencies = np.arange(PASSAGE.lowest_line, high, PASSAGE.line_step)
-    centred = [s - s.mean(axis=1, keepdims=True) for s in stretches]
-    powers = [
-        2.0
-        * np.abs(s @ np.exp(-2j * np.pi * step * np.outer(np.arange(s.shape[1]), frequencies))) ** 2
-        / s.shape[1] ** 2
-        for s in centred
-    ]
-    power = np.mean(powers, axis=0)
-    strongest = np.argmax(power, axis=1)
-    total = np.mean(np.concatenate(centred, axis=1) ** 2, axis=1)
-    n = sum(s.shape[1] for s in stretches)
+    shortest = step * min(s.shape[1] for s in stretches)
+    frequencies = np.arange(PASSAGE.line_periods / shortest, high, PASSAGE.line_step)
+    if not frequencies.size:
+        return []
+    power = np.mean([_line_power(s, step, frequencies) for s in stretches], axis=0)
     lines = []
-    for channel, k in enumerate(strongest):
-        line, all_power = float(power[channel, k]), max(float(total[channel]), 1e-300)
-        share = min(line / all_power, PASSAGE.most_explained)
-        lines.append(SteadyLine(float(frequencies[k]), float(np.sqrt(line)), float(-0.5 * n * np.log1p(-share))))
+    for row, k in zip(power, np.argmax(power, axis=1)):
+        near = np.abs(frequencies - frequencies[k]) <= PASSAGE.line_band
+        band_power = max(float(np.sum(row[near])) * PASSAGE.line_step * shortest, 1e-300)  # Parseval
+        share = min(float(row[k]) / band_power, PASSAGE.most_explained)
+        freedom = np.count_nonzero(near) * PASSAGE.line_step * step * sum(s.shape[1] for s in stretches)
+        evidence = -freedom * np.log1p(-share) - np.log(frequencies.size)
+        lines.append(SteadyLine(float(frequencies[k]), float(np.sqrt(row[k])), float(evidence)))
     return lines
+
+
+def _line_power(signals: np.ndarray, step: float, frequencies: np.ndarray) -> np.ndarray:
+    """(n_channel, n_frequency) mean square of a line at each frequency."""
+    centred, n = signals - signals.mean(axis=1, keepdims=True), signals.shape[1]
+    spectrum = centred @ np.exp(-2j * np.pi * step * np.outer(np.arange(n), frequencies))
+    return 2.0 * np.abs(spectrum / n) ** 2
 
 
 def line_without_wheel(case: TrackCase) -> Ambiguity | None:
     """A channel in which a steady line makes up a clear part of the response in most passages, also without a wheel.
 
-    Passages count whose band contains the line.
+    It has the same frequency in these passages. Passages count whose band contains it.
 
     Parameters
     ----------
@@ -135,12 +138,16 @@ def _line_of_channel(case: TrackCase, channel: str) -> Ambiguity | None:
     if not lines:
         return None
     strongest = max((line for _, line, _ in lines), key=lambda line: line.rms)
-    counted = [(line, share) for high, line, share in lines if high > strongest.frequency]
-    if np.median([share for _, share in counted]) <= PASSAGE.clear_share:
+    shares, evidence = [], 0.0
+    for high, line, share in lines:
+        is_same = abs(line.frequency - strongest.frequency) <= 2.0 * PASSAGE.line_step
+        if high > strongest.frequency:
+            shares.append(share if is_same else 0.0)
+            evidence += line.evidence if is_same else 0.0
+    if np.median(shares) <= PASSAGE.clear_share:
         return None
     words = (
         f"channel {channel} shows a line at {strongest.frequency:.0f} Hz of {np.sqrt(2.0) * strongest.rms:.2g} m/s² "
         "also where no wheel is near"
     )
-    evidence = sum(line.evidence for line, _ in counted)
     return Ambiguity(evidence, words, "a recording of this channel without a train", "sensor", channel)

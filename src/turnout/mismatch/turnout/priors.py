@@ -181,7 +181,8 @@ class PassagePriors:
         0.03, "Hz", "deviation of the mains: the European grid keeps 0.05 Hz in ordinary operation", "convention")
     mains_range: float = prior(4.0, "prior sd", "largest deviation of the mains that is tried", "numerical")
     mains_steps: float = prior(20.0, "-", "trial frequencies of a line for each Hz and second", "numerical")
-    lowest_line: float = prior(5.0, "Hz", "of a steady source in a channel: slower is drift", "convention")
+    line_periods: float = prior(2.0, "periods", "of a steady line in a stretch without a wheel, at least", "convention")
+    line_band: float = prior(10.0, "Hz", "to either side of a line, whose power it is compared with", "convention")
     line_step: float = prior(0.5, "Hz", "between trial frequencies of such a line, in stretches of half a second",
                              "numerical")
     most_explained: float = prior(0.999, "-", "share of a channel's power by a line, at most", "numerical")

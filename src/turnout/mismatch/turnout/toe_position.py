@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from turnout.mismatch.engine.nuisance import Nuisance
-from turnout.mismatch.turnout.priors import TRACK
+from turnout.mismatch.turnout.priors import RECEPTANCE, TRACK
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -34,13 +34,15 @@ def toe_nuisances(tracks: Iterable[Track]) -> list[Nuisance]:
     Returns
     -------
     list of Nuisance
-        It stays between the bearers beside it.
+        It stays between the bearers beside it; [] as well within a step of the derivative from one.
     """
     shifts = [limits for track in tracks if track.blade is not None and (limits := track.blade.toe_limits(track))]
     if not shifts:
         return []
-    most = TRACK.bound_sds * TRACK.toe_sd
-    low, high = max(-most, *(s[0] for s in shifts)), min(most, *(s[1] for s in shifts))
+    most, step = TRACK.bound_sds * TRACK.toe_sd, RECEPTANCE.toe_step  # the derivative needs a step to either side
+    low, high = max(-most, *(s[0] + step for s in shifts)), min(most, *(s[1] - step for s in shifts))
+    if not low < 0.0 < high:
+        return []
     return [Nuisance(TOE, "m", 0.0, TRACK.toe_sd, None, (low, high), "shift of the toe", group="track")]
 
 
