@@ -221,3 +221,29 @@ def test_components_of_one_position_count_together():
     first = evidence_by_position(changes)[0]
     assert (first.frame, first.level) == ("place", 0.6)
     assert first.nats == pytest.approx(np.logaddexp(gains[2], gains[3]) - np.log(N_SUPPORT))
+
+
+class TwoVisits(Supports):
+    """The same impacts with the same errors at a second visit, at the same position or at another."""
+
+    def __init__(self, *positions):
+        super().__init__(in_one(0.0), deviations=np.array(in_one(0.6)))
+        (hammer,) = (o for o in self.observations if o.name == "hammer")
+        self.conditions = dict(zip(("hammer", "hammer again"), positions))
+        self.jacobian["hammer again"] = self.jacobian["hammer"]
+        sigma = 8.0 * hammer.sigma  # so that further data would count
+        self.observations = tuple(replace(hammer, name=n, condition=n, sigma=sigma) for n in self.conditions)
+
+    def hammer_positions(self):
+        return self.conditions
+
+
+def test_impacts_that_are_repeated_at_one_position_are_no_further_evidence_of_a_deviation():
+    """With twice the same data at one position the gain is that of one; the fit of other supports hardly differs."""
+    gains = [
+        dict((n.name, g) for n, g in local_deviations(case, fit_jointly(case)))["support_2"]
+        for case in (TwoVisits(2.1), TwoVisits(2.1, 2.1), TwoVisits(2.1, 4.2))
+    ]
+    assert gains[0] > 1.0
+    assert gains[1] == pytest.approx(gains[0], rel=0.05)
+    assert gains[2] > 1.5 * gains[0]

@@ -15,7 +15,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.single_witness import single_witness
+from turnout.mismatch.engine.single_witness import REPETITION, single_witness
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -123,7 +123,10 @@ class ImpactCampaigns(Days):
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 1.9), 36.0, "all impacts at 4.2 m"),  # 33, and 5.9 of the others
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 2.1), 36.0, ""),  # 6.1 of the others: half a name confirms one
         ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all impacts at 4.2 m"),  # 11, half a name, against 2.5
-        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 17.0, ""),  # 11 are no name and the others have half of one
+        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 20.1, ""),  # 11 are no name and the others have half of one
+        ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 19.9, REPETITION),  # 8 of 16 by repetition, and 11.9 without them
+        ((3.0, 3.5, 3.0, 2.5, 7.0, 6.5, -1.0), 19.0, REPETITION),  # an intact track, the same at both visits
+        ((3.0, 3.5, 3.0, 2.5, 7.0, 6.5, 12.0), 36.0, ""),  # a train confirms it
         ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train confirms it
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all impacts at 4.2 m"),  # 15.5 are most of 30
@@ -144,7 +147,8 @@ def test_of_two_positions_neither_is_the_single_one():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = ImpactCampaigns(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
-    assert single_witness(Search(of_two), fit, case.candidates[0], 15.0, gains) == ""
+    assert single_witness(Search(of_two), fit, case.candidates[0], 19.0, gains) == ""
+    assert single_witness(Search(of_two), fit, case.candidates[0], 15.0, gains) == REPETITION
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])

@@ -22,6 +22,7 @@ import numpy as np
 from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.large_values import evidence_of_large_values
 from turnout.mismatch.engine.projector import Projector
+from turnout.mismatch.engine.single_witness import impact_repetitions
 from turnout.mismatch.engine.space_evidence import SpaceEvidence
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -113,7 +114,8 @@ def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     """Gain of each component by a value beyond the scatter of the other components of its kind.
 
     The scatter is that of the prior, or ``spread_of_others`` without outliers where that is larger. The prior of a
-    value beyond it is as wide as that of a change in ``local_changes`` (see ``evidence_of_large_values``).
+    value beyond it is as wide as that of a change in ``local_changes`` (see ``evidence_of_large_values``). Hammer tests
+    that repeat impacts at one position count as one, since the model errs alike in them.
 
     Parameters
     ----------
@@ -132,6 +134,10 @@ def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     spreads = {n.name: max(n.sd, spread_of_others(case, fit, n, without_outliers=True) or 0.0) for n in components}
     scattered = copy(case)
     scattered.nuisances = tuple(replace(n, sd=spreads.get(n.name, n.sd)) for n in case.nuisances)
+    repetitions = impact_repetitions(case.hammer_positions())
+    scattered.observations = tuple(
+        replace(o, effective=o.effective / repetitions.get(o.condition, 1)) for o in case.observations
+    )
     gains = evidence_of_large_values(scattered, fit, spreads, THRESHOLDS.max_ordinary_spreads)
     return [(n, gains.get(n.name, 0.0)) for n in components]
 

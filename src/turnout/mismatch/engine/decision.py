@@ -74,7 +74,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "decisions/short-wave-corrugation.md"),
     Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
-         "only weak evidence for {e.leader.in_words}, and other recordings contradict it", ENDS),
+         "only weak evidence for {e.leader.in_words}, which other recordings contradict or do not confirm", ENDS),
     Rule("reserved_not_predicted", lambda e: not e.consistent, "unknown",
          "with {e.leader.in_words}, recordings to which it was not fitted are predicted worse than the others", HOW),
     Rule("residual_has_structure", lambda e: e.structure > e.settings.structure_left and e.residual_excess > 1.0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
+
+REPETITION = "the repetition of impacts at the same positions"
 
 
 def single_witness(
@@ -35,6 +38,9 @@ def single_witness(
     Passages share none of these faults: if they are enough for a name without any impact, they are a second witness.
     What other impacts lose by the name is a question of its own (``is_contradicted``).
 
+    The error of a receptance is that of the model, so it is the same at each visit. Tests that repeat impacts at one
+    position therefore count as one. A name that needs each of them as evidence of its own rests on the repetition.
+
     Parameters
     ----------
     search : Search
@@ -47,8 +53,11 @@ def single_witness(
         Condition -> gain when it is left out. [nats]
     """
     case, threshold = search.case, search.settings.threshold
-    if position := _single_hammer_position(case.hammer_positions(), gain, by_condition, threshold):
+    hammer_positions = case.hammer_positions()
+    if position := _single_hammer_position(hammer_positions, gain, by_condition, threshold):
         return position
+    if _gain_without_repetition(hammer_positions, gain, by_condition) < threshold <= gain:
+        return REPETITION
     strongest = max(by_condition, key=lambda c: by_condition[c], default="")
     if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
         return ""
@@ -58,6 +67,36 @@ def single_witness(
     energies = effect_energy(case, fit, candidate)
     min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
     return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
+
+
+def impact_repetitions(hammer_positions: Mapping[str, float]) -> dict[str, int]:
+    """Number of tests with impacts at the same position.
+
+    Parameters
+    ----------
+    hammer_positions : mapping
+        Condition -> position of its impacts. [m]
+
+    Returns
+    -------
+    dict of str to int
+        For each condition, at least 1.
+
+    Examples
+    --------
+    >>> impact_repetitions({"2.1 m in March": 2.1, "4.2 m in March": 4.2, "2.1 m in May": 2.1})
+    {'2.1 m in March': 2, '4.2 m in March': 1, '2.1 m in May': 2}
+    """
+    counts = Counter(hammer_positions.values())
+    return {condition: counts[position] for condition, position in hammer_positions.items()}
+
+
+def _gain_without_repetition(
+    hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float]
+) -> float:
+    """Gain if the tests at each position of impacts count as one, by their mean [nats]."""
+    repetitions = impact_repetitions({c: p for c, p in hammer_positions.items() if c in by_condition})
+    return gain - sum((1.0 - 1.0 / n) * by_condition[condition] for condition, n in repetitions.items())
 
 
 def _single_hammer_position(
