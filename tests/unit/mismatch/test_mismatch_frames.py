@@ -106,4 +106,4 @@ def test_a_row_has_no_position_from_a_frame_of_the_residual():
     assert dict(facts(row | OF_A_ROW))["Where"] == "everywhere among these sensors"
     row = finding_row(diagnosed("none", (), frames), {})
     assert (row["channel"], row["locked_to"], row["p_value"], row["position_m"]) == (None, None, None, None)
-    assert dict(facts(row | OF_A_ROW))["Where"] == "somewhere in 2.4 to 8.7 m"
+    assert dict(facts(row | OF_A_ROW))["Where"] == "examined: 2.4 to 8.7 m"

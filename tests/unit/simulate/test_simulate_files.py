@@ -27,7 +27,7 @@ def rejected(load, path, text, said):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("  level:", "  levle:", r"roughness: unknown key 'levle'\. Use one of level"),
+        ("  level:", "  levle:", r"roughness: unknown key 'levle'\. Did you mean 'level'"),
         ("roughness:\n" + LEVEL, "roughness: 3", "roughness: 3 instead of names with values"),
         ("share: {value: 0.55", "shaer: {value: 0.55", r"routes\.main\[1\]: unknown key 'shaer'"),
         ("share: {value: 0.55", "share: {value: 1.0", r"routes\.main\[1\]: kink at 26.700 m: share 1.0 is not between"),
