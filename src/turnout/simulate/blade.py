@@ -136,12 +136,16 @@ class Blade:
             Number of the node.
         """
         per_bay = track.elements_per_bay
-        position = float(np.interp(self.toe, track.support, np.arange(track.support.size)))
-        bay = min(int(position), track.support.size - 2)
-        share = position - bay
+        bay, share = self._bay_of_toe(track)
         if per_bay == 1 or not AT_SUPPORT < share < 1.0 - AT_SUPPORT:
             return (bay + round(share)) * per_bay
         return bay * per_bay + min(max(round(share * per_bay), 1), per_bay - 1)
+
+    def _bay_of_toe(self, track: Track) -> tuple[int, float]:
+        """Number of the bay with the toe, and the share of it before the toe."""
+        position = float(np.interp(self.toe, track.support, np.arange(track.support.size)))
+        bay = min(int(position), track.support.size - 2)
+        return bay, position - bay
 
     def toe_limits(self, track: Track) -> tuple[float, float] | None:
         """How far the toe may move so that the same chairs are behind it.
@@ -156,9 +160,8 @@ class Blade:
         (float, float) or None
             Lowest and highest shift [m]; None for a toe on a support, which has no free end.
         """
-        position = float(np.interp(self.toe, track.support, np.arange(track.support.size)))
-        bay = min(int(position), track.support.size - 2)
-        if not AT_SUPPORT < position - bay < 1.0 - AT_SUPPORT:
+        bay, share = self._bay_of_toe(track)
+        if not AT_SUPPORT < share < 1.0 - AT_SUPPORT:
             return None
         start, end = track.support[bay : bay + 2].tolist()
         margin = AT_SUPPORT * (end - start)

@@ -1,13 +1,14 @@
 """Mains hum has a phase of its own in each recording, which the channel shows where no wheel is near."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.channel_lines import line_without_wheel, mains_lines, strongest_lines
+from turnout.mismatch.turnout.channel_lines import SteadyLine, line_without_wheel, mains_lines, strongest_lines
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 AMPLITUDE = 2.0  # [m/s²]
@@ -119,3 +120,32 @@ def test_one_amplitude_describes_the_hum_of_all_recordings(frequency, most):
 
 def test_ordinary_hum_is_no_clear_part_of_the_response():
     assert line_without_wheel(TrackCase(hum_campaign(50.0, 0.1))) is None
+
+
+def case_with_lines(*lines):
+    """One channel with a response of 1 m/s² rms in each passage, and (end of the band, frequency, rms) of a line."""
+    response = np.tile([1.0, -1.0], 20)
+    passages = {
+        f"passage {k}": SimpleNamespace(
+            sensors=(SimpleNamespace(name="A1"),), high=high, steady_lines={"A1": SteadyLine(frequency, rms, 30.0)}
+        )
+        for k, (high, frequency, rms) in enumerate(lines)
+    }
+    observations = [SimpleNamespace(name=name, data=response, rows=1) for name in passages]
+    site = SimpleNamespace(sensors=(SimpleNamespace(name="A1"),))
+    return SimpleNamespace(aligned_passages=passages, observations=observations, predictor=SimpleNamespace(site=site))
+
+
+@pytest.mark.parametrize(
+    "lines, evidence",
+    [
+        ([(112.0, 50.0, 0.3), (112.0, 50.5, 0.3), (112.0, 49.5, 0.25)], 90.0),
+        ([(112.0, 50.0, 0.3), (112.0, 37.0, 0.3), (112.0, 22.0, 0.25)], None),  # rumble has another frequency each time
+        ([(112.0, 50.0, 0.3), (112.0, 50.0, 0.3), (112.0, 22.0, 0.25)], 60.0),  # most passages show it
+        ([(112.0, 50.0, 0.3), (40.0, 22.0, 0.01), (40.0, 22.0, 0.01)], 30.0),  # the band of slow trains ends below it
+        ([(112.0, 50.0, 0.16), (112.0, 50.0, 0.16), (112.0, 50.0, 0.3)], None),  # too small in most passages
+    ],
+)
+def test_a_steady_line_has_one_frequency_in_most_passages_whose_band_contains_it(lines, evidence):
+    answer = line_without_wheel(case_with_lines(*lines))
+    assert (answer.nats if answer else None) == evidence
