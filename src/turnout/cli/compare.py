@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout, finite_number
+from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout, finite_number, whole_number
 
 if TYPE_CHECKING:
     from turnout.stages.compare import PassageComparison
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", help="file in config/vehicles; default: that of the train's type")
     parser.add_argument("--load", type=finite_number, default=0.5, help="share of the payload, 0 to 1.5 (%(default)s)")
     parser.add_argument("--no-calibration", action="store_true", help="take the track file as it is")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the rail's roughness (%(default)s)")
+    parser.add_argument("--seed", type=whole_number, default=0, help="seed of the rail's roughness (%(default)s)")
     parser.add_argument("--out", metavar="FILE", help="figure as HTML")
     parser.add_argument("--csv", metavar="FILE", help="spectra as CSV: sensor, band, frequency, recorded, simulated")
     add_track(parser, help="track file; default: that of the turnout")

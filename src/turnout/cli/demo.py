@@ -9,7 +9,7 @@ gives the same samples. The configuration that comes with the program (config/) 
 
 import argparse
 
-from turnout.cli.options import add_cores
+from turnout.cli.options import add_cores, whole_number
 
 GROUP = "Examples"
 HELP = "make a demonstration fleet and run the whole workflow on it"
@@ -23,11 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("--seed", type=int, default=1, help="another seed makes another fleet (default 1)")
-    parser.add_argument("--campaigns", type=int, default=24, help="campaigns per turnout (default 24)")
+    parser.add_argument("--seed", type=whole_number, default=1, help="another seed makes another fleet (default 1)")
+    parser.add_argument("--campaigns", type=whole_number, default=24, help="campaigns per turnout (default 24)")
     parser.add_argument(
         "--passages",
-        type=int,
+        type=whole_number,
         default=6,
         help="train passages per turnout without weekly trains, 0: no trains at all (default 6)",
     )

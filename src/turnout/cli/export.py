@@ -16,6 +16,7 @@ from turnout.cli.options import add_registry
 from turnout.counts import count_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     import duckdb
@@ -62,17 +63,16 @@ def run(args: argparse.Namespace) -> int:
     from turnout.errors import RegistryError
     from turnout.registry.database import open_registry
 
-    folder = Path(args.folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RegistryError(f"{folder} cannot be made: {error.strerror}. Name another folder.") from None
+    folder, names = Path(args.folder), args.only or DEFAULT_TABLES
     with open_registry(args.registry) as con:
-        for name in args.only or DEFAULT_TABLES:
+        _require_tables(con, names)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RegistryError(f"{folder} cannot be made: {error.strerror}. Name another folder.") from None
+        for name in names:
             try:
                 path, n = _write(con, name, folder, args.format)
-            except duckdb.CatalogException:
-                raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
             except duckdb.Error as error:
                 reason = str(error).splitlines()[0]
                 raise RegistryError(
@@ -82,9 +82,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _identifier(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
+
+
+def _require_tables(con: duckdb.DuckDBPyConnection, names: Sequence[str]) -> None:
+    """RegistryError if one of the tables and views does not exist, before any of them is written."""
+    import duckdb
+
+    from turnout.errors import RegistryError
+
+    for name in names:
+        try:
+            con.execute(f"describe {_identifier(name)}")
+        except duckdb.CatalogException:
+            raise RegistryError(f"no table or view {name!r}. 'turnout query --list' names them.") from None
+
+
 def _write(con: duckdb.DuckDBPyConnection, name: str, folder: Path, form: str) -> tuple[Path, int]:
     """(path, number of rows) of one written table or view; an existing one is replaced."""
-    quoted = '"' + name.replace('"', '""') + '"'
+    quoted = _identifier(name)
     if form == "delta":
         return folder / name, _delta(con, quoted, folder / name)
     path = folder / f"{name}.{form}"

@@ -43,6 +43,30 @@ def at_least_one(text: str) -> int:
     return number
 
 
+def whole_number(text: str) -> int:
+    """The whole number of ``text``; argparse.ArgumentTypeError otherwise.
+
+    Parameters
+    ----------
+    text : str
+        Value of an option.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Examples
+    --------
+    >>> whole_number("-3")
+    -3
+    """
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+
+
 def above_zero(text: str) -> float:
     """The number of ``text``, above 0; argparse.ArgumentTypeError otherwise.
 

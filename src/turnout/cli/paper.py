@@ -17,7 +17,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import above_zero, add_registry
+from turnout.cli.options import above_zero, add_registry, whole_number
 
 if TYPE_CHECKING:
     from typing import Any
@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("turnout", help="turnout, as in turnouts.tsv")
     parser.add_argument("--campaign", metavar="DATE", help="its date, YYYY-MM-DD; by default the newest")
     parser.add_argument("--format", choices=("text", "csv", "latex"), default="text", help="form (%(default)s)")
-    parser.add_argument("--table", type=int, choices=(1, 2, 3, 4, 5), help="only this table; by default 1 to 4")
+    parser.add_argument(
+        "--table", type=whole_number, choices=(1, 2, 3, 4, 5), help="only this table; by default 1 to 4"
+    )
     parser.add_argument("--train-type", default=PAPER_TRAIN, help="trains of Table 4 (%(default)s)")
     parser.add_argument(
         "--speed", type=above_zero, default=160.0, help="their speed on the main track in km/h (%(default)g)"

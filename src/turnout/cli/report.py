@@ -8,6 +8,7 @@ turnout report --turnouts tommerup_s1 tommerup_s2
 import argparse
 
 from turnout.cli.options import add_cores, add_pages, add_registry
+from turnout.counts import count_of
 
 GROUP = "Run"
 HELP = "write the pages of the fleet and of each turnout"
@@ -47,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
     day = _day(args.day)
     n = report_job(args.registry, args.pages, args.turnouts, threads=args.cores, day=day)
-    print(f"{n} pages written, the others had not changed: {args.pages}/index.html")
+    print(f"{count_of(n, 'page')} written, the others had not changed: {args.pages}/index.html")
     if note := f"As of {day}." if day else _older_day_hint(args.registry):
         print(note)
     return 0

@@ -20,6 +20,7 @@ from turnout.cli.options import (
     add_track,
     add_turnout,
     finite_number,
+    whole_number,
 )
 
 GROUP = "Simulate and diagnose"
@@ -39,9 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     hammer.add_argument(
         "--section", required=True, help="section of the track file, or, without --turnout, a position [m]"
     )
-    hammer.add_argument("--tests", type=int, default=1, help="tests, one file each; --out takes one (default 1)")
-    hammer.add_argument("--impacts", type=int, default=10, help="impacts per test (default 10)")
-    add_former(hammer, "--blows", "--impacts", type=int)
+    hammer.add_argument(
+        "--tests", type=whole_number, default=1, help="tests, one file each; --out takes one (default 1)"
+    )
+    hammer.add_argument("--impacts", type=whole_number, default=10, help="impacts per test (default 10)")
+    add_former(hammer, "--blows", "--impacts", type=whole_number)
     passage = subcommands.add_parser("passage", help="one train over the turnout")
     passage.add_argument("--vehicle", default="ic3", help="file in config/vehicles, or its path (default ic3)")
     passage.add_argument("--speed", type=SPEED, default=160.0, help="speed [km/h] (default 160)")
@@ -51,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.5,
         help="share of the payload, 0 (empty) to 1 (full), overloaded up to 1.5 (default 0.5)",
     )
-    passage.add_argument("--units", type=int, default=1, help="coupled units (default 1)")
+    passage.add_argument("--units", type=whole_number, default=1, help="coupled units (default 1)")
     passage.add_argument("--route", default="main", help="route of the track file (default main)")
     passage.add_argument("--direction", choices=("facing", "trailing"), default="facing")
     for sub in (hammer, passage):
@@ -66,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         sub.add_argument("--temperature", type=RAIL_TEMPERATURE, help="rail temperature to note [°C]")
         sub.add_argument(
             "--seed",
-            type=int,
+            type=whole_number,
             default=0,
             help="seed of noise, scatter of supports and roughness; the same for trains on one rail (default 0)",
         )

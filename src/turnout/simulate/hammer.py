@@ -281,7 +281,8 @@ def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tupl
         return float(location), base
     if not isinstance(track, TurnoutTrack) or location not in track.locations:
         names = ", ".join(track.locations) if isinstance(track, TurnoutTrack) else ""
-        raise SimulationError(f"no section {location!r} in the track file. Write one of {names or 'none'}.")
+        title = f" of {track.name!r}" if isinstance(track, TurnoutTrack) and track.name else ""
+        raise SimulationError(f"no section {location!r} in the track file{title}. Write one of {names or 'none'}.")
     position, route = track.locations[location]
     return float(position), track.track_of(route)
 

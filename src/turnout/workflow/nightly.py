@@ -21,7 +21,7 @@ from turnout.files import changed_at
 from turnout.installation import shipped_path
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
-from turnout.workflow.run_report import failure_reason, rejected_units, unused_turnouts
+from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import load_state, states_below
 
@@ -29,6 +29,7 @@ JOB_NAMES = "turnouts"
 EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeout(1)
 PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
 MAX_TURNOUTS_SHOWN = 3  # turnouts named in the report
+MAX_EXCLUDED_SHOWN = 1  # entries of no unit quoted in the report
 QUERY_HINT = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
 WORKLIST = Path("results/worklist.csv")
@@ -41,7 +42,7 @@ class NightReport:
 
     ``vanished`` is the number of units gone since the last run. ``worst`` are the turnouts with most unused units, and
     their numbers. ``unused`` are the turnouts without any usable unit so far; ``nothing_usable`` is True if that holds
-    for the whole fleet.
+    for the whole fleet. ``excluded`` are files and rows in quarantine that belong to no unit.
     """
 
     code: int
@@ -54,6 +55,7 @@ class NightReport:
     worst: tuple[tuple[str, int], ...] = ()
     unused: tuple[str, ...] = ()
     nothing_usable: bool = False
+    excluded: tuple[str, ...] = ()
     reason: str = ""
 
     def __str__(self) -> str:
@@ -68,7 +70,8 @@ class NightReport:
             + f"{self.vanished} vanished"
             + (f"; nothing could be used yet of {first_texts(self.unused, MAX_TURNOUTS_SHOWN)}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
-            + (f", see {QUERY_HINT}" if self.worst or self.unused else "")
+            + (f"; in no unit: {first_texts(self.excluded, MAX_EXCLUDED_SHOWN)}" if self.excluded else "")
+            + (f", see {QUERY_HINT}" if self.worst or self.unused or self.excluded else "")
             + ("" if self.published else "; the registry was not published")
             + (f"; why: {self.reason}" if self.reason else "")
         )
@@ -253,4 +256,7 @@ def _report(code: int, before: set, planned_before: set[str], reason: str, work:
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
     worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:MAX_TURNOUTS_SHOWN]
     counts = len(units), len(processed), len(quarantined), len(missing & units)
-    return NightReport(code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, reason)
+    excluded = tuple(excluded_entries(GENERATION.parent, unused))
+    return NightReport(
+        code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, excluded, reason
+    )

@@ -82,6 +82,30 @@ select turnout_id, not exists (select 1 from used u where in_service(u.turnout_i
 from unusable() where used_at_utc is null and turnout_id not in (select turnout_id from used)
 group by turnout_id order by turnout_id"""
 
+# Entries of the raw root that belong to no unit: tables beside the recordings, which many recordings need, come first.
+EXCLUDED_SQL = """
+select path || coalesce(', ' || place, '') || ': ' || found from quarantine_open
+where kind = 'configuration' and not is_remark and not list_contains(?, turnout_id)
+order by path not like '%.csv' or reason_code = 'name_unknown', path, place"""
+
+
+def excluded_entries(registry: Path, unused: Collection[str] = ()) -> list[str]:
+    """Files and rows of the raw root in quarantine that belong to no unit, such as a line of campaigns.csv.
+
+    Parameters
+    ----------
+    registry : Path
+        Folder of the registry.
+    unused : collection of str
+        Turnouts whose entries are left out, because the report names them as a whole.
+
+    Returns
+    -------
+    list of str
+        Path, place and what was found, tables beside the recordings first; none without a registry.
+    """
+    return [text for (text,) in _query(registry, EXCLUDED_SQL, [list(unused)])]
+
 
 def rejected_units(units: Collection[str], registry: Path) -> list[str]:
     """Those of the ``units`` whose hammer test was rejected.

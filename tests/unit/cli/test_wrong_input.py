@@ -54,7 +54,7 @@ WRONG = {
     "events W9 tamping 2026-04-02": "config/events.csv, turnout: turnout 'W9' has no row in turnouts.tsv. Allowed: W1.",
     "acknowledge W1/X --by me --reason x": "config/acknowledgements.csv, section: turnout 'W1' has no section 'X'",
     "query from_worklist --registry README.md": "not a valid DuckDB database file. Name the folder that holds registry",
-    "simulate hammer --section X": "no section 'X' in the track file. Write one of OT, SP",
+    "simulate hammer --section X": "no section 'X' in the track file of 'tommerup'. Write one of OT, SP",
     "diagnose --turnout W1 --sections X": "W1 has no section X. Write some of OT, SP",
     "events W1 tamping 0202-05-01": "config/events.csv, date: date 0202-05-01 is before 1900. Correct its year.",
     "events W1 tamping 3024-05-01": "config/events.csv, date: date 3024-05-01 is more than a year ahead. Correct it",
@@ -279,10 +279,10 @@ def options_of(parser):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_option_accepts_a_number_that_is_none(command):
-    """``float`` accepts nan and inf."""
+    """``float`` accepts nan and inf, and the message of ``int`` names a type of Python."""
     parser = argparse.ArgumentParser()
     import_module(f"turnout.cli.{command}").add_arguments(parser)
-    assert not [action.dest for action in options_of(parser) if action.type is float]
+    assert not [action.dest for action in options_of(parser) if action.type in (float, int)]
 
 
 def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project, capsys, monkeypatch):
@@ -295,6 +295,11 @@ def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project,
     assert main(["add", "W2", "tommerup"]) == 2
     message = capsys.readouterr().err
     assert "config/turnouts.tsv: Permission denied" in message and ".tmp" not in message
+
+
+def test_an_export_that_cannot_be_made_leaves_no_folder(project, capsys):
+    assert main(["export", "out"]) == 2
+    assert "there is no registry here" in capsys.readouterr().err and not (project / "out").exists()
 
 
 def test_work_that_is_there_already_is_not_entered_twice(project, capsys):

@@ -8,6 +8,7 @@ import duckdb
 import pytest
 from registry_rows import Bench, hammer_result
 
+from turnout.cli.main import main
 from turnout.errors import RegistryError
 from turnout.registry import database, publication, view_texts
 from turnout.registry.compaction import compact, rebuild
@@ -175,6 +176,15 @@ def test_a_copied_registry_does_not_answer_with_the_rows_of_the_first_one(five_n
     shutil.rmtree(five_nights.registry)
     five_nights.registry = copy
     assert five_nights.ask(ALL_MODES) == before
+
+
+def test_an_export_with_an_unknown_table_writes_none(five_nights, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["export", str(out), "--registry", str(five_nights.registry), "--only", "turnouts", "modes"]
+    assert main(command) == 0 and len(list(out.iterdir())) == 2
+    shutil.rmtree(out)
+    assert main([*command, "mode"]) == 2 and not out.exists()
+    assert "no table or view 'mode'" in capsys.readouterr().err
 
 
 def test_a_column_added_later_is_null_in_old_rows_and_rebuild_writes_it(bench, hammer, monkeypatch):

@@ -44,6 +44,18 @@ def test_an_alarm_is_acknowledged_and_silenced_by_command(configuration):
     assert first["acknowledgement_id"] != second["acknowledgement_id"]
 
 
+def test_a_line_that_was_written_is_done_though_the_registry_cannot_be_read(configuration, tmp_path, capsys):
+    """The comparison with the open alarms is a remark: exit code 2 would state that nothing was written."""
+    turnout, _ = place_of(configuration)
+    register([], tmp_path / "registry", read=iter)
+    shutil.copytree(tmp_path / "registry", tmp_path / "copy")
+    said = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
+    assert main(["acknowledge", turnout, *said, "--registry", str(tmp_path / "copy")]) == 0
+    printed = capsys.readouterr()
+    assert "not compared with the open alarms" in printed.out and "is a copy" in printed.out and not printed.err
+    assert len(load_configuration(configuration).acknowledgements) == 1
+
+
 def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys):
     """An alarm of the ballast, open since February: only the one said after it, of its band, changes the list."""
     turnout, label = place_of(configuration)

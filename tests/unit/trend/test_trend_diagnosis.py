@@ -1,5 +1,6 @@
 """An alarm and the diagnosis of the same section: one statement in the worklist, or why there is none."""
 
+import numpy as np
 import pandas as pd
 import pytest
 from tests.unit.trend.test_trend_list import fallen, viewed
@@ -118,6 +119,16 @@ def test_another_component_direction_or_position_is_no_decision(settings, rows, 
     assert diagnosis.endswith("soft ballast at 21.6 m")
     assert diagnosis == "soft ballast at 21.6 m" if expected is None else expected in diagnosis
     assert diagnosis.startswith("no decision: ") == (expected is not None)
+
+
+def test_more_impacts_are_no_advice_for_a_chart_of_trains(settings, rows):
+    """Only the recordings of a chart can show more."""
+    noise = np.exp(np.random.default_rng(1).normal(0.0, 0.3, len(rows)))
+    peaks = rows.assign(band="amplitude", source="passage", frequency_hz=100.0 * noise)
+    query = "select distinct source, look_at from worklist where state = 'cannot tell'"
+    with viewed(peaks, settings) as con:
+        ((source, look_at),) = con.execute(query).fetchall()
+    assert source == "passage" and "more trains" in look_at and "impacts" not in look_at
 
 
 def amplitude_row(rows, settings, **tables):

@@ -68,8 +68,9 @@ def model(turnout, status):
     return UnitResult(f"{turnout}/hammer/A/2026-01-05", turnout, "hammer", "k", "1", "ok", {"models": [row]})
 
 
-def registry(folder, **status):
+def registry(folder, quarantine=(), **status):
     tables = {"turnouts": [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in [*status, "never"]]}
+    tables |= {"quarantine": list(quarantine)} if quarantine else {}
     batch = write_batch(folder / "batches", [model(t, s) for t, s in status.items()])
     register([batch], folder / "results/registry", read=read_results, tables=tables)
 
@@ -87,6 +88,24 @@ def test_a_fleet_of_which_nothing_could_be_used_is_not_called_sound(folder):
     said = night(folder, known, known)
     assert said.startswith("every job ran, but nothing could be used: 5 units known")
     assert "nothing could be used yet of t1, t2, t3 and 2 more" in said
+
+
+def excluded(turnout, name, reason, place, found):
+    row = {"turnout_id": turnout, "kind": "configuration", "path": f"{turnout}/{name}", "stage": "plan"}
+    key = f"{turnout}{name}".encode().hex().zfill(32)[-32:]
+    return row | {"quarantine_id": key, "reason_code": reason, "place": place, "found": found, "remedy": "Correct it"}
+
+
+def test_a_table_that_cannot_be_read_is_quoted_before_a_file_with_an_unknown_name(folder):
+    """It belongs to no unit, so no count has it, and without its temperatures no chart is evaluated."""
+    column = excluded("t1", "campaigns.csv", "unreadable", "line 1, column 25", "unknown column 'temperature'")
+    name = excluded("t1", "a.csv", "name_unknown", "file name", "its name follows no pattern of the layout")
+    unused = excluded("t2", "campaigns.csv", "unreadable", "line 2, column 1", "a cell too many")
+    registry(folder, (name, column, unused), t1="accepted", t2="rejected")
+    known = dict.fromkeys(units("t1", "t2"), "ok")
+    line = night(folder, known, known)
+    assert "; in no unit: t1/campaigns.csv, line 1, column 25: unknown column 'temperature' and 1 more, see" in line
+    assert "nothing could be used yet of t2;" in line and "t2/campaigns.csv" not in line
 
 
 @pytest.mark.parametrize("quiet", [False, True])

@@ -296,6 +296,8 @@ select
         when h.state = 'learning' then 'nothing; measure again as planned'
         when h.why like 'the alarm of %' then 'what was corrected or entered since, and the chart of this section'
         when h.band = 'all' then 'what was rejected: turnout query "from rejected where turnout_id = ''' || h.turnout_id || '''"'
+        when h.state = 'cannot tell' and h.source = 'passage' then
+            'the measurement: more trains of one type a week, rail temperature in their files, sensor'
         when h.state = 'cannot tell' then 'the measurement: more impacts per campaign, rail temperature, sensor'
         when h.section_id = '*' then 'what all sections share: thermometer, hammer and method first, then drainage'
         when h.changed_component = 'both' then
