@@ -25,6 +25,7 @@ LAWS = {
 }
 FREE_LAWS = ("cubic_spring", "quadratic_drag", "dry_friction", "quadratic_spring")
 SOURCE = "Worden and Tomlinson 2001, Nonlinearity in structural dynamics, chapter 2"
+STICKING = 0.001  # of the largest velocity: below it dry friction is viscous; a larger share makes a body creep to rest
 
 
 @njit(cache=True)
@@ -35,7 +36,7 @@ def law_force(law, y, v):
     if law == 1:
         return abs(v) * v
     if law == 2:
-        return np.tanh(v / 0.02)
+        return np.tanh(v / STICKING)
     return y * y
 
 
@@ -111,11 +112,18 @@ class Mount(Case):
     frequency, damping, gain : (mean, sd)
         What is known beforehand.
     tolerance : float
-        Error of model and sensor that nobody minds, over the rms of a record.
+        Error of the model that does not matter, over the rms of a record.
+    noise : float
+        Standard deviation of the sensor's noise. A record that has decayed to it needs this number, because the
+        tolerance alone would then be below the noise, and no law would explain the record. [m]
+    without : sequence of str
+        Laws that are left out of the library.
     """
 
-    def __init__(self, records, reserved, rate, frequency, damping, gain=(0.0, 0.0), tolerance=0.01, without=()):
-        self.rate, self.gain = rate, gain
+    def __init__(
+        self, records, reserved, rate, frequency, damping, gain=(0.0, 0.0), tolerance=0.01, noise=0.0, without=()
+    ):
+        self.rate, self.gain, self.noise = rate, gain, noise
         self.recorded = {name: (force, y) for name, _, force, y in (*records, *reserved)}
         self.scale = max(float(np.max(np.abs(y))) for *_, y in records)
         self.observations = tuple(self.observation(*r, tolerance) for r in records)
@@ -126,7 +134,7 @@ class Mount(Case):
 
     def observation(self, name, condition, force, y, tolerance):
         """One record; a tenth of its samples count as independent."""
-        return Observation(name, condition, y, tolerance * float(np.std(y)), 0.1)
+        return Observation(name, condition, y, float(np.hypot(tolerance * np.std(y), self.noise)), 0.1)
 
     def parameters(self, frequency, damping):
         """Uncertain numbers of the linear system, with mean and standard deviation."""
@@ -183,11 +191,14 @@ def made_records(law, amount, levels, rate=200.0, seconds=10.0, force_sd=1.0, no
 
 
 def show(title, diagnosis):
-    """Print the answer, the effect with its size, and the fit on the held-out record."""
+    """Print the answer, the effect with its size, and the fit on the held-out record, or what to do without a name."""
     print(f"{title}: {diagnosis}")
     for term in diagnosis.fit.terms:
         print(f"   {term.sentence()}")
     fit = diagnosis.verification
+    if fit is None or fit.after is None:
+        print("   no law is named: check the noise and the step of the simulation first, then add what else may act")
+        return
     print(f"   fit on the held-out record: {fit.before:.1f} % without it, {fit.after:.1f} % with it")
 
 

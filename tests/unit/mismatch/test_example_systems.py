@@ -6,7 +6,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from examples.own_system import LAWS, Mount, Pendulum, made_records, simulate
+from examples.own_system import LAWS, Mount, Pendulum, made_records, show, simulate
 
 from turnout.mismatch import diagnose
 
@@ -44,6 +44,21 @@ def test_a_system_without_a_concealed_effect_has_no_finding(kind):
 def test_an_effect_that_is_not_in_the_library_gets_no_other_name():
     found = diagnose(case_of("free", "dry_friction", 0.03, without=("dry_friction",)))
     assert found.verdict.answer == "unknown"
+
+
+def test_decays_down_to_the_noise_of_the_sensor_need_its_size(capsys):
+    """The tolerance is a share of the rms of a record, which falls below the noise where the body has come to rest."""
+    records = made_records("dry_friction", 0.01, (1.0, 0.5, 0.1, 0.7), force_sd=0.0, noise=0.0)
+    rng = np.random.default_rng(5)
+    records = [(*r[:3], r[3] + 0.004 * rng.normal(size=r[3].size)) for r in records]
+    without = diagnose(Pendulum(records[:3], records[3:], *PRIORS))
+    assert (without.verdict.answer, without.verification.after) == ("unknown", None)
+    show("free decay", without)
+    assert "no law is named: check the noise" in capsys.readouterr().out
+    case = Pendulum(records[:3], records[3:], *PRIORS, noise=0.004)
+    named = diagnose(case)
+    assert (named.verdict.answer, named.names, named.verdict.grade) == ("named", ("dry_friction",), "A")
+    assert float(named.fit.psi[0]) == pytest.approx(0.01 / case.scale, rel=0.03)
 
 
 def test_a_free_decay_is_that_of_the_closed_form():
