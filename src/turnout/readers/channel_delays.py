@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from turnout.readers.entries import Entry
-from turnout.readers.entry_owners import owners_of, spaced_words
-from turnout.readers.rate_units import words_of
+from turnout.readers.entry_owners import numbered_channels, owners_of, spaced_words
+from turnout.readers.rate_units import SAMPLES, rate_unit, words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 
 DELAY = re.compile(r"delay|latenc|skew$|^lag$|verzog|retard|forsink|fordroj|vertraging|^timeshift$")
+# Times at which the samples of a channel begin.
+BEGIN = re.compile(r"\b(?:time (?:shift|offset)|start offset|t ?0|t start|pre ?trig(?:ger)?)\b")
 # Delays before a recording begins, and what is beside a delay.
 OTHER_DELAY = re.compile(r"trig|start|hold|wait|settl|warm|auslos|unit|einheit|type|mode|name|enabl|max|toler|alarm")
 MAX_LISTED = 4  # channels in one message
@@ -21,8 +23,8 @@ DELAY_REMEDY = "Let the export shift the samples; if they are in time already, n
 def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     """What the metadata of a record state about delays that differ between its channels.
 
-    Units of delays are not interpreted. No unit in use is longer than a second, so a difference far below a sampling
-    step in seconds is negligible in any of them.
+    A number without a unit counts as seconds. No unit in use is longer, so a difference far below a sampling step in
+    seconds is negligible in any of them.
 
     Parameters
     ----------
@@ -40,10 +42,12 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     """
     delays: dict[str, dict[int, float]] = {}
     labels: dict[str, str] = {}
-    for entry in (e for e in record.entries if _is_delay_name(e.name)):
-        numbers = _numbers(entry)
+    for entry in (e for e in record.entries if is_delay_name(e.name)):
+        numbers = _seconds(entry, rate)
         owners = owners_of(entry, record.entries, record.names)
         name = _without_channels(entry.name, [record.names[i] for i in owners])
+        if not owners and (owners := numbered_channels(entry.name, len(record.names))):
+            name = re.sub(r"\d+", "", name)
         labels.setdefault(name, entry.name)
         if len(numbers) == len(record.names) > 1:
             delays[name] = dict(enumerate(numbers))
@@ -52,7 +56,7 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     for name, of_channels in delays.items():
         values = [of_channels.get(i, 0.0) for i in rows]
         if values and (max(values) - min(values)) * rate > MAX_SHARE:
-            listed = ", ".join(f"{record.names[i]!r} {value:g}" for i, value in [*zip(rows, values)][:MAX_LISTED])
+            listed = ", ".join(f"{record.names[i]!r} {value:g} s" for i, value in [*zip(rows, values)][:MAX_LISTED])
             problem = f"its metadata state different delays ({labels[name]}: {listed})"
             return f"{problem}, and nothing says that they are corrected"
     return ""
@@ -67,17 +71,36 @@ def _without_channels(name: str, channels: Sequence[str]) -> str:
 
 
 @lru_cache(maxsize=4096)
-def _is_delay_name(name: str) -> bool:
-    words = words_of(name)
-    is_shift = {"time", "shift"} <= set(words) or {"time", "offset"} <= set(words)
-    is_delay = is_shift or any(DELAY.search(word) for word in words)
-    return is_delay and not any(OTHER_DELAY.search(word) for word in words)
+def is_delay_name(name: str) -> bool:
+    """Whether an entry of this name may state by how much a channel is late.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_delay_name(name) for name in ("Delay [µs]", "rail_start_offset", "t0", "trigger delay", "offset")]
+    [True, True, True, False, False]
+    """
+    texts = spaced_words(name), " ".join(words_of(name))
+    if others := [other for text in texts if (other := BEGIN.sub("", text)) != text]:
+        return not OTHER_DELAY.search(others[0])
+    return any(map(DELAY.search, words_of(name))) and not any(map(OTHER_DELAY.search, words_of(name)))
 
 
-def _numbers(entry: Entry) -> list[float]:
-    """The numbers of an entry: of a list, or the one at the beginning of a text."""
-    if isinstance(entry.value, str):
-        number = number_and_unit(entry.value)
-        return [] if number is None else [number[0]]
+def _seconds(entry: Entry, rate: float) -> list[float]:
+    """The numbers of an entry in seconds: of a list, or the one at the beginning of a text."""
+    in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", entry.name)
+    unit = next(iter([*in_brackets, *words_of(entry.name)[-1:]]), "")
     numbers = finite_numbers(entry.value)
-    return [] if numbers is None else [float(x) for x in numbers]
+    if isinstance(entry.value, str) and (number := number_and_unit(entry.value)):
+        numbers, unit = finite_numbers(number[0]), number[1] or unit
+    known = rate_unit(unit)
+    factor = float(known.scale) if known and known.is_step else 1.0 / rate if SAMPLES.fullmatch(unit.strip()) else 1.0
+    return [] if numbers is None else [float(x) * factor for x in numbers]

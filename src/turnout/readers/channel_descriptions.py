@@ -120,11 +120,28 @@ def _descriptions(entry: Entry, record: RawRecord) -> dict[int, str]:
 
 def _quantity_of_description(text: str, quantities: dict[str, str]) -> str:
     """The quantity of the sensor that a text describes, or of the channel of the layout that it names; "" for none."""
-    return quantities.get(text.strip().casefold(), "") or _quantity_of_sensor(text)
+    return quantities.get(text.strip().casefold(), "") or quantity_of_sensor(text)
 
 
 @lru_cache(maxsize=4096)
-def _quantity_of_sensor(text: str) -> str:
+def quantity_of_sensor(text: str) -> str:
+    """The quantity of the sensor that a text describes.
+
+    Parameters
+    ----------
+    text : str
+        Name or description of a channel.
+
+    Returns
+    -------
+    str
+        "" without a word for a sensor.
+
+    Examples
+    --------
+    >>> quantity_of_sensor("impulse hammer"), quantity_of_sensor("accelerometer"), quantity_of_sensor("impact_1")
+    ('force', 'acceleration', '')
+    """
     is_of_hammer = any(word.startswith(HAMMER_WORDS) for word in words_of(text))
     quantity = quantity_of_text(text)
     if is_of_hammer:

@@ -7,6 +7,7 @@ from itertools import pairwise
 from mmap import mmap
 from typing import NamedTuple
 
+from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import (
     BLANK,
@@ -24,6 +25,7 @@ from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
 from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.overload_flags import is_of_overload
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
@@ -313,6 +315,8 @@ def entries_of_lines(
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
+        elif len(cells) > 2 and (is_delay_name(cells[0]) or is_of_overload(cells[0])):
+            entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
         is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
         if pairs and not is_drawn and not is_settled:

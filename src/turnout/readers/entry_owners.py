@@ -62,6 +62,32 @@ def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
     )
 
 
+CHANNEL = re.compile(r"(?<![^\W_])(?:ch(?:an(?:nel)?)?s?|kanal|canal|voie|ai)[\s.#_-]*(\d+)", re.IGNORECASE)
+
+
+def numbered_channels(text: str, n_channel: int) -> frozenset[int]:
+    """Channels that a text calls by their numbers, counted from 1, as in "Ch2 delay".
+
+    Parameters
+    ----------
+    text : str
+        Name of an entry.
+    n_channel : int
+        Number of channels; a higher number is none of them.
+
+    Returns
+    -------
+    frozenset of int
+        Indices of the channels, from 0.
+
+    Examples
+    --------
+    >>> sorted(numbered_channels("Ch2_delay", 2)), sorted(numbered_channels("Channel 9", 2))
+    ([1], [])
+    """
+    return frozenset(int(n) - 1 for n in CHANNEL.findall(text) if 0 < int(n) <= n_channel)
+
+
 @lru_cache(maxsize=4096)
 def spaced_words(text: str) -> str:
     """Words of a text in lower case with one blank between them.

@@ -5,6 +5,7 @@ have reversed axes. The number of channels and the longer axis identify the axes
 """
 
 import io
+import re
 import warnings
 from typing import Any
 
@@ -93,7 +94,7 @@ def _plain_variables(value: Any, mapping_type: type[dict]) -> Any:
     if scipy.sparse.issparse(value):
         return SPARSE_MATRIX
     if isinstance(value, dict):
-        members = _structure_array(value) or value
+        members = _structure_array(value) or _cells_of_channels(value) or value
         members = {name: _plain_variables(v, mapping_type) for name, v in members.items()}
         return mapping_type({name: v for name, v in members.items() if v is not None})
     if isinstance(value, list):
@@ -108,6 +109,24 @@ def _plain_variables(value: Any, mapping_type: type[dict]) -> Any:
             return np.asarray(value)
         return value if all(isinstance(v, str) for v in value) else np.asarray(value, dtype=object)
     return value
+
+
+def _cells_of_channels(variables: dict[str, Any]) -> dict[str, Any] | None:
+    """Records of cells that each hold the vectors of one channel, as force{k} and rail{k}; None for other variables.
+
+    The channels of one record are equally long, so the vectors of such a cell are no channels of one record where their
+    lengths differ. Cells whose names differ in numbers alone are records themselves.
+    """
+    cells = {n: v for n, v in variables.items() if isinstance(v, list) and v and all(map(_is_list_of_numbers, v))}
+    is_uneven = any(len(set(map(len, vectors))) > 1 for vectors in cells.values())
+    words = {re.sub(r"\d+", "", name) for name in cells}
+    if not is_uneven or len(cells) < 2 or len(words) < len(cells):
+        return None
+    n_record = max(map(len, cells.values()))
+    records = {
+        f"record_{i:03d}": {n: np.asarray(v[i]) for n, v in cells.items() if i < len(v)} for i in range(n_record)
+    }
+    return {n: v for n, v in variables.items() if n not in cells} | records
 
 
 def _is_list_of_numbers(value: Any) -> bool:

@@ -44,7 +44,7 @@ from turnout.readers.metadata_names import (
     TIME_NAMES,
     UNIT_NAMES,
 )
-from turnout.readers.recording_versions import check_versions
+from turnout.readers.recording_versions import check_groups
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.signal_structures import with_signal_structures
 from turnout.readers.source import RawFile, RawRecord, Source
@@ -83,7 +83,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
     groups = [name for name, value in variables.items() if isinstance(value, Mapping) and holds_samples(value)]
-    _check_versions_of_groups({name: variables[name] for name in groups}, source)
+    _check_groups({name: variables[name] for name in groups}, source)
     if numbered:
         entries = [(value, f"record {i + 1}") for i, value in enumerate(records_in_order(numbered, variables, source))]
     elif groups and not vectors(variables) and not matrices(variables):
@@ -103,12 +103,12 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
     return RawFile(tuple(records), expected, lost)
 
 
-def _check_versions_of_groups(groups: Mapping[str, Mapping[str, Any]], source: Source) -> None:
+def _check_groups(groups: Mapping[str, Mapping[str, Any]], source: Source) -> None:
     names_by_channels: dict[frozenset[str], list[str]] = {}
     for name, group in groups.items():
         names_by_channels.setdefault(frozenset(vectors(group) | matrices(group)), []).append(name)
-    for names in names_by_channels.values():
-        check_versions(names, source)
+    for channels, names in names_by_channels.items():
+        check_groups(names, sorted(channels), source)
 
 
 SAMPLES_REMEDY = (

@@ -1,8 +1,9 @@
-"""Groups of a file that are versions of one recording, as "raw" and "filtered", and no records of their own."""
+"""Groups of a file that are no records of their own: versions of one recording, and channels."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
+from turnout.readers.channel_descriptions import quantity_of_sensor
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import Source
 
@@ -15,23 +16,34 @@ VERSION_WORD = re.compile(
 NEUTRAL_WORDS = frozenset("data daten signal signals signale measured measurement messung samples values".split())
 
 
-def check_versions(names: Sequence[str], source: Source) -> None:
-    """Check that no two groups with the same channels are versions of one recording.
+def check_groups(names: Sequence[str], channels: Iterable[str], source: Source) -> None:
+    """Check that groups with the same channels are the records of a file.
 
-    Each impact would count twice, once as it was measured and once as a program changed it.
+    Of two versions of one recording each impact would count twice, once as it was measured and once as a program
+    changed it. Where each group holds one channel of all records, two impacts would be force and response.
 
     Parameters
     ----------
     names : sequence of str
         Names of groups that have the same channels.
+    channels : iterable of str
+        Names of these channels.
     source : Source
         The raw file.
 
     Raises
     ------
     ReadError
-        If two names differ only in words for such versions.
+        If two names differ only in words for versions, or the groups have names of sensors and the channels have not.
     """
+    channels = list(channels)
+    words_of_groups = {re.sub(r"[\d_\W]+", "", name).casefold() for name in names}
+    is_of_sensors = len(names) > 1 and len(words_of_groups) == len(names) and any(map(quantity_of_sensor, names))
+    if is_of_sensors and len(channels) > 1 and not any(map(quantity_of_sensor, channels)):
+        listed = [" and ".join(map(repr, texts[:3])) for texts in (names, channels)]
+        problem = f"{listed[0]} are named as channels, and each holds {listed[1]}"
+        remedy = "Export a group for each record, with its channels by their names"
+        raise source.error("the groups", problem, remedy, reason="channel_missing")
     groups: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
     for name in names:
         words = tuple(w for w in words_of(name) if not VERSION_WORD.fullmatch(w) and w not in NEUTRAL_WORDS)

@@ -25,7 +25,7 @@ from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES
 from turnout.readers.record_columns import missing_record
 from turnout.readers.record_numbers import with_missing
-from turnout.readers.recording_versions import check_versions
+from turnout.readers.recording_versions import check_groups
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
@@ -153,8 +153,8 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
     tasks: dict[frozenset[str], list[nptdms.TdmsGroup]] = {}
     for group in filled:
         tasks.setdefault(frozenset(c.name for c in group.channels()), []).append(group)
-    for of_task in tasks.values():
-        check_versions([group.name for group in of_task], source)
+    for channels, of_task in tasks.items():
+        check_groups([group.name for group in of_task], sorted(channels), source)
     counts = {len(of_task) for of_task in tasks.values()}
     is_disjoint = sum(map(len, tasks)) == len(frozenset().union(*tasks))
     if len(tasks) < 2 or not is_disjoint:

@@ -270,7 +270,7 @@ class EntryCheck:
                 self._seen.difference_update(_key_of(e) for e in new_entries if _is_plain(e))  # for the next records
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
         of_converter = list(self._converter_errors(where, record))
-        overloads = list(self._overload_errors(where, new_entries))
+        overloads = list(self._overload_errors(where, new_entries, record.names))
         self._last = record.entries, key
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
@@ -309,9 +309,9 @@ class EntryCheck:
             )
             yield self.source.error(where, problem, remedy, reason="entry_unknown")
 
-    def _overload_errors(self, where: str, entries: Sequence[Entry]) -> Iterator[ReadError]:
+    def _overload_errors(self, where: str, entries: Sequence[Entry], names: Sequence[str]) -> Iterator[ReadError]:
         """Remark on each entry by which the logger says that a channel left its range."""
-        for entry in overload_entries(entries):
+        for entry in overload_entries(entries, names):
             if (entry.place, _text(entry.value)) in self._reported:
                 continue
             self._reported.add((entry.place, _text(entry.value)))

@@ -168,9 +168,10 @@ def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
         read(f"a.{format}", tmp_path, description)
 
 
-DELAYS = {
-    "delay_samples": True, "latency_us": True, "Verzögerung [ms]": True, "time shift": True, "group delay": True,
-    "trigger_delay": False, "settling delay": False, "delay unit": False,
+DELAYS = {  # name: 12 of its units [s], and 0 for what is no delay of a channel
+    "delay_samples": 0.012, "latency_us": 12e-6, "Verzögerung [ms]": 0.012, "time shift": 12.0, "group delay": 12.0,
+    "start_offset": 12.0, "t0 [ms]": 0.012, "pre-trigger (samples)": 0.012,
+    "trigger_delay": 0.0, "settling delay": 0.0, "delay unit": 0.0, "offset [V]": 0.0, "latency [ns]": 0.0,
 }  # fmt: skip
 
 
@@ -190,7 +191,8 @@ def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_pat
         return [str(error) for error in result.errors if error.reason == "clock_drift"]
 
     of_rail = delays({"rail": "12"})
-    assert bool(of_rail) == DELAYS[name] and all(f"{name}: 'force' 0, 'rail' 12" in text for text in of_rail)
+    delay = DELAYS[name]
+    assert bool(of_rail) == (delay > 0.0) and all(f"{name}: 'force' 0 s, 'rail' {delay:g} s" in t for t in of_rail)
     assert not delays({"rail": 12}, (name,)) and not delays({"force": 12, "rail": 12, "aux": 3})
 
 
@@ -198,6 +200,8 @@ OF_NAMES = {  # entries, and whether the channels differ by more than a hundredt
     ("force_delay", 12.0, "rail_delay", 12.0): False, ("force_delay", 12.0, "rail_delay", 11.0): True,
     ("force delay", 0.0, "rail delay", 9e-6): False, ("force delay", 0.0, "rail delay", 11e-6): True,
     ("Vertragsnummer force", 1.0, "Vertragsnummer rail", 2.0): False,
+    ("Ch1 delay", 12.0, "Ch2 delay", 12.0): False, ("Ch1 delay", 12.0, "Ch2 delay", 11.0): True,
+    ("force delay", "12 µs", "rail delay", "11 µs"): False, ("force delay", "12 µs", "rail delay", "1 µs"): True,
 }  # fmt: skip
 
 
@@ -210,3 +214,19 @@ def test_delays_whose_names_have_a_channel_are_compared_with_each_other(entries,
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     result = read("a.h5", tmp_path, RawDescription(sensors, rate=1e3))
     assert any(error.reason == "clock_drift" for error in result.errors) == OF_NAMES[entries]
+
+
+@pytest.mark.parametrize("name", ["Delay", "Channel delay [samples]", "Start offset", "Time offset [ms]"])
+@pytest.mark.parametrize("has_time", [False, True])
+def test_a_line_of_delays_has_one_for_each_column_or_for_each_but_the_time(name, has_time, tmp_path):
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    rows = [[f"{k / 1e3:.4f}"][: int(has_time)] + [f"{x:.4f}" for x in pair] for k, pair in enumerate(PAIRS)]
+    names = [*["time [s]"][: int(has_time)], "force", "rail"]
+    for delays in (["0", "0,3"], ["0,3", "0,3"]):
+        lines = [[name, *delays], names, *rows]
+        (tmp_path / "a.csv").write_text("".join(";".join(line) + "\n" for line in lines), encoding="utf-8")
+        result = read("a.csv", tmp_path, RawDescription(sensors, rate=1e3))
+        assert [error.reason for error in result.errors] == ["clock_drift"][: int(delays[0] != delays[1])]
+
+
+PAIRS = np.random.default_rng(6).normal(size=(50, 2))

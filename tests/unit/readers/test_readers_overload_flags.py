@@ -31,3 +31,52 @@ def test_an_overload_that_the_file_states_is_reported(name, value, tmp_path):
 )
 def test_no_overload_is_reported_where_the_file_states_none(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
+
+
+STATEMENTS = [
+    ("Overload", "CH2"),
+    ("Overload", "ch 1, ch 2"),
+    ("Overload", "0,1"),
+    ("Overflow", "force"),
+    ("Status", "overload"),
+    ("Status", "OVLD channel 2"),
+    ("Quality", np.array("Übersteuerung Kanal 1")),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), STATEMENTS)
+def test_an_overload_of_a_channel_and_one_in_a_value_are_reported(name, value, tmp_path):
+    (error,) = remarks(tmp_path, name, value)
+    assert error.reason == "entry_unknown"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("Overload", "0,0"),
+        ("Overload", "none"),
+        ("Overload", "no channel"),
+        ("Status", "no overload"),
+        ("Status", "Overload limit 10 V"),
+        ("Status", "0 overloads"),
+        ("Comment", "the sensor that showed an overload last year was replaced"),
+    ],
+)
+def test_a_text_that_denies_an_overload_or_is_about_another_one_is_no_statement(name, value, tmp_path):
+    assert not remarks(tmp_path, name, value)
+
+
+@pytest.mark.parametrize(
+    ("line", "is_above"),
+    [("CH2 overload", True), ("Overload: CH2", False), ("OVLD ch 2", False), ("Overload;0;1", True)],
+)
+def test_an_overload_above_or_below_the_numbers_of_a_text_is_reported(line, is_above, tmp_path):
+    lines = ["force [N]", *(f"{x:.6f}" for x in SAMPLES)]
+    lines.insert(0 if is_above else len(lines), line)
+    if ";" in line:
+        lines = [text if text == line else f"{text};{text}".replace("N];force", "N];rail") for text in lines]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    channels = [RawChannel(name, name, "force", unit="N") for name in ("force", "rail")[: 1 + (";" in line)]]
+    result = read("a.csv", tmp_path, RawDescription(tuple(channels), rate=1000.0))
+    assert [error.reason for error in result.errors] == ["entry_unknown"]
+    assert "left its range" in str(result.errors[0])
