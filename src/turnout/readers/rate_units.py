@@ -67,7 +67,7 @@ def rate_unit(text: str) -> RateUnit | None:
         return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))
     if plain in TIME_UNITS:
         return RateUnit(True, TIME_UNITS[plain])
-    if re.fullmatch(r"(?:1/s|s\^?-1|s⁻¹|1/sec)", plain):
+    if re.fullmatch(r"(?:1? ?/ ?s(?:ec)?|s\^?-1|s⁻¹)", plain):
         return RateUnit(False, Fraction(1))
     parts = UNIT_PER.split(plain)
     if len(parts) != 2:

@@ -1,5 +1,6 @@
 """Start times of the records of a file: in UTC, in their order, and what is reported about them."""
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -135,6 +136,10 @@ def _longest_ordered(starts: Sequence[Any]) -> list[int]:
 
 PLAUSIBLE_YEARS = (1990, 2060)  # of a digital logger; other years are epochs of counters (1904, 1970, 1980)
 CLOCK_REMEDY = "Check the logger's clock; give the campaign or the time in the file's name"
+SHORT_DATE = re.compile(r"\d{1,2}(?:[-/]\d{1,2}[-/]\d{2,4}|\.\d{1,2}\.\d{2})(?!\d)")
+ORDER_REMEDY = (
+    "Let the logger write the year with four digits in front, YYYY-MM-DD: in this date its order is not stated"
+)
 COUNT_REMEDY = (
     "State its origin in the name or the unit, such as 'days since 1899-12-30', or give the campaign or the time in "
     "the file's name"
@@ -261,8 +266,14 @@ def start_errors(
         problem = (
             f"the start time {no_time[0][1]!r} {'has no time of day' if is_date(no_time[0][1]) else 'cannot be read'}"
         )
-        is_number, is_object = no_time[0][1].endswith("?"), "MATLAB class" in no_time[0][1]
-        remedy = COUNT_REMEDY if is_number else OBJECT_REMEDY if is_object else CLOCK_REMEDY
+        text = no_time[0][1]
+        remedy = CLOCK_REMEDY
+        if SHORT_DATE.match(text):
+            remedy = ORDER_REMEDY
+        elif "MATLAB class" in text:
+            remedy = OBJECT_REMEDY
+        elif text.endswith("?"):
+            remedy = COUNT_REMEDY
         yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:

@@ -27,6 +27,7 @@ MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate cryst
 PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible statement outside means something else
 USUAL_RATES = (100.0, 1e6)  # Hz: "25.600" is 25600 and not 25.6; a number without unit outside may have another one
 MIN_EPOCH = 10**8  # s since 1970
+PREFIXES_ALONE = tuple("kKMGnuµ\u03bc")  # without their unit, as in "20k"; "m" would be metres
 PLACEHOLDERS = {"", "-", "none", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set", "unset", "[]"}
 ANY_UNIT = tuple(
     RateUnit(is_step, scale)
@@ -227,6 +228,8 @@ def _statements(entry: Entry, value: Any) -> Iterator[Statement]:
                 yield from _statements_of_piece(piece)
         return
     unit = rate_unit(unit_text) if unit_text else meaning.unit
+    if unit is None and unit_text in PREFIXES_ALONE and meaning.certainty == CERTAIN and meaning.is_step is not None:
+        unit = rate_unit(unit_text + ("s" if meaning.is_step else "Hz"))
     certainty = meaning.certainty
     if certainty == NOT and unit is not None:
         with_unit = name_meaning(f"{entry.name} [{unit_text}]") if unit_text else meaning
@@ -260,7 +263,7 @@ def _split(text: str) -> tuple[str | None, str]:
     if not match:
         return None, ""
     number, unit_text = match[0].rstrip(".,' "), text[match.end() :].strip()
-    if (
+    if rate_unit(unit_text) is None and (
         unit_text[:1].isdigit()
         or (unit_text[:1] in ("-", ":", "/") and unit_text[1:2].isdigit())
         or len(unit_text) > 40

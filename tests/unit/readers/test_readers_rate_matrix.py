@@ -62,6 +62,10 @@ WAYS = {
     "Intervallo di campionamento": lambda rate: f"{number(1e6 / rate)} us",
     "Frecuencia de muestreo": lambda rate: f"{number(rate)} Hz",
     "Período de muestreo": lambda rate: f"{number(1e3 / rate)} ms",
+    "Sampling rate": lambda rate: f"{number(rate / 1e3)}k",
+    "Sample step": lambda rate: f"{number(1e6 / rate)} u",
+    "Samplerate": lambda rate: f"{number(rate)}/s",
+    "Sample frequency": lambda rate: f"{number(rate)} 1/s",
 }
 
 
@@ -553,3 +557,11 @@ def test_a_variable_that_is_called_t_in_upper_case_is_a_channel_or_an_axis(forma
         result = read(f"a.{format}", tmp_path, described(TRUE, "T"))
         assert len(result.recordings) == is_right
         assert all("column 'T', which rises evenly" in error.problem for error in result.errors)
+
+
+@pytest.mark.parametrize("text", ["50 m", "0.05m", "20q", "25k6", "20 kk"])
+def test_a_letter_that_is_no_prefix_of_the_unit_is_not_understood(text, tmp_path):
+    """A step of 0.05 m is one along the track."""
+    write_npz(tmp_path / "a.npz", [("sampling interval", text)])
+    result = read("a.npz", tmp_path, described(TRUE))
+    assert [error.reason for error in result.errors] == ["wrong_rate"] and "not understood" in str(result.errors[0])
