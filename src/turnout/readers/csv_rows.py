@@ -228,6 +228,8 @@ def lazy_columns(
             times = rows.scan(time)
     _check_one_block(data, offset, rows.end, source)
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
+    if rows.n_row > N_SUMMARY_ROWS and rows.may_have_summary:
+        _check_summary(columns, line + 1, source)
     for i, statistics in enumerate(rows.marks):
         if statistics.may_be_for_thousands:
             check_thousands(columns[i][:], i, names[i], data, offset, separator, source)
@@ -307,11 +309,12 @@ class RowReader:
         self.path, self.offset, self.end, self.options = path, offset, end, options
         self.n_row, self.begin = 0, 0
         self.marks: list[MarkStatistics] = []
+        self.low = self.high = self.last_rows = np.empty((0, 0))
         self.batches: list[pa.RecordBatch] = []
         self.reader: csv.CSVStreamingReader | None = None
 
     def scan(self, time: int | None) -> np.ndarray | None:
-        """Count the rows, collect the statistics of the marks in each column, and read the time column.
+        """Count the rows, collect marks and extremes of each column, and read the time column.
 
         Parameters
         ----------
@@ -329,9 +332,23 @@ class RowReader:
             self.marks = self.marks or [MarkStatistics() for _ in batch.columns]
             for statistics, column in zip(self.marks, batch.columns):
                 statistics.add(column.to_numpy(zero_copy_only=False))
+            self._add_extremes(np.column_stack([column.to_numpy(zero_copy_only=False) for column in batch.columns]))
             if time is not None:
                 values.append(batch.column(time).to_numpy(zero_copy_only=False))
         return None if time is None else np.concatenate(values)
+
+    def _add_extremes(self, rows: np.ndarray) -> None:
+        """Extend the least and largest numbers above the last rows by those of further rows."""
+        rows = np.concatenate([self.last_rows, rows]) if self.last_rows.size else rows
+        above, self.last_rows = rows[:-N_SUMMARY_ROWS], rows[-N_SUMMARY_ROWS:]
+        if len(above):
+            self.low = np.min([*self.low[-1:], above.min(axis=0)], axis=0)[None]
+            self.high = np.max([*self.high[-1:], above.max(axis=0)], axis=0)[None]
+
+    @property
+    def may_have_summary(self) -> bool:
+        """Whether one of the last rows holds the least, and one the largest number of each column."""
+        return all(bool((self.last_rows == extreme).all(axis=1).any()) for extreme in (self.low, self.high))
 
     def column(self, i: int) -> LazyColumn:
         """Column number ``i``.

@@ -650,13 +650,26 @@ def test_a_short_table_has_no_summary(tmp_path):
     assert len(raw.records[0].samples[0]) == len(rows)
 
 
-def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path):
-    numbers = np.random.default_rng(4).normal(size=(60, 2)).round(6)
+@pytest.mark.parametrize("is_lazy", [False, True])
+@pytest.mark.parametrize("n", [60, 30_000])
+def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path, is_lazy, n):
+    """Of a long text, too, which is read in blocks of 16 MB: here each number has 300 zeros behind it."""
+    numbers = np.random.default_rng(4).normal(size=(n, 2)).round(6)
+    zeros = "0" * (300 if n > 60 else 0)
     rows = [*numbers, numbers.mean(axis=0), numbers.max(axis=0), numbers.min(axis=0)]
-    for order, line in ((rows, 63), (rows[:-1], None), (rows[:60], None)):
-        (tmp_path / "a.csv").write_text("force;rail\n" + "".join(f"{a};{b}\n" for a, b in order))
+    for order, line in ((rows, n + 3), (rows[:-1], None), (rows[:n], None)):
+        text = "".join(f"{a:.6f}{zeros};{b:.6f}{zeros}\n" for a, b in order)
+        (tmp_path / "a.csv").write_text("force;rail\n" + text)
         if line is None:
-            assert read_unconverted("a.csv", tmp_path)
+            assert read_unconverted("a.csv", tmp_path, is_lazy=is_lazy)
             continue
         with pytest.raises(ReadError, match=f"line {line}: from here on rows hold the least and the largest"):
-            read_unconverted("a.csv", tmp_path)
+            read_unconverted("a.csv", tmp_path, is_lazy=is_lazy)
+
+
+def test_a_long_periodic_signal_has_no_summary(tmp_path):
+    """Its last rows hold the extremes as rows above do."""
+    x = np.sin(np.arange(120) * np.pi / 2).round(6) + 0.0
+    (tmp_path / "a.csv").write_text("force;rail\n" + "".join(f"{a:.2f};{a:.2f}\n" for a in x))
+    _, _, raw = read_unconverted("a.csv", tmp_path, is_lazy=True)
+    np.testing.assert_array_equal(raw.records[0].samples[0][:], x.round(2))
