@@ -12,6 +12,8 @@ from turnout.readers.channel_maps import ChannelMapping
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.records import Channel
 
+MIN_CHANGES = 32  # of a value: so many are an even number of samples apart by chance once in 2**31
+HEAD_LENGTH = 4096  # samples
 LARGEST_NUMBER = 1e30  # beyond it a number marks a missing sample, as 9.9e37 and 9.91e37 of SCPI instruments
 
 
@@ -63,7 +65,7 @@ class ChannelStatistics:
 
     ``n_bad`` is the number of samples that are not finite or mark missing ones, ``first_bad`` the index of the first of
     them, ``value`` the first sample, ``constant`` whether all samples equal it. ``lowest`` and ``highest`` are the
-    extremes.
+    extremes. ``hold`` is the number of samples of which all changes of the value are multiples apart.
     """
 
     n_bad: np.ndarray
@@ -72,6 +74,8 @@ class ChannelStatistics:
     constant: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
+    hold: np.ndarray
+    n_change: np.ndarray
 
     @classmethod
     def from_record(cls, block_reader: BlockReader, n_sample: int) -> ChannelStatistics:
@@ -120,12 +124,14 @@ class ChannelStatistics:
     @classmethod
     def _empty(cls, n: int) -> ChannelStatistics:
         return cls(
-            np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool), np.full(n, np.inf), np.full(n, -np.inf)
-        )
+            np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool), np.full(n, np.inf), np.full(n, -np.inf),
+            np.zeros(n, int), np.zeros(n, int),
+        )  # fmt: skip
 
-    def by_channel(self) -> list[tuple[int, int, float, bool]]:
-        """(n_bad, first_bad, value, constant) of each channel."""
-        return list(zip(self.n_bad, self.first_bad, self.value, self.constant))
+    def by_channel(self) -> list[tuple[int, int, float, bool, int]]:
+        """(n_bad, first_bad, value, constant, hold) of each channel; ``hold`` is 1 for few changes."""
+        hold = np.where(self.n_change >= MIN_CHANGES, np.maximum(self.hold, 1), 1)
+        return list(zip(self.n_bad, self.first_bad, self.value, self.constant, hold))
 
     def _add(self, samples: np.ndarray, start: int) -> None:
         if start == 0:
@@ -134,6 +140,10 @@ class ChannelStatistics:
             self.lowest[i] = min(self.lowest[i], row.min())
             self.highest[i] = max(self.highest[i], row.max())
             self.constant[i] = self.lowest[i] == self.value[i] == self.highest[i]
+            for part in (row[:HEAD_LENGTH], row[HEAD_LENGTH - 1 :]):  # one change at any other sample settles it
+                if self.hold[i] != 1 and len(changes := np.flatnonzero(part[1:] != part[:-1])):
+                    self.hold[i] = np.gcd.reduce([self.hold[i], *np.diff(changes)])
+                    self.n_change[i] += len(changes)
             with np.errstate(over="ignore", invalid="ignore"):
                 suspect = not abs(row.sum()) < LARGEST_NUMBER
             if suspect and not (finite := np.abs(row) < LARGEST_NUMBER).all():
@@ -143,16 +153,17 @@ class ChannelStatistics:
 
 
 def channel_error(
-    n_sample: int, statistics: tuple[int, int, float, bool], channel: Channel, where: str, source: Source
+    n_sample: int, statistics: tuple[int, int, float, bool, int], channel: Channel, where: str, source: Source
 ) -> ReadError | None:
-    """ReadError of a channel that is not finite or constant; None for an intact one.
+    """ReadError of a channel that is not finite, constant or a slower one whose samples are repeated.
 
     Parameters
     ----------
     n_sample : int
         Number of samples of the channel.
-    statistics : tuple of (int, int, float, bool)
-        Number of non-finite samples, index of the first of them, first sample, whether all are equal.
+    statistics : tuple of (int, int, float, bool, int)
+        Number of non-finite samples, index of the first of them, first sample, whether all are equal, the number of
+        samples for which each value is held.
     channel : Channel
         The channel; one that measures temperature may be constant.
     where : str
@@ -166,7 +177,7 @@ def channel_error(
         The error, None for an intact channel.
     """
     place = f"{where}, channel {channel.name!r}"
-    n_bad, first_bad, value, constant = statistics
+    n_bad, first_bad, value, constant, hold = statistics
     if n_bad:
         problem = f"{n_bad} of {n_sample} samples are missing or not finite, the first is sample {first_bad}"
         remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
@@ -175,4 +186,8 @@ def channel_error(
         problem = f"all {n_sample} samples are {value:.6g}: the channel is dead"
         remedy = "Check the sensor, its cable and 'source' of this channel in the layout"
         return source.error(place, problem, remedy, reason="dead_channel")
+    if hold > 1 and channel.quantity in ("force", "acceleration"):
+        problem = f"its value changes only after multiples of {hold} samples: those of a lower rate are repeated"
+        remedy = "Export force and response at one rate, each sample once"
+        return source.error(place, problem, remedy, reason="wrong_rate")
     return None
