@@ -46,7 +46,7 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
         numbers = _seconds(entry, rate)
         owners = owners_of(entry, record.entries, record.names)
         name = _without_channels(entry.name, [record.names[i] for i in owners])
-        if not owners and (owners := numbered_channels(entry.name, len(record.names))):
+        if not owners and (owners := numbered_channels(entry.name, record.entries, len(record.names))):
             name = re.sub(r"\d+", "", name)
         labels.setdefault(name, entry.name)
         if len(numbers) == len(record.names) > 1:

@@ -62,16 +62,18 @@ def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
     )
 
 
-CHANNEL = re.compile(r"(?<![^\W_])(?:ch(?:an(?:nel)?)?s?|kanal|canal|voie|ai)[\s.#_-]*(\d+)", re.IGNORECASE)
+CHANNEL = re.compile(r"(?<![^\W_])(?:ch(?:an(?:nel)?)?s?|kanal|canal|voie)[\s.#_-]*(\d+)", re.IGNORECASE)
 
 
-def numbered_channels(text: str, n_channel: int) -> frozenset[int]:
-    """Channels that a text calls by their numbers, counted from 1, as in "Ch2 delay".
+def numbered_channels(text: str, entries: Sequence[Entry], n_channel: int) -> frozenset[int]:
+    """Channels that a text calls by their numbers, as in "Ch2 delay", from 0 where another entry has a channel 0.
 
     Parameters
     ----------
     text : str
         Name of an entry.
+    entries : sequence of Entry
+        All entries of the record.
     n_channel : int
         Number of channels; a higher number is none of them.
 
@@ -82,10 +84,14 @@ def numbered_channels(text: str, n_channel: int) -> frozenset[int]:
 
     Examples
     --------
-    >>> sorted(numbered_channels("Ch2_delay", 2)), sorted(numbered_channels("Channel 9", 2))
+    >>> sorted(numbered_channels("Ch2_delay", [], 2)), sorted(numbered_channels("Channel 9", [], 2))
     ([1], [])
+    >>> sorted(numbered_channels("Ch1", [Entry("line 1", "Ch0", "N")], 2))
+    [1]
     """
-    return frozenset(int(n) - 1 for n in CHANNEL.findall(text) if 0 < int(n) <= n_channel)
+    numbers = [int(n) for n in CHANNEL.findall(text)]
+    first = 0 if numbers and any("0" in CHANNEL.findall(f"{e.name} {e.value}"[:40]) for e in entries) else 1
+    return frozenset(n - first for n in numbers if 0 <= n - first < n_channel)
 
 
 @lru_cache(maxsize=4096)

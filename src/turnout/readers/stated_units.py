@@ -1,7 +1,8 @@
 """Units that a file states in its metadata or in the names of its channels, by general rules for all formats.
 
-A unit stands where the format defines it, under a word for a unit ("Einheit", "y_unit", "EU"), in brackets in the name
-of a channel, or as a word of that name ("rail_g", "rail_g_2"). A unit of the layout must agree with it.
+A unit stands where the format defines it, under a word for a unit ("Einheit", "y_unit", "EU"), alone under the name or
+the number of a channel ("CH1 [kN]", "rail: g"), in brackets in the name of a channel, or as a word of that name
+("rail_g", "rail_g_2"). A unit of the layout must agree with it.
 """
 
 import re
@@ -10,8 +11,8 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
-from turnout.readers.entries import MAX_ENTRIES, Entry
-from turnout.readers.entry_owners import container_of, owners_of
+from turnout.readers.entries import FREE_TEXT, MAX_ENTRIES, Entry
+from turnout.readers.entry_owners import CHANNEL, container_of, numbered_channels, owners_of, spaced_words
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.units import Conversion, conversion
@@ -32,6 +33,7 @@ UNIT_IN_NAME = re.compile(r"[\[({<|]\s*([^\[\](){}<>|]+?)\s*(?:[\])}>|]|$)")
 SEPARATORS = re.compile(r"[\s_./:;,=|@*\"'-]+")  # of the words of a name
 # A range, a distance or a sensitivity: "5 kN hammer", "rail 50g 2", "mV/g rail". The 2 of "rail_2_g_raw" is a number.
 AMOUNT = re.compile(r"(?:^|(?<=\s))(?:[±+-]?\d+(?:[.,]\d+)?\s?[^\W\d_][^\s_]*|[mµu]?V/[^\s_]+)")
+MAX_UNIT_TEXT = 60  # characters of a text that may be the name of a channel and a unit
 LEVEL = re.compile(r"dB")
 # The sensitivity of a sensor in a name, "rail 100 mV/g": its unit is none of the samples.
 SENSITIVITY_IN_NAME = re.compile(
@@ -181,9 +183,32 @@ def unit_entries(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     Returns
     -------
     tuple of Entry
-        Those under a name of a unit, or in a group of that name.
+        Those under a name of a unit, in a group of that name, or with a unit alone as their value.
     """
-    return tuple(e for e in entries if _states_unit(e.place, e.name))
+    return tuple(e for e in entries if _states_unit(e.place, e.name) or _unit_alone(e))
+
+
+def _unit_alone(entry: Entry) -> tuple[str, str] | None:
+    """Name and unit of an entry whose value is a unit alone, as "CH1: kN", or of a text like "CH1 [kN]"."""
+    is_text = isinstance(entry.value, str) and len(entry.value) <= MAX_UNIT_TEXT
+    return _name_and_unit(entry.name, entry.value) if is_text and not entry.is_piece else None
+
+
+@lru_cache(maxsize=4096)
+def _name_and_unit(name: str, text: str) -> tuple[str, str] | None:
+    if name == FREE_TEXT:
+        name, _, text = text.replace("(", "[", 1).partition("[")
+    unit = text.strip("[]() ")
+    return (name, unit) if known_unit(unit) and not is_meaningless(unit) else None
+
+
+def _owners_by_name(name: str, record: RawRecord) -> frozenset[int]:
+    """The channels whose name or number is a name, without other words."""
+    words = spaced_words(name)
+    if owners := frozenset(i for i, other in enumerate(record.names) if other and spaced_words(other) == words):
+        return owners
+    is_number = bool(CHANNEL.fullmatch(name.strip()))
+    return numbered_channels(name, record.entries, len(record.names)) if is_number else frozenset()
 
 
 @lru_cache(maxsize=4096)
@@ -213,8 +238,13 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
     certain: list[str] = []
     possible: list[str] = []
     for entry in entries:
+        if not _states_unit(entry.place, entry.name):
+            of_channel, unit = _unit_alone(entry) or ("", "")
+            certain.extend([unit] if index in _owners_by_name(of_channel, record) else [])
+            continue
         texts = _texts(entry.value)
         owners = owners_of(entry, record.entries, record.names)
+        owners = owners or numbered_channels(entry.name, record.entries, n)
         in_chain = bool(_words(entry.name) & CHAIN_WORDS)
         if owners and len(texts) == 1:
             if index in owners:

@@ -1,0 +1,69 @@
+"""Units under the name or the number of a channel belong to that channel, in every format."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+FORCE, RAIL = np.random.default_rng(20261128).normal(size=(2, 60)).round(6)
+FORMS = {
+    "{} [{}]": ("CH1", "CH2"),
+    "{}: {}": ("Ch 1", "Ch 2"),
+    "{};{}": ("Kanal 0", "Kanal 1"),
+    "{} ({})": ("force", "rail"),
+    "{} unit: {}": ("Channel 1", "Channel 2"),
+}
+
+
+def layout(units, sources=("force", "rail")):
+    quantities = ("force", "acceleration")
+    channels = (RawChannel(n, s, q, unit=u) for n, s, q, u in zip(("force", "rail"), sources, quantities, units))
+    return RawDescription(tuple(channels), rate=1000.0)
+
+
+def read_text(tmp_path, form, units, description):
+    lines = [form.format(name, unit) for name, unit in zip(FORMS[form], units)]
+    rows = [f"{a};{b}" for a, b in zip(FORCE, RAIL)]
+    (tmp_path / "a.csv").write_text("\n".join([*lines, "force;rail", *rows, ""]), encoding="utf-8")
+    return read("a.csv", tmp_path, description)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_units_of_numbered_channels_are_those_of_the_columns(form, tmp_path):
+    result = read_text(tmp_path, form, ("kN", "g"), layout((None, None)))
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].samples, [1e3 * FORCE, 9.80665 * RAIL], rtol=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("units", [("m/s²", "N"), ("N", "g"), ("kN", "m/s²")])
+def test_units_that_are_exchanged_or_others_contradict_the_layout(form, units, tmp_path):
+    result = read_text(tmp_path, form, units, layout(("N", "m/s²")))
+    assert [error.reason for error in result.errors] == ["unit_unknown"]
+    assert not read_text(tmp_path, form, ("N", "m/s²"), layout(("N", "m/s²"))).errors
+    assert not read_text(tmp_path, form, units, layout(("N!", "m/s²!"))).errors
+
+
+@pytest.mark.parametrize("format", ["h5", "npz"])
+def test_a_mapping_of_channels_to_units_counts_in_other_formats(format, tmp_path):
+    for units in ({"force": "N", "rail": "m/s²"}, {"force": "m/s²", "rail": "N"}):
+        if format == "h5":
+            with h5py.File(tmp_path / "a.h5", "w") as file:
+                file["force"], file["rail"] = FORCE, RAIL
+                file.create_group("info").attrs.update(units)
+        else:
+            np.savez(tmp_path / "a.npz", force=FORCE, rail=RAIL, info=np.array(json.dumps(units)))
+        result = read(f"a.{format}", tmp_path, layout(("N", "m/s²")))
+        assert [error.reason for error in result.errors] == ["unit_unknown"][: int(units["force"] != "N")]
+
+
+@pytest.mark.parametrize("line", ["rail side: N", "CH3: kN", "Switch 1: N", "AI0: V"])
+def test_a_letter_that_is_a_unit_beside_other_words_is_none_of_the_channel(line, tmp_path):
+    rows = [f"{a};{b}" for a, b in zip(FORCE, RAIL)]
+    (tmp_path / "a.csv").write_text("\n".join([line, "force [N];rail [m/s²]", *rows, ""]), encoding="utf-8")
+    result = read("a.csv", tmp_path, layout(("N", "m/s²")))
+    assert not any("channel 'rail'" in error.where or "channel 'force'" in error.where for error in result.errors)
