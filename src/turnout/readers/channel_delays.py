@@ -12,10 +12,12 @@ from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 
 DELAY = re.compile(r"delay|latenc|skew$|^lag$|verzog|retard|forsink|fordroj|vertraging|^timeshift$")
 # Times at which the samples of a channel begin.
-BEGIN = re.compile(r"\b(?:time (?:shift|offset)|start offset|t ?0|t start|pre ?trig(?:ger)?)\b")
+BEGIN = re.compile(r"\b(?:start offset|t ?0|t start|pre ?trig(?:ger)?)\b")
+SHIFT = re.compile(rf"{BEGIN.pattern}|\btime (?:shift|offset)\b")
 # Delays before a recording begins, and what is beside a delay.
 OTHER_DELAY = re.compile(r"trig|start|hold|wait|settl|warm|auslos|unit|einheit|type|mode|name|enabl|max|toler|alarm")
 MAX_LISTED = 4  # channels in one message
+MAX_LAG = 0.5  # of a sampling step that the first samples may be apart: converters that take turns are
 MAX_SHARE = 0.01  # of a sampling step that delays may differ: 1.8° of phase at half the sampling rate
 DELAY_REMEDY = "Let the export shift the samples; if they are in time already, name the entry in 'checked_entries'"
 
@@ -55,7 +57,7 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
             delays.setdefault(name, {}).update(dict.fromkeys(owners, numbers[0]))
     for name, of_channels in delays.items():
         values = [of_channels.get(i, 0.0) for i in rows]
-        if values and (max(values) - min(values)) * rate > MAX_SHARE:
+        if values and (max(values) - min(values)) * rate > (MAX_LAG if BEGIN.search(name) else MAX_SHARE):
             listed = ", ".join(f"{record.names[i]!r} {value:g} s" for i, value in [*zip(rows, values)][:MAX_LISTED])
             problem = f"its metadata state different delays ({labels[name]}: {listed})"
             return f"{problem}, and nothing says that they are corrected"
@@ -89,7 +91,7 @@ def is_delay_name(name: str) -> bool:
     [True, True, True, False, False]
     """
     texts = spaced_words(name), " ".join(words_of(name))
-    if others := [other for text in texts if (other := BEGIN.sub("", text)) != text]:
+    if others := [other for text in texts if (other := SHIFT.sub("", text)) != text]:
         return not OTHER_DELAY.search(others[0])
     return any(map(DELAY.search, words_of(name))) and not any(map(OTHER_DELAY.search, words_of(name)))
 

@@ -222,7 +222,7 @@ def test_a_line_of_delays_has_one_for_each_column_or_for_each_but_the_time(name,
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     rows = [[f"{k / 1e3:.4f}"][: int(has_time)] + [f"{x:.4f}" for x in pair] for k, pair in enumerate(PAIRS)]
     names = [*["time [s]"][: int(has_time)], "force", "rail"]
-    for delays in (["0", "0,3"], ["0,3", "0,3"]):
+    for delays in (["0", "0,7"], ["0,7", "0,7"]):
         lines = [[name, *delays], names, *rows]
         (tmp_path / "a.csv").write_text("".join(";".join(line) + "\n" for line in lines), encoding="utf-8")
         result = read("a.csv", tmp_path, RawDescription(sensors, rate=1e3))
