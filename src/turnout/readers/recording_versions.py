@@ -40,8 +40,8 @@ def check_groups(names: Sequence[str], channels: Iterable[str], source: Source) 
     words_of_groups = {re.sub(r"[\d_\W]+", "", name).casefold() for name in names}
     is_of_sensors = len(names) > 1 and len(words_of_groups) == len(names) and any(map(quantity_of_sensor, names))
     if is_of_sensors and len(channels) > 1 and not any(map(quantity_of_sensor, channels)):
-        listed = [" and ".join(map(repr, texts[:3])) for texts in (names, channels)]
-        problem = f"{listed[0]} are named as channels, and each holds {listed[1]}"
+        groups_listed, channels_listed = (" and ".join(map(repr, texts[:3])) for texts in (names, channels))
+        problem = f"{groups_listed} are named as channels, and each holds {channels_listed}"
         remedy = "Export a group for each record, with its channels by their names"
         raise source.error("the groups", problem, remedy, reason="channel_missing")
     groups: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
