@@ -91,8 +91,8 @@ def is_delay_name(name: str) -> bool:
     [True, True, True, False, False]
     """
     texts = spaced_words(name), " ".join(words_of(name))
-    if others := [other for text in texts if (other := SHIFT.sub("", text)) != text]:
-        return not OTHER_DELAY.search(others[0])
+    if remainders := [remainder for text in texts if (remainder := SHIFT.sub("", text)) != text]:
+        return not OTHER_DELAY.search(remainders[0])
     return any(map(DELAY.search, words_of(name))) and not any(map(OTHER_DELAY.search, words_of(name)))
 
 
@@ -103,6 +103,7 @@ def _seconds(entry: Entry, rate: float) -> list[float]:
     numbers = finite_numbers(entry.value)
     if isinstance(entry.value, str) and (number := number_and_unit(entry.value)):
         numbers, unit = finite_numbers(number[0]), number[1] or unit
-    known = rate_unit(unit)
-    factor = float(known.scale) if known and known.is_step else 1.0 / rate if SAMPLES.fullmatch(unit.strip()) else 1.0
+    factor = 1.0 / rate if SAMPLES.fullmatch(unit.strip()) else 1.0
+    if (time_unit := rate_unit(unit)) and time_unit.is_step:
+        factor = float(time_unit.scale)
     return [] if numbers is None else [float(x) * factor for x in numbers]
