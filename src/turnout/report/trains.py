@@ -43,6 +43,7 @@ NO_CHARTS = """(
     select null::varchar as section_id, null as band, null as source, null::timestamp as measured_at_utc,
         null::varchar as state
     where false)"""
+MEASURED_SOURCES = ("recording", "both")  # axle_load_source of a load from the sensors, not from trains.csv
 FACTORS = ("train type", "speed", "axle load")
 SCORES = ("fit", "forecast")
 
@@ -147,21 +148,26 @@ def score_words(scores: Sequence[Mapping[str, Any]]) -> str:
         sentences.append(
             f"The model of the section itself predicts more than that of any other section in {n_best} of {n_compared}."
         )
-    sentences.append("A score within its null carries no information about the track, neither good nor bad.")
+    sentences.append("A score that random models reach carries no information about the track, neither good nor bad.")
     return " ".join(sentences)
 
 
 def _passage(passage: Mapping[str, Any]) -> dict[str, Any]:
     """One passage in words."""
     load, load_error = passage["axle_load_t"], passage["axle_load_se_t"]
-    timetable = {"speed": passage["speed_listed_kmh"], "type": passage["train_type_listed"]}
+    is_measured = load is not None and passage["axle_load_source"] in MEASURED_SOURCES
+    listed = (
+        (passage["speed_listed_kmh"], "{:g} km/h"),
+        (passage["train_type_listed"], "{}"),
+        (passage["axle_load_listed_t"], "{:.1f} t"),
+    )
     return {
         "when": f"{passage['passed_at_utc']:%Y-%m-%d %H:%M}",
         "type": passage["train_type"] or "unknown",
-        "listed": ", ".join(f"{v:g} km/h" if k == "speed" else v for k, v in timetable.items() if v) or "–",
+        "listed": ", ".join(text.format(value) for value, text in listed if value) or "–",
         "axles": passage["n_axles"] or "–",
         "speed": "–" if passage["speed_kmh"] is None else _with_error(passage["speed_kmh"], passage["speed_se_kmh"]),
-        "load": "not available" if load is None else _with_error(load, load_error),
+        "load": _with_error(load, load_error) if is_measured else "not measured",
         "way": f"{passage['direction'] or 'unknown'}, {passage['track'] or 'unknown'}",
         "status": passage["status"] + (f": {passage['detail']}" if passage["detail"] else ""),
     }

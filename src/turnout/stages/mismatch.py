@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 
 FITS_FOLDER = "work/mismatch-fits"
 TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "twin_states", "quarantine")
+REMEDY = (
+    "A diagnosis needs a track file, and hammer tests or passages of the visit: correct what is named, or measure it"
+)
+BUDGET_REMEDY = "Run the same command again, with a larger --budget if need be"
 BUDGET_SPENT = "the budget was used up with {} of {} groups done; the same command continues"
 SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 
@@ -148,7 +152,8 @@ def diagnose_visit(
         try:
             group_tables = _diagnose_group(group, turnout, accepted, about, options, (k, len(members)))
         except BudgetSpentError:
-            unfinished = [_undiagnosed_row(unit, turnout, BUDGET_SPENT.format(k, len(members)), g) for g in members[k:]]
+            reason = BUDGET_SPENT.format(k, len(members))
+            unfinished = [_undiagnosed_row(unit, turnout, reason, g, BUDGET_REMEDY) for g in members[k:]]
             raise BudgetSpentError(
                 k, len(members), _sort_by_severity(rows | {"quarantine": rows["quarantine"] + unfinished})
             ) from None
@@ -226,10 +231,9 @@ def _changed_effects(group: Group, about: Mapping[str, Any]) -> tuple[AcceptedEf
 
 
 def _undiagnosed_row(
-    unit: Unit | None, turnout: TurnoutConfig, reason: str, group: Group | None = None
+    unit: Unit | None, turnout: TurnoutConfig, reason: str, group: Group | None = None, remedy: str = REMEDY
 ) -> dict[str, Any]:
-    """Quarantine row with the reason why sections cannot be diagnosed."""
+    """Quarantine row with the reason why sections cannot be diagnosed, and what to do."""
     sections = f"sections {', '.join(group.labels)}" if group else "all sections"
-    remedy = "See docs/mismatch.md: what a diagnosis needs"
     error = ReadError(turnout.raw, sections, reason, remedy, "simulation_failed")
     return quarantine_row(error, {"turnout_id": turnout.id}, "mismatch", "mismatch")

@@ -266,7 +266,7 @@ def surface_sentence(estimate: Mapping[str, Any]) -> str:
 
 def _rival_text(rival: str | None) -> str:
     name = (rival or "").replace("_", " ")
-    return f", or what was left out is “{name}”: these recordings cannot distinguish the two" if rival else ""
+    return f", or the effect is “{name}”: these recordings cannot distinguish the two" if rival else ""
 
 
 def _location_text(finding: Mapping[str, Any], low: float, high: float) -> str:

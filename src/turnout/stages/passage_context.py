@@ -164,7 +164,9 @@ def _read_patterns(path: str, content: str) -> tuple[Pattern, ...]:
             message = f"{message!r} is missing"
         elif isinstance(error, (TypeError, AttributeError)):
             message = "they are not two tables of names with values"
-        raise ConfigError(path, "vehicles and trains", message, "See docs/passages.md") from None
+        raise ConfigError(
+            path, "vehicles and trains", message, "Compare it with the file of a new project (turnout init)"
+        ) from None
 
 
 def read_clusters(path: Path) -> Clusters | None:

@@ -47,7 +47,8 @@ def track_file(turnout: TurnoutConfig, name: str | None = None) -> Path:
             return folder / f"{stem}.yaml"
     names = name or f"{turnout.id}.yaml nor {turnout.layout}"
     raise SimulationError(
-        f"{turnout.id}: no file {folder}/{names}.yaml; without a track nothing can be simulated "
+        f"{turnout.id}: no file {folder}/{names}.yaml; without a track nothing can be simulated. "
+        f"Copy a file of {folder} or of a new project (turnout init) to one of these names, and change what differs "
         "(docs/simulation.md, 'A track of your own')."
     )
 

@@ -171,7 +171,7 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
     }  # fmt: skip
     said = headline(row)
     assert "at 8.4 m is 0.3 times as stiff" in said
-    torn = "above its ballast, or what was left out is “local ballast”: these recordings cannot distinguish the two."
+    torn = "above its ballast, or the effect is “local ballast”: these recordings cannot distinguish the two."
     assert said.endswith(torn)
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
@@ -194,7 +194,7 @@ def test_axes_carry_their_units():
 
 def test_one_of_two_says_which_measurement_would_tell():
     row = ROWS["a_or_b"] | {"next_measurement": "Measure passages of a lighter and a heavier train"}
-    assert "or what was left out is “local ballast”: these recordings cannot distinguish the two" in headline(row)
+    assert "or the effect is “local ballast”: these recordings cannot distinguish the two" in headline(row)
     assert check(row) == "Measure passages of a lighter and a heavier train."
 
 
@@ -304,8 +304,8 @@ def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
 def test_a_rejected_name_is_not_offered_as_what_was_left_out():
     """An unknown may hold the term that was tried: it is said to be rejected, and nobody is told to accept it."""
     shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
-    assert "what was rejected" in shown and "what was left out" not in shown and "--accept" not in shown
-    assert "what was left out" in page(named()) and "--accept" in page(named())
+    assert "with the rejected effect" in shown and "with the effect" not in shown and "--accept" not in shown
+    assert "base model with the effect" in page(named()) and "--accept" in page(named())
 
 
 def test_one_fit_alone_is_a_sentence_and_no_chart():
@@ -323,8 +323,8 @@ def test_the_residual_is_what_was_measured_less_what_was_simulated():
     x = np.linspace(0.0, 1.0, 201)
     row = {"curve": "waveform", "x": x, "x_label": "time", "x_unit": "s", "y_unit": "m/s²", "label": "passage 1"}
     row |= {"measured": np.sin(40 * x), "before": 0.8 * np.sin(40 * x), "after": np.sin(40 * x)}
-    svg = residual_panel(row, "what was left out")
-    assert "4.0 % of the energy before, 0.0 % with what was left out" in svg
+    svg = residual_panel(row, "the effect")
+    assert "4.0 % of the energy by the base model, 0.0 % with the effect" in svg
     path = re.search(r'<path class="curve-before"[^>]* d="M([^"]*)"', svg)[1]
     y = np.cumsum(np.array(re.findall(r"-?[\d.]+", path), dtype=float).reshape(-1, 2)[:, 1])
     # the axis reaches 1.25 times the largest residual on both sides of the middle of 190 - 26 - 40 px

@@ -64,22 +64,43 @@ def test_the_words_count_what_the_scores_are_worth():
     assert score_words([]) == ""
 
 
+PASSAGE = {
+    "passed_at_utc": datetime(2026, 7, 24, 1, 18), "speed_kmh": 142.5, "speed_se_kmh": 0.2, "axle_load_t": None,
+    "axle_load_se_t": None, "axle_load_source": "unavailable", "axle_load_listed_t": None,
+    "speed_listed_kmh": 140.0, "train_type_listed": "IC3", "train_type": "IC3",
+    "n_axles": 8, "direction": "facing", "track": "main", "status": "accepted", "detail": None,
+}  # fmt: skip
+
+
 def test_the_part_says_speed_and_load_with_intervals_and_effects_with_what_was_held_fixed():
-    passage = {
-        "passed_at_utc": datetime(2026, 7, 24, 1, 18), "speed_kmh": 142.5, "speed_se_kmh": 0.2, "axle_load_t": None,
-        "axle_load_se_t": None, "speed_listed_kmh": 140.0, "train_type_listed": "IC3", "train_type": "IC3",
-        "n_axles": 8, "direction": "facing", "track": "main", "status": "accepted", "detail": None,
-    }  # fmt: skip
     effect = {
         "section_id": "t/A7", "score": "fit", "factor": "speed", "per": "10 km/h", "held_fixed": "train type", "n": 40,
         "raw_change_pct": 0.5, "change_pct": -1.0, "low_pct": -1.5, "high_pct": -0.5,
     }  # fmt: skip
-    rows = {"passages": [passage], "scores": [], "weeks": [], "bars": [bar("A7", "IC3", 10.0)], "effects": [effect]}
+    rows = {"passages": [PASSAGE], "scores": [], "weeks": [], "bars": [bar("A7", "IC3", 10.0)], "effects": [effect]}
     part = trains_part(rows, SECTIONS)
-    assert part["passages"][0]["speed"] == "142.5 ± 0.4" and part["passages"][0]["load"] == "not available"
+    assert part["passages"][0]["speed"] == "142.5 ± 0.4" and part["passages"][0]["load"] == "not measured"
     assert part["passages"][0]["listed"] == "140 km/h, IC3"
     assert part["effects"][0]["held"] == "-1.00 [-1.50, -0.50]" and part["effects"][0]["verdict"] == "differs from none"
     assert part["loads_known"] is False and trains_part(rows | {"passages": []}, SECTIONS) is None
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "load"),
+    [("recording", 0.2, "13.9 ± 0.4"), ("both", 0.2, "13.9 ± 0.4"), ("timetable", None, "not measured")],
+)  # fmt: skip
+def test_an_axle_load_of_the_train_data_is_not_shown_as_measured(source, error, load):
+    passage = PASSAGE | {"axle_load_t": 13.9, "axle_load_se_t": error, "axle_load_source": source}
+    listed = None if source == "recording" else 13.86
+    rows = {
+        "passages": [passage | {"axle_load_listed_t": listed}],
+        "scores": [],
+        "weeks": [],
+        "bars": [],
+        "effects": [],
+    }
+    row = trains_part(rows, SECTIONS)["passages"][0]
+    assert (row["load"], row["listed"]) == (load, "140 km/h, IC3" + (", 13.9 t" if listed else ""))
 
 
 def test_names_with_quotes_ask_for_themselves():

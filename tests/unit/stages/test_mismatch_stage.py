@@ -194,6 +194,8 @@ def test_a_spent_budget_shows_the_groups_that_are_done(soft, monkeypatch, capsys
     told = capsys.readouterr()
     assert first["sentence"] in told.out and "no answer for sections B: the budget was used up" in told.out
     assert "1 of 2 groups done; the same command continues" in told.err
+    page = (soft / "results/pages/findings/t1.html").read_text()
+    assert "Run the same command again" in page and "docs/" not in page
     assert "2 groups: neighbouring sections together; a group takes a minute to ten" in told.err
     page = (soft / "results/pages/findings/t1.html").read_text()
     assert "with 1 of 2 groups done" in page
@@ -306,7 +308,8 @@ def test_a_file_that_cannot_be_read_is_said(soft):
 def test_a_turnout_without_a_track_is_said(soft, capsys):
     (soft / "config/tracks/small.yaml").unlink()
     assert main(["diagnose", "--turnout", "t1"]) == 2
-    assert "without a track nothing can be simulated" in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert "without a track nothing can be simulated. Copy a file of config/tracks" in message
 
 
 def test_the_rows_fit_the_registry(soft, tmp_path):

@@ -78,7 +78,7 @@ def _finding(
 ) -> dict[str, Any]:
     curves = [c for c in rows["mismatch_curves"] if c["finding_id"] == finding["finding_id"]]
     named = finding["verdict"] in ("named", "a_or_b")
-    changed = ("what was left out" if named else "what was rejected") if finding["term_json"] is not None else ""
+    changed = ("the effect" if named else "the rejected effect") if finding["term_json"] is not None else ""
     drawings = [(c["curve"], curve_panel(c, changed)) for c in sorted(curves, key=lambda c: c["curve_no"])]
     residuals = "".join(residual_panel(c, changed) for c in curves)
     return {

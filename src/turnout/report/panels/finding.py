@@ -22,7 +22,7 @@ TITLES = {
 WIDE_WIDTH = 944  # px, width of a waveform panel
 
 
-def curve_panel(row: Mapping[str, Any], changed: str = "what was left out") -> str:
+def curve_panel(row: Mapping[str, Any], changed: str = "the effect") -> str:
     """SVG of one row of ``mismatch_curves``.
 
     Parameters
@@ -45,7 +45,7 @@ def curve_panel(row: Mapping[str, Any], changed: str = "what was left out") -> s
     log = row["curve"] != "waveform"
     chart = Chart(_x_axis(row, x, log), _y_axis(row, values, log), _title(row),
                   width=WIDE_WIDTH if row["curve"] == "waveform" else 462, height=250)  # fmt: skip
-    words = {"measured": "measured", "before": "simulated before", "after": f"simulated with {changed}"}
+    words = {"measured": "measured", "before": "base model", "after": f"base model with {changed}"}
     for name in names:
         chart.line(x, values[name], f"curve-{name}", words[name])
     _key(chart, names, words)
@@ -76,11 +76,12 @@ def residual_panel(row: Mapping[str, Any], changed: str) -> str:
     chart = Chart(
         Axis(float(x.min()), float(x.max()), _x_label(row)),
         Axis(-reach, reach, f"residual [{row['y_unit']}]"),
-        f"Residual, measured less simulated: {share[0]:.1f} % of the energy before, {share[1]:.1f} % with {changed}",
+        f"Residual, measured less simulated: {share[0]:.1f} % of the energy by the base model, "
+        f"{share[1]:.1f} % with {changed}",
         width=WIDE_WIDTH,
         height=190,
     )
-    words = {"before": "residual before", "after": f"residual with {changed}"}
+    words = {"before": "residual of the base model", "after": f"residual with {changed}"}
     for name, values in left.items():
         chart.line(x, values, f"curve-{name}", words[name])
     _key(chart, list(left), words)
@@ -152,8 +153,12 @@ def fit_panel(finding: Mapping[str, Any]) -> str:
         SVG, "" with less than two fits to compare.
     """
     entries = [
-        ("before", finding["fit_before_pct"], "bar-before"),
-        ("with it", finding["fit_after_pct"], "bar-after"),
+        ("base model", finding["fit_before_pct"], "bar-before"),
+        (
+            "with the effect" if finding["verdict"] in ("named", "a_or_b") else "with it",
+            finding["fit_after_pct"],
+            "bar-after",
+        ),
         ("best rival", finding["fit_rival_pct"], "bar-rival"),
         ("decoy", finding["fit_decoy_pct"], "bar-rival"),
     ]
@@ -183,7 +188,7 @@ def _gain(finding: Mapping[str, Any]) -> str:
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
     if before is None or after is None or error is None:
         return ""
-    return f": {after - before:+.1f} ± {error:.1f} points"
+    return f": {after - before:+.1f} ± {error:.1f} points (standard error)"
 
 
 def history_of_parameter(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 WIDTH = 952
-LEGEND = "○ others held fixed, 95 %, magenta: random models"
+LEGEND = "mean at equal other factors (○, 95 %), limit of random models (magenta)"
 # Light to dark, distinct in print and for colour-blind readers.
 COLOURS = ("#c6dbef", "#6baed6", "#2171b5", "#08306b", "#fdd0a2", "#fd8d3c", "#d94801", "#7f2704")
 
@@ -53,9 +53,8 @@ def train_bars(factor: str, rows: Sequence[Mapping[str, Any]], sections: Sequenc
     at = {(r["section_id"], r["class"]): r for r in rows}
     n = sum(r["n_passages"] for r in rows if r["section_id"] == sections_shown[0]["section_id"])
     ends = [e for r in rows for e in (_low(r), _high(r))]
-    title = (
-        f"{rows[0]['score']} by {factor}: bar: mean, thin line: ± spread, {LEGEND}{_undrawn(len(classes) - len(names))}"
-    )
+    marks = f"mean (bar), ± standard deviation (thin line), {LEGEND}"
+    title = f"{rows[0]['score']} by {factor}: {marks}{_undrawn(len(classes) - len(names))}"
     chart = Chart(
         Axis(
             0.5,
