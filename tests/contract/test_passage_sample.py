@@ -1,6 +1,8 @@
 """The sample output in docs/passages.md has the lines that the command prints."""
 
-from turnout.cli.passage import FIT_HEAD, score_basis
+from types import SimpleNamespace
+
+from turnout.cli.passage import FIT_HEAD, _train_lines, score_basis
 from turnout.config.settings.passage import PassageSettings
 
 
@@ -12,3 +14,19 @@ def test_the_sample_has_the_head_the_basis_and_a_row_of_known_status_per_sensor(
     assert [row.split()[0] for row in rows] == ["OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"]
     status = {row.split()[-1] for row in rows if "does not record" not in row}
     assert status <= {"accepted", "not_an_impulse", "null_explains", "rejected"}
+
+
+def test_the_uncertainties_are_95_percent_intervals_as_on_the_pages(repository):
+    """The standard errors 0.1 km/h and 0.056 m/s² are those of the sample."""
+    recording = SimpleNamespace(source="a.h5", record=0, duration=3.7)
+    speed = SimpleNamespace(
+        speed=140.1 / 3.6, se=0.1 / 3.6, source="both", acceleration=0.0, acceleration_se=0.056, disagreement=None
+    )
+    type_ = SimpleNamespace(type="IC3", probability=1.0, residual=None, vehicles=())
+    passage = SimpleNamespace(
+        status="accepted", findings=(), speed=speed, type=type_, n_axle=8, contrast=5.9, direction="facing",
+        track="main", offsets=(0.0,),
+    )  # fmt: skip
+    lines = [line for line in _train_lines(recording, passage) if "±" in line]
+    page = (repository / "docs" / "passages.md").read_text(encoding="utf-8")
+    assert len(lines) == 2 and all("(95 %)" in line and line in page for line in lines)

@@ -13,7 +13,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_turnout, add_work
-from turnout.constants import KMH
+from turnout.constants import KMH, Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -127,9 +127,9 @@ def _train_lines(recording: Recording, passage: Passage) -> list[str]:
         return lines
     speed, type_ = passage.speed, passage.type
     lines.append(f"  axles      {passage.n_axle}; the weakest peak is {passage.contrast:.1f} times the next one")
-    speed_text = f"{KMH * speed.speed:.1f} ± {KMH * speed.se:.1f} km/h in the middle"
+    speed_text = f"{KMH * speed.speed:.1f} ± {KMH * Z95 * speed.se:.1f} km/h (95 %) in the middle"
     lines.append(f"  speed      {speed_text}, from {SPEED_SOURCES[speed.source]}")
-    lines.append(f"  change     {speed.acceleration:+z.2f} ± {speed.acceleration_se:.2f} m/s²")
+    lines.append(f"  change     {speed.acceleration:+z.2f} ± {Z95 * speed.acceleration_se:.2f} m/s² (95 %)")
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
     lines.append(f"  direction  {passage.direction}, track {passage.track}")
