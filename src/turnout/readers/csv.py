@@ -200,7 +200,7 @@ def _records(
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             undecided=undecided,
-            time_label="" if time is None else names[time],
+            time_label="" if time is None else _label(names, units, time),
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
             entries=entries,

@@ -8,6 +8,7 @@ from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME
+from turnout.readers.time_numbers import SINCE
 from turnout.units import conversion
 
 TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
@@ -80,9 +81,10 @@ def seconds_per_number(unit: str, source: Source) -> float:
     """
     if not unit.strip():
         return 1.0
-    time_unit = rate_unit(unit)
+    since = SINCE.search(unit)
+    time_unit = rate_unit(since[1] if since else unit)
     if time_unit is None or not time_unit.is_step:
-        remedy = "Export the time in s, ms, µs, ns, min or h, or as the time of day with seconds"
+        remedy = "Export the time in s, ms, µs, ns, min, h or d, or as the time of day with seconds"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
     return float(time_unit.scale)
 
@@ -243,6 +245,10 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     names = lines[name_line]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
-    for i, (name, (bare, unit)) in enumerate(zip(names, map(name_and_unit, names))):
+    pairs = [name_and_unit(name) for name in names]
+    bare_names = [bare for bare, _ in pairs]
+    for i, (name, (bare, unit)) in enumerate(zip(names, pairs)):
+        if unit.isdigit() and bare_names.count(bare) > 1:  # "Y[0]", "Y[1]"
+            continue
         names[i], units[i] = bare, unit if unit or bare != name else units[i]
     return Columns(names, units, further)

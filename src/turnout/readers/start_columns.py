@@ -9,16 +9,17 @@ import numpy as np
 
 from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE, ClockColumn
 from turnout.readers.lazy import Column
-from turnout.readers.rate_units import words_of
+from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.rate_words import is_time_name
 from turnout.readers.source import RawRecord
 from turnout.readers.stamp_texts import plain_stamp
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
 from turnout.readers.texts import decode_text
-from turnout.readers.time_numbers import time_of_number
+from turnout.readers.time_numbers import SINCE, time_of_number
 
 TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
 DATED = re.compile(rf" *({DATE})[T ,_]+{CLOCK} *")
+UNIT_AT_END = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
 ZONE = re.compile(r"(?:(Z|UTC)|([+-])(\d{2}):?(\d{2})) *$")
 
 
@@ -151,13 +152,22 @@ def starts_of_axes(record: RawRecord) -> list[tuple[datetime | None, str]]:
     """
     starts = list(record.axis_starts)
     if record.time is not None and len(record.time) > 1:
-        unit = " [s]" if record.is_time_in_seconds else ""
-        starts.append(_start_of_axis(record.time, record.time_label + unit))
+        starts.append(_start_of_time_column(record.time, record.time_label, record.is_time_in_seconds))
     for name, unit, column in zip(record.names, record.units, record.samples):
         is_dated = is_time_name(name) or (is_start_name(name) and has_date_word(name))
         if is_dated and column.dtype.kind in "fiu" and len(column) > 1:
             starts.append(_start_of_axis(column, f"{name} [{unit}]" if unit.strip() else name))
     return [(start, text) for start, text in starts if start or text]
+
+
+def _start_of_time_column(time: np.ndarray, label: str, is_in_seconds: bool) -> tuple[datetime | None, str]:
+    """Start of a time column; one that was converted to seconds counts in the unit in its label: days are days."""
+    in_brackets = UNIT_AT_END.search(label) if is_in_seconds else None
+    since = SINCE.search(in_brackets[1]) if in_brackets else None
+    unit = rate_unit(since[1] if since else in_brackets[1]) if in_brackets else None
+    if unit and unit.is_step:
+        return _start_of_axis(time / float(unit.scale), label)
+    return _start_of_axis(time, f"{label} [s]" if is_in_seconds else label)
 
 
 def _start_of_axis(column: Column, declared: str) -> tuple[datetime | None, str]:

@@ -64,6 +64,28 @@ def test_a_count_since_1970_is_a_start_in_utc(tmp_path, unit, size):
     assert record(tmp_path, [f"{name};force [N];rail [m/s2]"], times).started_at == START.replace(tzinfo=UTC)
 
 
+DAYS = {  # unit of the column, first number, and the start or what is asked
+    ("d", 46155.5): "days since 1899-12-30 or days since 1904-01-01?",
+    ("days", 740115.5): datetime(2026, 5, 13, 12),
+    ("days since 1899-12-30", 46155.5): datetime(2026, 5, 13, 12, tzinfo=UTC),
+    ("hours since 1970-01-01", 494074.0): START.replace(tzinfo=UTC),
+    ("h", 46155.5): None,
+}
+
+
+@pytest.mark.parametrize("unit, first", DAYS)
+def test_a_column_of_days_counts_days_and_no_seconds_of_another_origin(tmp_path, unit, first):
+    """46155 days are as many seconds as LabVIEW counts in 2030: that was the start, without a message."""
+    size = 24.0 if unit.startswith("h") else 1.0
+    times = [f"{first + k * size / 86_400_000.0:.14f}" for k in range(N)]
+    raw = record(tmp_path, [f"Time [{unit}];force [N];rail [m/s2]"], times)
+    expected = DAYS[unit, first]
+    if isinstance(expected, str):
+        assert raw.started_at is None and expected in raw.unread_start
+    else:
+        assert raw.started_at == expected and not raw.unread_start
+
+
 @pytest.mark.parametrize("first, step", [(0.0, 0.001), (12.5, 0.001), (7e8, 50.0), (3.0e9, 50.0)])
 def test_a_count_from_another_origin_is_no_start(tmp_path, first, step):
     times = [f"{first + step * k:.3f}" for k in range(N)]

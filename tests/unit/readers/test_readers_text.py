@@ -579,6 +579,18 @@ def test_names_without_cells_are_an_error_and_a_comment_is_none(tmp_path):
     assert read("a.csv", tmp_path, description).recordings[0].n_sample == 40
 
 
+@pytest.mark.parametrize("names", ["Y[0];Y[1]", "ai (1);ai (2)"])
+def test_numbers_in_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
+    """Before, both columns were called Y, and no layout could name one of them."""
+    first, second = names.split(";")
+    (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
+    channels = tuple(replace(c, source=n) for c, n in zip(NAMED.channels, (first, second)))
+    (recording,) = read("a.csv", tmp_path, replace(NAMED, channels=channels)).recordings
+    np.testing.assert_allclose(recording.samples, X.T.round(4), atol=1e-12)
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nforce [1];acc [1]\n{ROWS}")
+    assert read("a.csv", tmp_path, NAMED).errors == ()
+
+
 TEMPERATURES = ["T [°C]", "t (K)", "T [Nm]", "Time [kN]"]
 
 
