@@ -368,7 +368,9 @@ def test_a_time_column_in_another_unit_is_rejected(tmp_path):
     (tmp_path / "a.csv").write_text("time [weeks];force;acc\n" + rows)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
-    expected = "a.csv, the time column: its unit 'weeks' is not known. Export the time in s, ms, µs, ns, min or h, or"
+    expected = (
+        "a.csv, the time column: its unit 'weeks' is not known. Export the time in s, ms, µs, ns, min, h or d, or"
+    )
     assert str(caught.value) == f"{expected} as the time of day with seconds."
     assert caught.value.reason == "unit_unknown"
 
