@@ -22,6 +22,7 @@ from turnout.readers.csv_cells import (
 )
 from turnout.readers.csv_columns import are_names, name_and_unit, names_and_units
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
+from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
 from turnout.readers.other_subjects import STRONG, subject_of
@@ -315,7 +316,7 @@ def entries_of_lines(
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
-        elif len(cells) > 2 and (is_delay_name(cells[0]) or is_of_overload(cells[0])):
+        elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
             entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
         is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)

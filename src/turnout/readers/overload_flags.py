@@ -19,7 +19,9 @@ BESIDE_OVERLOAD = re.compile(
     r"detect|enabl|check|level|limit|thresh|schwell|mode|action|hold|time|margin|recover|type|%"
 )
 TRUE_WORDS = frozenset("true yes ja oui si on overload overloaded clipped saturated".split())
-DENYING_WORDS = frozenset("no not non none nein nicht kein keine ohne without sans aucun free never ok ingen".split())
+DENYING_WORDS = frozenset(
+    "no not non none nein nicht kein keine ohne without sans aucun free never ok ingen off aus false".split()
+)
 MAX_WORDS = 5  # of a text that states an overload: a longer one may speak of it for another reason
 
 

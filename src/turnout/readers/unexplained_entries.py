@@ -34,6 +34,7 @@ from turnout.readers.entry_candidates import (
     candidates,
 )
 from turnout.readers.entry_owners import container_of
+from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, window_entries
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.precision import EXACT_PRECISION, around
@@ -194,6 +195,7 @@ class EntryCheck:
         self.source = source
         self._checked = frozenset(name.strip().casefold() for name in description.checked_entries)
         units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
+        self._is_hammer_test = description.kind == "hammer"
         self._channels = [c for c in description.channels if c.quantity != IGNORED]
         self._units = tuple(unit.rstrip("!") for unit in units)
         self._are_certain = any(unit.endswith("!") for unit in units)
@@ -270,7 +272,7 @@ class EntryCheck:
                 self._seen.difference_update(_key_of(e) for e in new_entries if _is_plain(e))  # for the next records
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
         of_converter = list(self._converter_errors(where, record))
-        overloads = list(self._overload_errors(where, new_entries, record.names))
+        flags = list(self._flag_errors(where, new_entries, record.names))
         self._last = record.entries, key
         new = [(e, c) for e, c in unexplained if (e.name, c.text) not in self._reported]
         self._reported.update((e.name, c.text) for e, c in new)
@@ -279,7 +281,7 @@ class EntryCheck:
             *directions,
             *self._object_errors(where, objects),
             *of_converter,
-            *overloads,
+            *flags,
             *([self._error(where, new, "entry_unknown")] if new else []),
         ]
 
@@ -309,17 +311,19 @@ class EntryCheck:
             )
             yield self.source.error(where, problem, remedy, reason="entry_unknown")
 
-    def _overload_errors(self, where: str, entries: Sequence[Entry], names: Sequence[str]) -> Iterator[ReadError]:
-        """Remark on each entry by which the logger says that a channel left its range."""
-        for entry in overload_entries(entries, names):
+    def _flag_errors(self, where: str, entries: Sequence[Entry], names: Sequence[str]) -> Iterator[ReadError]:
+        """Remark on each entry by which the logger says that a channel left its range, or of an exponential window."""
+        flags = [
+            (entry, "that a channel left its range", "Look at its peaks") for entry in overload_entries(entries, names)
+        ]
+        if self._is_hammer_test:
+            flags += [(entry, WINDOW_PROBLEM, WINDOW_REMEDY) for entry in window_entries(entries)]
+        for entry, statement, remedy in flags:
             if (entry.place, _text(entry.value)) in self._reported:
                 continue
             self._reported.add((entry.place, _text(entry.value)))
-            statement = f"'{entry.name}: {_text(entry.value)[:MAX_SHOWN]}' in {entry.place}"
-            problem = f"{statement} may say that a channel left its range"
-            remedy = (
-                f"Look at its peaks; if it means something else, name it in the layout, 'checked_entries: {entry.name}'"
-            )
+            problem = f"'{entry.name}: {_text(entry.value)[:MAX_SHOWN]}' in {entry.place} may say {statement}"
+            remedy = f"{remedy}; if it means something else, name it in the layout, 'checked_entries: {entry.name}'"
             yield self.source.error(where, problem, remedy, reason="entry_unknown")
 
     def _converter_errors(self, where: str, record: RawRecord) -> Iterator[ReadError]:
