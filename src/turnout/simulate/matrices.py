@@ -323,10 +323,18 @@ def _blade_nodes(track: Track) -> range:
     return range(first, last) if track.blade.direction > 0 else range(first + 1, last + 1)
 
 
-def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray, dict[tuple, int]]:
-    """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node.
+def rail_nodes(track: Track) -> np.ndarray:
+    """Positions of the nodes of the rail; the one at the toe of a blade is moved to it.
 
-    The node of a blade follows the node of the rail beside it. At its end both have one.
+    Parameters
+    ----------
+    track : Track
+        The track.
+
+    Returns
+    -------
+    (n_node,) array of float
+        [m]
     """
     per_bay = track.elements_per_bay
     bays = [np.linspace(a, b, per_bay + 1)[:-1] for a, b in zip(track.support[:-1], track.support[1:])]
@@ -334,6 +342,15 @@ def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.nd
     if track.blade is not None:
         toe = track.blade.toe_node(track)
         node[toe] = track.blade.toe if toe % per_bay else node[toe]
+    return node
+
+
+def _number_rows(track: Track, links: Sequence[Link]) -> tuple[np.ndarray, np.ndarray, dict[tuple, int]]:
+    """Nodes, their rows and the row of every named degree of freedom; those of a support follow its node.
+
+    The node of a blade follows the node of the rail beside it. At its end both have one.
+    """
+    per_bay, node = track.elements_per_bay, rail_nodes(track)
     extra: list[set[tuple]] = [set() for _ in track.support]
     for link in links:
         for name, _ in link.ends:

@@ -9,6 +9,7 @@ from turnout.mismatch.engine import candidate_search, refit
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.candidate_search import Entry, RefitTask, shortlist
 from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.leaders import start_from_priors
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -77,6 +78,16 @@ def test_a_restart_that_gains_less_changes_nothing(monkeypatch):
     base, before = ranked(monkeypatch, Imitated(), (0.0, 0.0))
     _, after = ranked(monkeypatch, Imitated(), (0.0, 20.0), base)
     assert after["other wave"].gain == before["other wave"].gain
+
+
+@pytest.mark.parametrize(("family", "is_continued"), [("wave", True), ("other wave", False)])
+def test_only_a_restart_that_leads_to_a_gain_goes_on_to_convergence(monkeypatch, family, is_continued):
+    case, continued = Imitated(), []
+    base, converge = fit_jointly(case, values={"stiffness": IMITATION}), Search.converge
+    monkeypatch.setattr(Search, "converge", lambda self, fit: continued.append(fit) or converge(self, fit))
+    candidate = next(c for c in case.candidates if c.family == family)
+    start_from_priors(Search.of(case), base, RefitTask(candidate, np.array([0.1]), {}, 20.0))
+    assert bool(continued) == is_continued
 
 
 def test_none_begins_again_where_another_effect_gains_a_name(monkeypatch):

@@ -119,7 +119,9 @@ def _is_same_but_for(key: str, first: Candidate, second: Candidate) -> bool:
 
 
 def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None:
-    """Score of a candidate fitted to convergence from the priors of all shared nuisances that can mask it.
+    """Score of a candidate fitted from the priors of all shared nuisances that can mask it.
+
+    The fit goes on to convergence if it leads to a gain of half a threshold.
 
     Parameters
     ----------
@@ -136,11 +138,12 @@ def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None
     """
     candidates = (*fit.candidates, task.candidate)
     psi = np.concatenate([fit.psi, task.start])
-    values = fit.values | search.prior_values()
+    values, sought_cost = fit.values | search.prior_values(), search.least_cost_of_interest(fit)
 
     def compute() -> Fit | None:
         try:
-            return search.converge(search.fit(candidates, psi, values))
+            refit = search.fit(candidates, psi, values, sought_cost=sought_cost)
+            return search.converge(refit) if refit.cost < sought_cost else refit
         except SimulationError:
             return None
 

@@ -11,7 +11,7 @@ import numpy as np
 from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.links import links_of
-from turnout.simulate.matrices import TrackMatrices, add_rails, assemble, link_matrices, link_vector
+from turnout.simulate.matrices import TrackMatrices, add_rails, assemble, link_matrices, link_vector, rail_nodes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Iterable, Sequence
@@ -54,9 +54,17 @@ def matrices_of(track: Track, terms: Sequence[PhysicsTerm] = ()) -> TrackMatrice
     joins = frozenset(tuple(name for name, _ in link.ends) for link in links if len(link.ends) > 1)
     key = (
         track.support.tobytes(), track.elements_per_bay, track.pad_width, track.pad_loss_factor.tobytes(),
-        track.ballast_loss_factor.tobytes(), _unit_chairs(track).blade, extra, joins,
+        track.ballast_loss_factor.tobytes(), _blade_layout(track), extra, joins,
     )  # fmt: skip
     return _get_or_compute(_templates, key, lambda: MatrixTemplate(track, links)).fill(track, links)
+
+
+def _blade_layout(track: Track) -> tuple[int, ...]:
+    """Nodes and direction of the blade, on which links and rows depend; () without one.
+
+    A toe that moves between two bearers keeps them.
+    """
+    return () if track.blade is None else (*track.blade.nodes(track), track.blade.direction)
 
 
 def _unit_chairs(track: Track) -> Track:
@@ -127,9 +135,14 @@ class MatrixTemplate:
         return tuple(map(np.array, zip(*entries)))
 
     def _base_with_rail(self, track: Track) -> TrackMatrices:
-        """``base`` with the rail of ``track``, cached."""
-        key = track.rail, track.stretches, track.end_length, track.end_damping
-        return _get_or_compute(self.rail_bases, key, lambda: add_rails(self.base, track))
+        """``base`` with the rails of ``track``, cached."""
+        blade = _unit_chairs(track).blade
+        key = track.rail, track.stretches, track.end_length, track.end_damping, blade
+
+        def compute() -> TrackMatrices:
+            return add_rails(self.base if blade is None else replace(self.base, node=rail_nodes(track)), track)
+
+        return _get_or_compute(self.rail_bases, key, compute)
 
     def _link_entries(self, links: Sequence[Link]) -> tuple[np.ndarray, ...]:
         """Matrix entries of ``links`` of terms, cached."""

@@ -155,7 +155,7 @@ class ReceptancePriors:
     relative_step: float = prior(
         1e-3, "-", "change of a support's value, for derivatives of links that follow it", "numerical")
     seat_step: float = prior(0.01, "m", "of the derivative by the position of a sensor", "numerical")
-    toe_step: float = prior(0.01, "m", "of the derivative by the position of the toe", "numerical")
+    toe_step: float = prior(1e-7, "m", "of the change of the matrices by the position of the toe", "numerical")
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ class SimulationPriors:
     difference_size: float = prior(
         0.4, "ln", "of the size of an effect that counts as a prior sd there: a fifth of it", "numerical")
     max_in_switch: int = prior(
-        1000, "simulations", "of a passage over a switch in one search beside its base fit: three CPU minutes",
+        5000, "simulations", "of a passage over a switch in one search beside its base fit: a quarter of a CPU hour",
         "decisions/switch-panels.md")
     path_step: float = prior(0.01, "m", "of a fine path", "numerical")
     transfer_step: float = prior(

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from turnout.kernel_cache import kernel
 from turnout.mismatch.turnout.priors import RECEPTANCE
-from turnout.mismatch.turnout.receptance_model import ReceptanceModel
+from turnout.mismatch.turnout.receptance_model import linear_matrices
 from turnout.mismatch.turnout.receptance_observation import LINES, SHIFTED_LINES
 from turnout.mismatch.turnout.toe_position import TOE, with_toe
 from turnout.mismatch.turnout.track_parameters import COMMON_PARAMETERS, SUPPORT_PARAMETERS
@@ -24,8 +24,10 @@ from turnout.simulate.rail import element_mass
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from turnout.mismatch.turnout.receptance_model import ReceptanceModel
     from turnout.mismatch.turnout.receptance_observation import FrfPair
     from turnout.mismatch.turnout.zone import Zone
+    from turnout.simulate.matrices import TrackMatrices
     from turnout.simulate.rail import Rail
     from turnout.simulate.track import RailStretch
 
@@ -147,9 +149,32 @@ class ReceptanceSensitivity:
         if limits is None:
             return np.zeros_like(self.receptances)
         step = RECEPTANCE.toe_step if limits[1] > -limits[0] else -RECEPTANCE.toe_step
-        moved = ReceptanceModel(with_toe(track, {TOE: step}), self.model.terms)
-        beside = ReceptanceSensitivity(moved, self.row, self.seats, self.zone)
-        return (beside.receptances - self.receptances) / step
+        return self._change_with(linear_matrices(with_toe(track, {TOE: step}), self.model.terms)) / step
+
+    def _change_with(self, changed: TrackMatrices) -> np.ndarray:
+        r"""(n_pair, n_line) change of the receptances to first order, with matrices of the same rows [m/N].
+
+        .. math:: -u_m^T (\Delta K + i\omega \Delta C - \omega^2 \Delta M) u_e + \Delta w_m^T u_e + u_m^T \Delta w_e
+
+        and the change of the local compliance, with the displacements u under unit forces at impact and sensor and
+        their weights w.
+        """
+        before, u, (positions, (first, second)) = self.model.matrices, self._displacements, self._positions
+        changes = {name: getattr(changed, name) - getattr(before, name) for name in FACTOR}
+        diagonal, row = np.nonzero(np.any([change != 0.0 for change in changes.values()], axis=0))
+        entries = sum(FACTOR[name][:, None] * change[diagonal, row] for name, change in changes.items())
+        upper, lower = u[..., row], u[..., row + diagonal]
+        mirrored = np.where(diagonal > 0, upper, 0.0)
+        change = ((upper[first] * lower[second] + lower[first] * mirrored[second]) * entries).sum(axis=-1)
+        places, weights = list(positions), [(before.weights(p), changed.weights(p)) for p in positions]
+        for k, pair in enumerate(zip(first, second)):
+            for force, seat in (pair, pair[::-1]):
+                (rows, old), (new_rows, new) = weights[seat]
+                change[k] += u[force][:, new_rows] @ new - u[force][:, rows] @ old
+            force, seat = (places[p] for p in pair)
+            if not isinstance(force, tuple) and not isinstance(seat, tuple):
+                change[k] += changed.compliance(force, seat) - before.compliance(force, seat)
+        return change
 
     @property
     def gradients(self) -> np.ndarray:

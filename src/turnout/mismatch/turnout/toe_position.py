@@ -3,7 +3,7 @@
 A blade overhangs its first slide chair. The vibration of this free end depends on its length: 5 cm change receptances
 beside the toe, and what chairs that open change in them, by as much as that change itself. Drawings, creep and
 temperature leave a few centimetres open. Wheels pass the free end on the stock rail, so passages keep the toe of the
-file. The derivative of receptances is a difference quotient (``ReceptanceSensitivity.toe_gradients``).
+file. The derivative of receptances follows from that of the matrices (``ReceptanceSensitivity.toe_gradients``).
 """
 
 from __future__ import annotations
