@@ -24,7 +24,14 @@ from turnout.readers.csv_columns import are_names, name_and_unit, names_and_unit
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.lost_entries import CONTROL_CHARACTER
-from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_DATE_NAMES, START_NAMES
+from turnout.readers.metadata_names import (
+    CONDITION_QUANTITIES,
+    RECORD_COUNT_NAMES,
+    SAMPLE_COUNT_NAMES,
+    START_DATE_NAMES,
+    START_NAMES,
+    TEMPERATURES,
+)
 from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
 from turnout.readers.rate_units import rate_unit
@@ -36,12 +43,12 @@ from turnout.readers.stated_units import is_unit_name
 
 HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
-TEMPERATURES = {"rail_temperature", "air_temperature"}
 TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
 HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}
-NUMERIC_HEAD_NAMES = TEMPERATURES | {
-    *SAMPLE_COUNT_NAMES
-}  # a head line only if a number follows, else the name of a column
+NUMERIC_HEAD_NAMES = {
+    *TEMPERATURES, *SAMPLE_COUNT_NAMES,
+}  # a head line only if a number follows, else the name of a column  # fmt: skip
+NUMBER_WITH_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?\s*[^\d;,\t|]*")  # "12.5°C"
 GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 
 
@@ -154,6 +161,7 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     is_note = (
         plain_name in HEAD_NAMES
         or (plain_name in NUMERIC_HEAD_NAMES and is_number(value.split()[0] if value else ""))
+        or (plain_name in TEMPERATURES and bool(NUMBER_WITH_UNIT.fullmatch(value)))
         or _states_scale(name_with_unit, value)
     )
     if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):
@@ -164,6 +172,8 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
         return name_with_unit, value
     if plain_name in TIMES_OF_START and len(re.findall(r"\d+", value)) > 1 and not is_number(value):
         return plain_name, value  # "13 May 2026 10:00" is no number with a unit
+    if plain_name in CONDITION_QUANTITIES:
+        return plain_name, f"{value} {match[2] or ''}"
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 

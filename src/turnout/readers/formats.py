@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 
 from turnout.readers.claims import check_claims
+from turnout.readers.condition_units import with_converted_conditions
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 from turnout.readers.start_columns import with_axis_start
@@ -53,6 +54,7 @@ class Format:
             with_stated_units(with_named_sensitivities(with_named_factors(r))) if isinstance(r, RawRecord) else r
             for r in raw.records
         )
+        records = tuple(with_converted_conditions(r) if isinstance(r, RawRecord) else r for r in records)
         records = with_stated_starts(records)
         records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)
         if len(records) == 1:

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.condition_units import unread_conditions
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawRecord, Source
 
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many
 START = "start time"
+UNIT_REMEDY = "Write it as '12.5 °C', or as a number in °C"
 REMEDY = "Copy the file again; if it is whole, correct the entry in the logger's settings"
 
 
@@ -44,6 +46,13 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
             if not is_single(value) and arrays.setdefault(name, k) == k:
                 problem = f"its {name} is {len(value)} different values, and not one for each record"
                 yield _error(f"record {k + 1}", name, problem, source)
+    unread: dict[str, tuple[int, str]] = {}
+    for k, record, _ in read:
+        for name, text in unread_conditions(record.conditions, record.entries).items():
+            unread.setdefault(name, (k, text))
+    for name, (k, text) in unread.items():
+        problem = f"its {name} is {text[:40]!r}, no number in a known unit"
+        yield _error(f"record {k + 1}", name, problem, source, UNIT_REMEDY)
     everywhere = set.intersection(*(names for _, _, names in read))
     reported = set()
     for name in sorted(set.union(*(names for _, _, names in read)) - everywhere):
@@ -109,8 +118,8 @@ def _names(record: RawRecord) -> set[str]:
     return {*record.conditions, *([START] if has_start else [])}
 
 
-def _error(where: str, name: str, problem: str, source: Source) -> ReadError:
-    return source.error(where, problem, REMEDY, reason="start_unknown" if name == START else "condition_lost")
+def _error(where: str, name: str, problem: str, source: Source, remedy: str = REMEDY) -> ReadError:
+    return source.error(where, problem, remedy, reason="start_unknown" if name == START else "condition_lost")
 
 
 @lru_cache(maxsize=4096)

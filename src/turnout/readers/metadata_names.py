@@ -21,3 +21,6 @@ CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
 UNIT_NAMES = ("units", "unit", "channel_units")
 ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 RECORD_COUNT_NAMES = ("n_records", "n_record")
+TEMPERATURES = ("rail_temperature", "air_temperature")
+# Conditions with a quantity: in °C and m/s.
+CONDITION_QUANTITIES = {**dict.fromkeys(TEMPERATURES, "temperature"), "speed": "velocity"}

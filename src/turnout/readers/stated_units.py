@@ -13,6 +13,7 @@ from typing import Any
 
 from turnout.readers.entries import FREE_TEXT, MAX_ENTRIES, Entry
 from turnout.readers.entry_owners import CHANNEL, container_of, numbered_channels, owners_of, spaced_words
+from turnout.readers.metadata_names import CONDITION_QUANTITIES
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.units import Conversion, conversion
@@ -86,6 +87,23 @@ def is_unit_of_other(name: str) -> bool:
         False for a name without a word for a unit.
     """
     return any(UNIT_WORD.fullmatch(word) for word in words_of(name)) and not is_unit_name(name)
+
+
+@lru_cache(maxsize=4096)
+def is_unit_of_condition(name: str) -> bool:
+    """Whether a name means the unit of a condition, as "rail_temperature_unit", which is none of a channel "rail".
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+    """
+    is_of_condition = re.sub(r"[ -]", "_", name.strip().lower()).startswith(tuple(CONDITION_QUANTITIES))
+    return is_of_condition and any(UNIT_WORD.fullmatch(word) for word in words_of(name))
 
 
 @lru_cache(maxsize=4096)
@@ -213,6 +231,8 @@ def _owners_by_name(name: str, record: RawRecord) -> frozenset[int]:
 
 @lru_cache(maxsize=4096)
 def _states_unit(place: str, name: str) -> bool:
+    if is_unit_of_condition(name):
+        return False
     return is_unit_name(name) or is_unit_name(container_of(Entry(place, name, None)).rpartition("/")[2])
 
 

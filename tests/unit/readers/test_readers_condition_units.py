@@ -1,0 +1,75 @@
+"""Temperatures that a file notes are in °C whatever their unit is, and one that cannot be read is reported."""
+
+import h5py
+import numpy as np
+import pytest
+
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+FORCE, RAIL = np.random.default_rng(20261128).normal(size=(2, 60)).round(6)
+CHANNELS = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
+IN_SI = RawDescription(CHANNELS, rate=1000.0)
+
+
+def read_with(tmp_path, format, entries, lines=()):
+    path = tmp_path / f"a.{format}"
+    if format == "csv":
+        rows = [f"{a};{b}" for a, b in zip(FORCE, RAIL)]
+        path.write_text("\n".join([*lines, "force;rail", *rows, ""]), encoding="utf-8")
+    elif format == "h5":
+        with h5py.File(path, "w") as file:
+            file["force"], file["rail"] = FORCE, RAIL
+            file.attrs.update(entries)
+    else:
+        np.savez(path, force=FORCE, rail=RAIL, **{n: np.array(v) for n, v in entries.items()})
+    result = read(path.name, tmp_path, IN_SI)
+    (recording,) = result.recordings
+    return recording.conditions, result.errors
+
+
+TEXTS = {
+    "12.5": 12.5,
+    "12,5 °C": 12.5,
+    "54.5 °F": 12.5,
+    "54.5F": 12.5,
+    "285.65 K": 12.5,
+    "12.5℃": 12.5,
+    "-3 degC": -3.0,
+}
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_temperature_is_converted_from_its_unit(text, tmp_path):
+    """Before, 54.5 °F were 54.5 °C in the head of a text, and no temperature in other formats: without a message."""
+    number = text.rstrip("°CFK℃deg ")
+    unit = text.removeprefix(number).strip()
+    heads = [f"rail_temperature: {text}", f"# Rail temperature = {text}", f"rail_temperature [{unit}];{number}"]
+    cases = [("csv", {}, [line]) for line in heads[: 3 if unit else 2]]
+    cases += [(format, {"rail_temperature": text}, ()) for format in ("h5", "npz")]
+    if unit and "," not in text:
+        value = {"rail_temperature": float(number), "rail_temperature_unit": unit}
+        cases += [(format, value, ()) for format in ("h5", "npz")]
+    for case in cases:
+        conditions, errors = read_with(tmp_path, *case)
+        assert conditions["rail_temperature"] == pytest.approx(TEXTS[text], abs=1e-9), case
+        assert not errors
+
+
+@pytest.mark.parametrize("text", ["twelve", "12.5;13.0", "12.5 bar", "warm (12)"])
+def test_a_temperature_that_cannot_be_read_is_reported(text, tmp_path):
+    for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
+        _, errors = read_with(tmp_path, *case)
+        assert [error.reason for error in errors] == ["condition_lost"] and "°C" in errors[0].remedy
+
+
+@pytest.mark.parametrize("text", ["n/a", "-", "", "NaN"])
+def test_no_temperature_is_not_reported(text, tmp_path):
+    for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
+        assert not read_with(tmp_path, *case)[1]
+
+
+def test_a_speed_is_converted_from_its_unit(tmp_path):
+    for text, speed in (("33.3", 33.3), ("120 km/h", 120 / 3.6), ("33.3 m/s", 33.3)):
+        for case in (("csv", {}, [f"# speed: {text}"]), ("h5", {"speed": text}, ())):
+            assert read_with(tmp_path, *case)[0]["speed"] == pytest.approx(speed)
