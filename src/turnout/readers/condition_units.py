@@ -34,12 +34,12 @@ def with_converted_conditions(record: RawRecord) -> RawRecord:
     """
     of_entries = {name: e.value for e in record.entries if (name := _plain(e.name)) in TEMPERATURES}
     stated = {n: v for n, v in {**of_entries, **record.conditions}.items() if n in CONDITION_QUANTITIES}
-    numbers = {name: _converted(name, value, record.entries) for name, value in stated.items()}
+    numbers = {name: _number_in_unit(name, value, record.entries) for name, value in stated.items()}
     converted = {name: number for name, number in numbers.items() if number is not None}
     return replace(record, conditions={**record.conditions, **converted}) if converted else record
 
 
-def _converted(name: str, value: Any, entries: Sequence[Entry]) -> float | None:
+def _number_in_unit(name: str, value: Any, entries: Sequence[Entry]) -> float | None:
     """A condition in the unit of its quantity; None where nothing has to be or can be converted."""
     text = decode_text(value) if isinstance(value, bytes) else str(value)
     stated = number_and_unit(text) if isinstance(value, (str, bytes, int, float)) else None
