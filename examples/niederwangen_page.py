@@ -57,7 +57,7 @@ def term_rows(measured, results):
             for score in d.verdict.scores[:4]:
                 change = Change(score.family, score.candidate.where["since"], tuple(score.fit.psi[-_n(score) :]))
                 yield [
-                    m.section, campaign, score.family.replace("_", " "), f"{score.gain:.0f}", f"{score.explained:.0%}",
+                    m.section, campaign, score.family.replace("_", " "), f"{score.gain:z.0f}", f"{score.explained:.0%}",
                     numbers(change, score.fit.psi_se[-_n(score) :]),
                 ]  # fmt: skip
 
@@ -85,7 +85,7 @@ def date_rows(measured, results):
         _, runs, gains = results[m.section]
         for campaign, (_, d) in runs.items():
             if gains[campaign]:
-                text = ", ".join(f"by {c}: {g:.0f}" for c, g in gains[campaign].items())
+                text = ", ".join(f"by {c}: {g:z.0f}" for c, g in gains[campaign].items())
                 yield [m.section, campaign, d.verdict.scores[0].family.replace("_", " "), text]
 
 

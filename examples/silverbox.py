@@ -15,6 +15,7 @@ from turnout.mismatch import diagnose
 from turnout.mismatch.engine.fit_quality import fit_percent
 from turnout.mismatch.engine.latent_force import latent_law
 from turnout.mismatch.engine.reserved_data import predict_reserved
+from turnout.report.formatting import with_half_width
 
 RATE = 1e7 / 2**14  # [Hz]
 ARROW, START, LENGTH = 40000, 40650, 8692  # samples of the arrow; the first multisine and the length of each
@@ -59,8 +60,8 @@ def law_rows(case, diagnosis):
 
     yield ["linear base", "0", "", *fit_texts(diagnosis.base)]
     for score in diagnosis.scores or diagnosis.verdict.scores:
-        amount = f"{score.fit.psi[0]:.3f} ± {1.96 * score.fit.psi_se[0]:.3f}"
-        yield [score.family.replace("_", " "), f"{score.gain:.0f}", amount, *fit_texts(score.fit)]
+        amount = with_half_width(float(score.fit.psi[0]), 1.96 * float(score.fit.psi_se[0]), 3)
+        yield [score.family.replace("_", " "), f"{score.gain:z.0f}", amount, *fit_texts(score.fit)]
 
 
 def missing_force(case, fit):
@@ -162,9 +163,10 @@ nothing: the circuit is a little stiffer to one side. With the cubic spring the 
 
 ## What it does not show
 
-One oscillator with one effect: neither place nor train nor weather is asked for. `docs/blind.md` does that on
-simulated tracks, `docs/niederwangen_mismatch.md` on a real one. The sensor's offset is among the free numbers;
-forgotten, it hides under every law and one-sided springs gain (`tests/published/test_mismatch_silverbox.py`).
+One oscillator with one effect: the diagnosis did not have to find a position, a train or a temperature.
+`docs/blind.md` does that on simulated tracks, `docs/niederwangen_mismatch.md` on a real one. The offset of the sensor
+is a nuisance parameter. Without it every law absorbs a part of the offset, and one-sided springs gain evidence
+(`tests/published/test_mismatch_silverbox.py`).
 """
 
 

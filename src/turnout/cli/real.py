@@ -84,6 +84,8 @@ def _print_impacts(folder: Path) -> None:
 
 
 def _print_modes(beams: Iterable[Beam]) -> None:
+    from turnout.report.formatting import with_half_width
+
     for beam in beams:
         print(f"\nModes of the {beam.name} ({beam.origin}): found without prior knowledge of their number or frequency")
         print(f"{'published [Hz]':>15} {'found [Hz]':>22} {'published damping':>19} {'found damping [%]':>20} {'n':>4}")
@@ -94,8 +96,8 @@ def _print_modes(beams: Iterable[Beam]) -> None:
                 print(f"{published:>15} {'not found':>22} {zeta:>19}")
                 continue
             estimate, damping_estimate = mode.frequency, mode.damping
-            frequency = f"{estimate.mean:.2f} ± {(estimate.high - estimate.low) / 2:.2f}"
-            ratio = f"{100 * damping_estimate.mean:.3f} ± {50 * (damping_estimate.high - damping_estimate.low):.3f}"
+            frequency = with_half_width(estimate.mean, (estimate.high - estimate.low) / 2, 2)
+            ratio = with_half_width(100 * damping_estimate.mean, 50 * (damping_estimate.high - damping_estimate.low), 3)
             print(f"{published:>15} {frequency:>22} {zeta:>19} {ratio:>20} {estimate.n:>4}")
     print("± is the 95 % t interval of the mean over n responses, as if independent; those of one sensor are not.")
 

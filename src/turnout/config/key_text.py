@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from turnout.config.schema import Key
+from turnout.config.schema import Key, number_text
 
 
 def describe_key(key: Key) -> str:
@@ -23,19 +23,21 @@ def describe_key(key: Key) -> str:
     --------
     >>> describe_key(Key("number", "the paper's gate", minimum=0.0, maximum=1.0))
     "0 to 1: the paper's gate"
+    >>> describe_key(Key("number", "samples per second", "Hz", minimum=250.0, maximum=1e7))
+    '250 to 10,000,000 [Hz]: samples per second'
     """
     unit = "" if key.unit in ("", "-", "1") else f"[{key.unit}]"
     limits = ""
     if key.choices:
         limits = " or ".join(map(str, key.choices))
     elif key.above is not None:
-        limits = f"above {key.above:g}"
+        limits = f"above {number_text(key.above)}"
     elif key.minimum is not None and key.maximum is not None:
-        limits = f"{key.minimum:g} to {key.maximum:g}"
+        limits = f"{number_text(key.minimum)} to {number_text(key.maximum)}"
     elif key.minimum is not None:
-        limits = f"at least {key.minimum:g}"
+        limits = f"at least {number_text(key.minimum)}"
     elif key.maximum is not None:
-        limits = f"at most {key.maximum:g}"
+        limits = f"at most {number_text(key.maximum)}"
     head = " ".join(text for text in (limits, unit) if text)
     return f"{head}: {key.meaning}" if head else key.meaning
 

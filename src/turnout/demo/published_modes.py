@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from turnout.modal.frf import FrfMode
 
-# (frequency [Hz], damping [%]) of the seven modes in the makers' own showcase.
+# (frequency [Hz], damping [%]) of the seven modes as its makers publish them.
 SDYPY_BEAM = (
     (177.0, 0.86), (477.4, 0.20), (933.1, 0.15), (1535.5, 0.20), (2286.9, 0.28), (3162.4, 0.18), (4181.2, 0.15),
 )  # fmt: skip
@@ -75,7 +75,7 @@ def beam_modes(raw: Path | str) -> Iterator[Beam]:
         raise TurnoutError(f"{path} is not the published file. Delete it and run again")
     frequency, responses = np.load(path, allow_pickle=True)
     frequency, responses = np.asarray(frequency, float), np.asarray(responses, complex).reshape(-1, len(frequency))
-    yield _beam("beam of sdypy-EMA 0.27.3", "its makers' showcase", frequency, responses, SDYPY_BEAM, 4500.0)
+    yield _beam("beam of sdypy-EMA 0.27.3", "published by its makers", frequency, responses, SDYPY_BEAM, 4500.0)
     uff = read_frf("frf/beam.uff", raw)
     yield _beam("beam.uff of pyuff 2.4.2", "peaks read off its curves", uff.frequency, uff.frf, UFF_BEAM, 1400.0)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.report.axis import Axis
+from turnout.report.formatting import with_half_width
 from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.svg import Chart
 
@@ -111,8 +112,8 @@ def _table_row(published: float | None, damping: float | None, mode: FrfMode | N
     f, d = mode.frequency, mode.damping
     off = "–" if published is None else f"{100 * (f.mean / published - 1):+.3f}"
     return words | {
-        "found": f"{f.mean:.3f} ± {(f.high - f.low) / 2:.3f}",
+        "found": with_half_width(f.mean, (f.high - f.low) / 2, 3),
         "off": off,
-        "found_damping": f"{100 * d.mean:.3f} ± {50 * (d.high - d.low):.3f}",
+        "found_damping": with_half_width(100 * d.mean, 50 * (d.high - d.low), 3),
         "n": f.n,
     }

@@ -23,7 +23,7 @@ from turnout.stages.mismatch_curves import (
     reach_of,
 )
 from turnout.stages.mismatch_text import headline, interval, requirements_in_words, surface_sentence
-from turnout.stages.possible_effect import agreement_sentence, sentence_on_possible_effect
+from turnout.stages.possible_effect import agreement_sentence, scope_of_agreement, sentence_on_possible_effect
 from turnout.stages.values_off_file import sentences_on_values
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def finding_tables(
     low, high = band or (row["band_low_hz"], row["band_high_hz"])
     row |= {"band_low_hz": low, "band_high_hz": high, "wheel_within_m": reach}
     row |= _summary_columns(diagnosis, case, group, about)
-    row["sentence"] = _sentence(diagnosis, case, row)
+    row["sentence"] = _sentence(diagnosis, case, row, len(group.campaign.passages))
     ambiguity = case.ambiguity() if diagnosis.verdict.is_ambiguous else None
     if ambiguity:
         row["next_measurement"] = f"Measure {ambiguity.measurement}"
@@ -83,7 +83,7 @@ def finding_tables(
     }
 
 
-def _sentence(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]) -> str:
+def _sentence(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any], n_recorded: int) -> str:
     """The finding in words, with what follows from the values of the fit and what these recordings cannot show."""
     surface = (surface_sentence(s) for s in surface_estimates(case, diagnosis.fit))
     values = [*filter(None, surface), *sentences_on_values(case.nuisances, diagnosis.fit)]
@@ -91,7 +91,10 @@ def _sentence(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any]) -> 
         return " ".join([headline(row), *values])
     possible = sentence_on_possible_effect(diagnosis.verdict, case, row)
     limits = requirements_in_words(case.unmet_requirements)
-    return " ".join(filter(None, [agreement_sentence(headline(row), bool(values)), *values, possible, limits]))
+    agreement = agreement_sentence(headline(row), bool(values))
+    return " ".join(
+        [scope_of_agreement(agreement, row["n_passages"], n_recorded), *filter(None, [*values, possible, limits])]
+    )
 
 
 def _identity(group: Group, about: Mapping[str, Any], case: TrackCase) -> dict[str, Any]:

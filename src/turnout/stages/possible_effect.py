@@ -48,6 +48,45 @@ def sentence_on_possible_effect(verdict: Verdict, case: TrackCase, finding: Mapp
     return f"Possible, with {evidence} that a name needs: “{effect_in_words(term, finding)}.”"
 
 
+def scope_of_agreement(sentence: str, n_compared: int, n_recorded: int) -> str:
+    """The sentence of the answer "none", limited to the recordings that could be compared with the simulation.
+
+    A passage that resembles its simulation too little is not compared: the largest effects are among them.
+
+    Parameters
+    ----------
+    sentence : str
+        Of a diagnosis without a finding.
+    n_compared, n_recorded : int
+        Passages that the diagnosis compared, and that it was given.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> scope_of_agreement("Simulation and recordings agree.", 0, 6)  # doctest: +NORMALIZE_WHITESPACE
+    'Simulation and hammer tests agree. None of 6 passages could be compared with its simulation, so this answer
+    does not hold for trains and running surface: see the notes.'
+    >>> scope_of_agreement("Simulation and recordings agree.", 5, 6)
+    'Simulation and recordings agree. 1 of 6 passages could not be compared with its simulation: see the notes.'
+    """
+    n_left_out = n_recorded - n_compared
+    if n_left_out <= 0:
+        return sentence
+    if n_compared:
+        left_out = f"{n_left_out} of {n_recorded} passages"
+        return f"{sentence} {left_out} could not be compared with its simulation: see the notes."
+    passages = "The passage" if n_recorded == 1 else f"None of {n_recorded} passages"
+    verb = "could not be" if n_recorded == 1 else "could be"
+    sentence = sentence.replace("Simulation and recordings agree", "Simulation and hammer tests agree")
+    return (
+        f"{sentence} {passages} {verb} compared with its simulation, so this answer does not hold for trains and "
+        "running surface: see the notes."
+    )
+
+
 def agreement_sentence(sentence: str, has_other_values: bool) -> str:
     """The sentence of the answer "none", if other values than those of the files were needed for it.
 

@@ -222,6 +222,11 @@ def test_the_worst_comes_first_and_the_rest_is_folded():
     assert order[0] < order[1] and '<details><summary><span class="badge ok">OT' in text
 
 
+@pytest.mark.parametrize(("n_passages", "agreeing"), [(0, "hammer tests"), (3, "recordings")])
+def test_a_page_without_a_compared_passage_does_not_say_that_all_recordings_agree(n_passages, agreeing):
+    assert f"<h1>Simulation and {agreeing} agree</h1>" in page(finding("none", n_passages=n_passages))
+
+
 def test_the_arrow_points_at_the_place_or_the_sensor():
     drawing = TurnoutDrawing(SECTIONS)
     # ends lie 4 m beyond the sections, 20 pixels from the edges: -16 m at 20, 32.2 m at 900

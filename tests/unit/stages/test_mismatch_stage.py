@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -44,8 +45,6 @@ def impacts(tmp_path_factory, repository):
 
 @pytest.fixture
 def soft(folder, impacts):
-    import shutil
-
     shutil.copytree(impacts, folder / "raw")
     return folder
 
@@ -303,6 +302,17 @@ def test_a_file_that_cannot_be_read_is_said(soft):
     (soft / "raw/t1/hammer/2026-07-25/B_1.h5").write_bytes(b"nothing")
     tables = diagnose_turnout("t1")
     assert "B_1.h5" in said(tables) and tables["mismatch_findings"][0]["n_hammer_tests"] == 1
+
+
+def test_trains_that_differ_too_much_to_be_compared_do_not_agree(soft, monkeypatch):
+    """The dip is that large that no passage resembles its simulation; hammer tests do not show a dip."""
+    shutil.rmtree(soft / "raw")
+    small.write_hammer_tests(soft)
+    small.roll(soft, lambda track: (physics.SurfaceDip(18.3, 6e-4),), speeds=(90.0, 110.0))
+    (row,) = diagnose_turnout("t1")["mismatch_findings"]
+    assert (row["verdict"], row["n_passages"]) == ("none", 0)
+    assert row["sentence"].startswith("Simulation and hammer tests agree as well as those of intact turnouts do.")
+    assert "None of 2 passages could be compared with its simulation" in row["sentence"]
 
 
 def test_a_turnout_without_a_track_is_said(soft, capsys):

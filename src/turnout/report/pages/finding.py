@@ -58,6 +58,7 @@ def finding_page(
     first = findings[0] if findings else None
     return template.render(
         turnout=turnout,
+        agreeing="recordings" if any(f["n_passages"] for f in findings) else "hammer tests",
         visit=first["visit"] if first else "",
         newest=day(max((f["found_at_utc"] for f in findings), default=None)),
         drawing=position_panel(rows["sections"], findings, first) if findings else "",
