@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -14,15 +15,31 @@ sys.dont_write_bytecode = False
 import pytest
 
 
+KERNELS = pytest.StashKey[list[str]]()
+
+
+def used_kernels() -> list[str]:
+    """Compiled functions of the two packages that were called in this process, as module.name."""
+    modules = [m for name, m in list(sys.modules.items()) if name.partition(".")[0] in ("turnout", "turnout_blind")]
+    functions = {f"{f.__module__}.{f.__name__}" for m in modules for f in vars(m).values() if is_compiled(f)}
+    return sorted(functions)
+
+
+def is_compiled(function: object) -> bool:
+    """Whether this is a function of numba that has machine code, compiled here or read from its cache."""
+    return type(function).__module__.startswith("numba.") and bool(getattr(function, "signatures", ()))
+
+
 def pytest_collection(session: pytest.Session) -> None:
     """No search for unused objects while modules are imported: nearly all of them stay, and each search costs more."""
     gc.disable()
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Later searches leave out what has been imported."""
+    """Later searches leave out what has been imported; no test may simulate on import (``kernels_of_collection``)."""
     gc.freeze()
     gc.enable()
+    session.config.stash[KERNELS] = used_kernels()
 
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -66,3 +83,16 @@ def shared_recordings() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no recordings of loggers: {folder} does not exist")
     return folder
+
+
+
+@pytest.fixture(scope="session")
+def kernels_of_collection(request: pytest.FixtureRequest) -> list[str]:
+    """Compiled functions that were called while tests were collected."""
+    return request.config.stash[KERNELS]
+
+
+@pytest.fixture(scope="session", name="used_kernels")
+def used_kernels_now() -> Callable[[], list[str]]:
+    """Function that lists the compiled functions that were called so far."""
+    return used_kernels

@@ -1,5 +1,7 @@
 """Starts of effects that resonate: whatever the frequency, one of them must look enough like the resonance."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,13 @@ from turnout.simulate.frequency_response import receptance
 from turnout.simulate.matrices import assemble
 
 F = np.arange(40.0, 1000.0, 1.0)  # Hz
-G = receptance(assemble(uniform_track(24.0)), F, 12.0, 12.0)  # m/N
 SPAN = np.geomspace(60.0, 800.0, 300)  # Hz
+
+
+@cache
+def rail_receptance():
+    """At mid-track [m/N]; not computed on import, for which each process that collects tests would compile kernels."""
+    return receptance(assemble(uniform_track(24.0)), F, 12.0, 12.0)
 
 
 def mass_on_spring(mass, frequency, damping):
@@ -22,8 +29,8 @@ def mass_on_spring(mass, frequency, damping):
 
 def on_a_track(mass, frequency, damping):
     """Change of the receptance at the mass, -z g^2 / (1 + z g), on a rail of receptance g: a heavy mass holds it."""
-    z = mass_on_spring(mass, frequency, damping)
-    return z * G**2 / (1.0 + z * G)
+    z, g = mass_on_spring(mass, frequency, damping), rail_receptance()
+    return z * g**2 / (1.0 + z * g)
 
 
 def mounting(frequency, quality):
