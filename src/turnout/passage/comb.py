@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import linalg, ndimage
+from scipy import ndimage
+
+from turnout.passage.kinematics import passing_times
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,9 +28,14 @@ COMB_STEP = 0.2  # m, step of the grid along the train
 TOOTH_HALF_WIDTH = 2.4  # m either side of a wheel: less than bogie and gap, else a tooth could be a bogie
 N_TAPS = 25  # 2 TOOTH_HALF_WIDTH / COMB_STEP + 1
 SLOW_WIDTH = 2.5  # m, standard deviation of the slow part that is subtracted
+SLOW_REACH = int(4.0 * SLOW_WIDTH / COMB_STEP + 0.5)  # points either side that the slow part is a mean of
+BLOCK = 16  # motions of which profiles are computed at once; more fill the processor's cache
 RIDGE = 0.03  # ridge on the tooth, relative to its own power
 LEAD_LENGTH, TAIL_LENGTH = 12.0, 24.0  # m kept before and after the audible length
 CORRELATION_LENGTH = 0.5  # m, correlation length of the residual of a comb
+SLOW_WEIGHTS = np.exp(-0.5 / (SLOW_WIDTH / COMB_STEP) ** 2 * np.arange(-SLOW_REACH, SLOW_REACH + 1) ** 2)
+SLOW_WEIGHTS /= SLOW_WEIGHTS.sum()
+LAGS = np.abs(np.subtract.outer(np.arange(N_TAPS), np.arange(N_TAPS)))  # between two taps of a tooth
 
 
 @dataclass(frozen=True)
@@ -59,9 +66,8 @@ class Comb:
         fraction = offsets / COMB_STEP - whole
         np.add.at(teeth, whole, 1.0 - fraction)
         np.add.at(teeth, whole + 1, fraction)
-        padded = np.pad(teeth, (0, N_TAPS))
-        auto = np.array([teeth @ padded[lag : lag + teeth.size] for lag in range(N_TAPS)])
-        return cls(offsets, teeth, np.linalg.inv(linalg.toeplitz(auto) + RIDGE * auto[0] * np.eye(N_TAPS)))
+        auto = np.correlate(np.concatenate([teeth, np.zeros(N_TAPS - 1)]), teeth, "valid")
+        return cls(offsets, teeth, np.linalg.inv(auto[LAGS] + RIDGE * auto[0] * np.eye(N_TAPS)))
 
 
 @dataclass(frozen=True)
@@ -120,21 +126,37 @@ def profiles_at(envelopes: SensorEnvelopes, motions: Sequence[Motion]) -> Profil
         extents[:, 0] - middle,
         np.maximum(extents[:, 1] - extents[:, 0], 0.0),
     )  # 0: the train would have reversed
-    n = int((length.max() + LEAD_LENGTH + TAIL_LENGTH) / COMB_STEP) + 1
+    n_points = ((length + LEAD_LENGTH + TAIL_LENGTH) / COMB_STEP).astype(int) + 1
+    n = int(n_points.max())
     values = np.zeros((len(positions), len(motions), n))
     edges = np.arange(amplitude.shape[1] + 1) * step
-    for i, x in enumerate(positions):
-        total = np.concatenate([[0.0], np.cumsum(amplitude[i])]) * step
-        for k, motion in enumerate(motions):
-            m = min(int((length[k] + LEAD_LENGTH + TAIL_LENGTH) / COMB_STEP) + 1, n)
-            borders = motion.passing(origin[k] - LEAD_LENGTH + (np.arange(m + 1) - 0.5) * COMB_STEP, x)
-            mean = np.diff(np.interp(borders, edges, total)) / np.maximum(np.diff(borders), 1e-9)
-            values[i, k, :m] = mean - ndimage.gaussian_filter1d(mean, SLOW_WIDTH / COMB_STEP)
+    totals = [np.concatenate([[0.0], np.cumsum(row)]) * step for row in amplitude]
+    # a few motions at once, of profiles about as long
+    for k in np.split(np.argsort(n_points, kind="stable"), range(BLOCK, len(motions), BLOCK)):
+        stop = n_points[k].max()
+        grid = (origin[k] - LEAD_LENGTH)[:, None] + (np.arange(stop + 1) - 0.5) * COMB_STEP
+        reflected, of_block = _reflected_indices(n_points[k], stop), [motions[j] for j in k]
+        for i, x in enumerate(positions):
+            borders = passing_times(of_block, grid, x)
+            mean = np.diff(np.interp(borders, edges, totals[i]), axis=1) / np.maximum(np.diff(borders, axis=1), 1e-9)
+            extended = np.take_along_axis(mean, reflected, axis=1)
+            slow = ndimage.correlate1d(extended, SLOW_WEIGHTS, axis=1, mode="constant")[:, SLOW_REACH:-SLOW_REACH]
+            values[i, k, :stop] = np.where(np.arange(stop) < n_points[k][:, None], mean - slow, 0.0)
     # every sensor has the same weight, at any level
     values /= np.maximum(np.sqrt(np.mean(values**2, axis=2, keepdims=True)), 1e-12)
     size = 2 ** int(np.ceil(np.log2(n + N_TAPS + 8)))
     power = np.maximum(np.sum(values**2, axis=(0, 2)), 1e-12)
     return Profiles(tuple(motions), values, np.fft.rfft(values, size, axis=2), power, length, origin)
+
+
+def _reflected_indices(n_points: np.ndarray, stop: int) -> np.ndarray:
+    """(n_row, stop + 2 SLOW_REACH) indices of rows that go on behind both ends as if mirrored there.
+
+    Only the first ``n_points`` (n_row,) of each row count.
+    """
+    period = 2 * n_points[:, None]
+    index = np.arange(-SLOW_REACH, stop + SLOW_REACH) % period
+    return np.minimum(index, period - 1 - index)
 
 
 def explained_share(profiles: Profiles, comb: Comb, rows: np.ndarray, stride: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -313,14 +335,14 @@ def _best_share(profiles: Profiles, positions: np.ndarray, start: float) -> floa
     if not np.all(np.diff(positions) > 0.5):
         return -np.inf
     comb = Comb.of(positions - first)
-    lags = np.arange(N_TAPS) - N_TAPS // 2
     teeth = np.flatnonzero(comb.teeth)
+    # whole steps: the tooth takes up the remainder
+    index = np.rint((start + first + START_SHIFTS + LEAD_LENGTH) / COMB_STEP).astype(int) + N_TAPS
+    taps = (index - N_TAPS // 2)[:, None, None] + teeth[:, None] + np.arange(N_TAPS)
     total = np.zeros(START_SHIFTS.size)
     for values in profiles.values[:, 0]:
-        padded = np.pad(values, (N_TAPS, N_TAPS + comb.teeth.size))
-        for k, shift in enumerate(START_SHIFTS):
-            # whole steps: the tooth takes up the remainder
-            index = round((start + first + shift + LEAD_LENGTH) / COMB_STEP) + N_TAPS
-            correlation = comb.teeth[teeth] @ padded[index + teeth[:, None] + lags]
-            total[k] += correlation @ comb.inverse @ correlation
+        padded = np.zeros(values.size + 2 * N_TAPS + comb.teeth.size)
+        padded[N_TAPS : N_TAPS + values.size] = values
+        correlation = comb.teeth[teeth] @ padded[taps]
+        total += np.sum(correlation @ comb.inverse * correlation, axis=1)
     return float(total.max() / profiles.power[0])

@@ -14,7 +14,7 @@ from scipy import fft, ndimage
 from turnout.constants import KMH
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from turnout.config.settings.passage import PassageSettings
 
@@ -51,10 +51,7 @@ class Motion:
         >>> float(Motion(10.0, 1.0, 2.0).time(24.0))
         3.0
         """
-        distance = np.asarray(distance, dtype=float)
-        speed_squared = np.maximum(self.speed**2 + 2.0 * self.acceleration * distance, 1e-6)
-        # rationalised root: no cancellation as the acceleration goes to 0
-        return self.start + 2.0 * distance / (self.speed + np.sqrt(speed_squared))
+        return _time_at(self.speed, self.start, self.acceleration, np.asarray(distance, dtype=float))
 
     def distance(self, time: float | np.ndarray) -> np.ndarray:
         """Distance that the first axle has travelled from the origin at ``time``: the inverse of ``time()``. [m]
@@ -119,6 +116,38 @@ class Motion:
         """
         start = float(self.time(distance))
         return replace(self, speed=float(self.speed_at(start)), start=start)
+
+
+def _time_at(
+    speed: float | np.ndarray, start: float | np.ndarray, acceleration: float | np.ndarray, distance: np.ndarray
+) -> np.ndarray:
+    speed_squared = np.maximum(speed**2 + 2.0 * acceleration * distance, 1e-6)
+    # rationalised root: no cancellation as the acceleration goes to 0
+    return start + 2.0 * distance / (speed + np.sqrt(speed_squared))
+
+
+def passing_times(motions: Sequence[Motion], offsets: np.ndarray, position: float) -> np.ndarray:
+    """``Motion.passing`` of several motions. [s]
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        Motions, one for each row.
+    offsets : (n_motion, n) array of float
+        Distances of axles behind the first. [m]
+    position : float
+        Position along the turnout. [m]
+
+    Returns
+    -------
+    (n_motion, n) array of float
+        Times at which these axles pass the position. [s]
+    """
+    speed, start, acceleration, direction = (
+        np.array([[value] for value in values])
+        for values in zip(*((m.speed, m.start, m.acceleration, m.direction) for m in motions))
+    )
+    return _time_at(speed, start, acceleration, offsets + direction * position)
 
 
 @dataclass(frozen=True)

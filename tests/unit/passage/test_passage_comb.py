@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, passing_times, recording_of, rolling_noise, sensors_for
+from scipy.ndimage import gaussian_filter1d
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import Group, Pattern, Vehicle, offsets
@@ -43,6 +44,37 @@ def test_a_motion_that_would_turn_back_within_the_recording_has_no_length():
     assert np.isfinite(found.values).all()
 
 
+def test_profiles_of_many_motions_are_those_of_each():
+    """Means between grid points less their Gaussian mean, of one sensor and one motion at a time.
+
+    Motions of any length in any order, some backwards, some that brake, the shortest of 37 m: the slow part reaches
+    beyond both of its ends.
+    """
+    rng, positions = np.random.default_rng(3), [0.0, 5.0, 18.0]
+    levels = SimpleNamespace(step=0.002, amplitude=rng.exponential(size=(3, 3000)))
+    envelopes = SimpleNamespace(levels=levels, positions=positions, begin=1.0, end=4.5)
+    motions = [
+        Motion(v, 1.0 + 0.1 * rng.normal(), a, int(d)) for v in rng.permutation(np.geomspace(0.3, 70.0, 40))
+        for a, d in ((0.0, 1), (-0.2, -1))
+    ]  # fmt: skip
+    found = profiles_at(envelopes, motions)
+    edges = np.arange(3001) * 0.002
+    for k, m in enumerate(motions):
+        begin, end = (
+            m.distance(1.0) - m.direction * np.mean(positions),
+            m.distance(4.5) - m.direction * np.mean(positions),
+        )
+        n = int((max(end - begin, 0.0) + 36.0) / COMB_STEP) + 1
+        for i, x in enumerate(positions):
+            borders = m.passing(begin - 12.0 + (np.arange(n + 1) - 0.5) * COMB_STEP, x)
+            total = np.interp(borders, edges, 0.002 * np.concatenate([[0.0], np.cumsum(levels.amplitude[i])]))
+            mean = np.diff(total) / np.diff(borders)
+            fast = mean - gaussian_filter1d(mean, 2.5 / COMB_STEP)
+            expected = np.zeros(found.values.shape[2])
+            expected[:n] = fast / np.sqrt(np.sum(fast**2) / expected.size)
+            assert found.values[i, k] == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
 def test_the_true_comb_explains_all_and_gives_its_tooth_back():
     places = offsets((LONG, SHORT, LONG, LONG))
     profiles, comb = laid(places + 6.0), Comb.of(places)
@@ -53,6 +85,20 @@ def test_the_true_comb_explains_all_and_gives_its_tooth_back():
     teeth, rest = teeth_of(profiles, comb, float(starts[k]))
     assert np.abs(teeth[0] - TOOTH).max() < 0.06 * TOOTH.max()
     assert np.sum(rest**2) < 0.07 * profiles.power[0]
+
+
+@pytest.mark.parametrize("steps", [-2, 2])
+def test_a_row_may_start_two_steps_before_or_behind_and_no_further(steps):
+    """Before the axles move, the share is the best of those at the five starts."""
+    row = (LONG, SHORT, LONG, LONG)
+    places = offsets(row)
+    profiles = laid(places + 6.0, noise=0.5)
+    share, starts = explained_share(profiles, Comb.of(places), np.arange(1))
+    best = int(np.argmax(share[0]))
+    for further in (0, int(np.sign(steps))):
+        k = best + steps + further
+        _, before, _ = fit_shape(profiles, row, places, float(starts[k]))
+        assert before == pytest.approx(share[0, k - 2 : k + 3].max(), rel=1e-9)
 
 
 def test_a_comb_in_noise_explains_no_more_than_its_free_numbers_do():
