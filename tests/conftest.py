@@ -16,7 +16,6 @@ sys.dont_write_bytecode = False
 
 import pytest
 
-
 KERNELS = pytest.StashKey[list[str]]()
 
 
@@ -85,7 +84,6 @@ def shared_recordings() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no recordings of loggers: {folder} does not exist")
     return folder
-
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,9 @@ from turnout.simulate.spline_kernel import second_differences
 
 
 def test_no_test_simulates_while_it_is_collected(kernels_of_collection):
-    assert not kernels_of_collection, "called by a module of tests on import; a fixture or a cached function calls later"
+    assert not kernels_of_collection, (
+        "called on import by a module of tests: a fixture or a cached function calls later"
+    )
 
 
 def test_a_called_kernel_is_listed(used_kernels):
