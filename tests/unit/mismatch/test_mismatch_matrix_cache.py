@@ -58,17 +58,18 @@ def test_a_skeleton_does_not_know_which_track_came_first():
 
 
 @pytest.mark.parametrize("terms", [(), (physics.HeelSupport(22, 23, 0.3),)], ids=["none", "heel"])
-def test_tracks_that_differ_in_their_chairs_share_a_skeleton_and_are_the_assembled_ones(terms):
+def test_tracks_that_differ_in_chairs_and_toe_share_a_skeleton_and_are_the_assembled_ones(terms):
+    """The toe lies between the supports at 6.6 and 7.2 m: within a tenth of a bay it would be on one of them."""
     track = uniform_track(24.0)
     matrix_cache._templates.clear()
-    for stiffness, damping in ((3e8, 3e4), (2e8, 5e4)):
-        blade = Blade(6.7, 13.0, 18.0, track.rail, stiffness, damping, 2.0, 0.5)
+    for toe, stiffness, damping in ((6.7, 3e8, 3e4), (6.73, 2e8, 5e4), (6.7, 2e8, 5e4)):
+        blade = Blade(toe, 13.0, 18.0, track.rail, stiffness, damping, 2.0, 0.5)
         full, filled = (f(track.with_(blade=blade), terms) for f in (assemble, matrices_of))
         assert filled.index == full.index
         for name in ("mass", "damping", "stiffness"):
             a, b = getattr(full, name), getattr(filled, name)
             assert b == pytest.approx(a, rel=1e-9, abs=1e-9 * np.abs(a).max())
-        assert filled.blade_rails == full.blade_rails
+        assert filled.blade_rails == full.blade_rails and np.array_equal(filled.node, full.node)
     assert len(matrix_cache._templates) == 1
 
 
