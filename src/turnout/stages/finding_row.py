@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from turnout import physics
-from turnout.stages.mismatch_text import UNFINISHED
+from turnout.stages.mismatch_text import UNFINISHED, whole_sentence
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -39,6 +39,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     if verdict.answer == "numerics":
         return f"The simulation is not fine enough to be compared: {verdict.reason}."
     if verdict.answer == "unknown":
+        if verdict.cause == "all trains":
+            return whole_sentence(verdict.reason)
         if not verdict.is_finished:
             return f"{UNFINISHED}: {verdict.reason}. The simulation differs most {location_text(diagnosis)}."
         if verdict.is_ambiguous:

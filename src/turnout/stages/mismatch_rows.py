@@ -191,6 +191,7 @@ def _verdict_evidence(verdict: Verdict) -> dict:
         "reason": verdict.reason,
         "is_finished": verdict.is_finished,
         "is_ambiguous": verdict.is_ambiguous,
+        "cause": verdict.cause,
         "posterior": {k: _plain(v) for k, v in _largest(verdict.posterior)},
         "ranking": [{"family": s.family, "nats": _plain(s.gain), "explained": _plain(s.explained)} for s in top_scores],
         "by_condition": {k: _plain(v) for k, v in top_scores[0].by_condition.items()} if top_scores else {},

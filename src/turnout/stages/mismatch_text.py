@@ -194,10 +194,32 @@ def title(finding: Mapping[str, Any]) -> str:
         evidence = json.loads(finding.get("evidence_json") or "{}")
         if evidence.get("is_ambiguous"):
             return f"Something is there {where}, and these recordings cannot name it: {evidence['reason']}."
+        if evidence.get("cause") == "all trains":
+            return whole_sentence(evidence["reason"])
         if not evidence.get("is_finished", True):
             return f"{UNFINISHED}, as the search was not finished. The simulation differs most {where}."
         return f"Something is missing {where}, and no known effect explains it."
     return finding["sentence"] or ""
+
+
+def whole_sentence(text: str) -> str:
+    """The text with a capital and a full stop.
+
+    Parameters
+    ----------
+    text : str
+        Not empty.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> whole_sentence("no passage resembles the simulation of its train")
+    'No passage resembles the simulation of its train.'
+    """
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def requirements_in_words(unexamined: Sequence[Any]) -> str:

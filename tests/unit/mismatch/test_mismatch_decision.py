@@ -77,6 +77,7 @@ CASES = {
     "excess_without_candidate": ([score(gain=11.0)], 1.1, {}),
     "sensors_shake_without_wheel": ([], 0.9, {"disturbed": True, "mismatched_trains": ("ic3",)}),
     "train_unlike_its_file": ([], 0.9, {"mismatched_trains": ("ic3",)}),
+    "no_train_matches": ([], 0.9, {"no_train_matches": True, "strained": "mass of the rail"}),
     "no_tolerance_explains_it": ([], 0.9, {"strained": "mass of the rail"}),
     "component_differs_under_trains": ([score(gain=11.0)], 0.9, {"local_change": 12.1}),
     "component_unlike_its_kind": ([score(gain=11.0)], 0.9, {"local_deviation": 12.1}),

@@ -22,6 +22,7 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
 from turnout.mismatch.turnout.screening import _passage_channel_changes
 from turnout.physics.transfer import TransferTerm
+from turnout.stages.finding_row import sentence
 
 
 @pytest.fixture(scope="module")
@@ -364,6 +365,19 @@ def test_a_train_that_is_unlike_its_type_is_reported_and_localized(campaign):
     assert most.mismatched_trains == (
         "heavy",
     )  # a polygon that lifts its wheels shows at some speeds and not at others
+
+
+def test_trains_none_of_which_is_like_its_simulation_are_no_sign_of_an_intact_turnout(campaign):
+    """A dip of a millimetre, or wrong files of all vehicles: hammer tests alone agree, and no train was compared."""
+    light, heavy = (next(p.vehicle for p in campaign.passages if p.train == t) for t in ("light", "heavy"))
+    swapped = [replace(p, vehicle=heavy if p.train == "light" else light) for p in campaign.passages]
+    case = TrackCase(replace(campaign, passages=tuple(swapped)))
+    assert not case.aligned_passages and case.no_train_matches and case.mismatched_trains == ()
+    diagnosis = diagnose(case)
+    assert diagnosis.verdict.answer == "unknown" and "no_train_matches" in diagnosis.verdict.trail
+    assert diagnosis.where is None and sentence(diagnosis).startswith("No passage resembles the simulation")
+    single = TrackCase(replace(campaign, passages=tuple(swapped[:1])))
+    assert not single.aligned_passages and not single.no_train_matches  # it may be another train
 
 
 def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(intact, monkeypatch):

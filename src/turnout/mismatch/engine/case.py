@@ -53,6 +53,8 @@ class Case:
         Recordings that are not used, since a source other than the known inputs shows in them.
     mismatched_trains : tuple of str
         Trains, most recordings of which do not agree with their vehicle file.
+    no_train_matches : bool
+        Several trains were recorded, and none agrees with its simulation: no recording of a train is fitted.
     reservation : str
         Why diagnoses of such a case are not proven on concealed data; "" where they are. Its names are withheld.
     measured_range : (float, float)
@@ -72,6 +74,7 @@ class Case:
     cell_level: Mapping[str, float] = {}
     disturbed_recordings: tuple = ()
     mismatched_trains: tuple = ()
+    no_train_matches: bool = False
     reservation: str = ""
     measured_range = (-np.inf, np.inf)
 

@@ -62,6 +62,9 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "all sensors vibrate while no wheel is near", LOCATED, cause="clock"),
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
          "most passages of {e.train_names} do not fit its vehicle file", LOCATED, cause="train"),
+    Rule("no_train_matches", lambda e: e.shows_nothing and e.no_train_matches, "unknown",
+         "no passage resembles the simulation of its train: a large fault of the track, or wrong vehicle files or "
+         "positions of sensors", LOCATED, cause="all trains"),
     Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
          "the recordings are explained only with a value too far from its file: {e.strained}", LOCATED),
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",

@@ -81,6 +81,8 @@ class EffectEvidence:
         Another source than a train shakes the sensors in some recordings. These are not fitted.
     mismatched_trains : tuple of str
         Trains that do not agree with their vehicle file, so that most of their recordings are not fitted.
+    no_train_matches : bool
+        Several trains were recorded, and none agrees with its simulation: no recording of a train is fitted.
     strained : str
         Value of the base model that no tolerance explains, in words; "" if there is none.
     local_change : float
@@ -99,6 +101,7 @@ class EffectEvidence:
     residual_excess: float = 1.0
     disturbed: bool = False
     mismatched_trains: tuple[str, ...] = ()
+    no_train_matches: bool = False
     strained: str = ""
     local_change: float = 0.0
     local_deviation: float = 0.0

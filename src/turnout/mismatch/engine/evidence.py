@@ -238,7 +238,7 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     excess = worst_excess(search, fit)
     strained = None if fit.candidates else strained_value(case, fit, settings.threshold)
     facts: dict[str, Any] = {"disturbed": bool(case.disturbed_recordings), "strained": str(strained or "")}
-    facts["mismatched_trains"] = case.mismatched_trains
+    facts |= {"mismatched_trains": case.mismatched_trains, "no_train_matches": case.no_train_matches}
     for fact, gains in (("local_change", local_changes), ("local_deviation", local_deviations)):
         facts[fact] = 0.0 if fit.candidates else evidence_of_any_component(gains(case, fit))
     facts["ambiguity"] = None if fit.candidates else case.ambiguity()

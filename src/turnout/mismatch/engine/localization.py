@@ -80,7 +80,8 @@ def locate(
     leader : Score or None
         The best candidate that got no name.
     cause : str
-        "clock" or "train" if recordings that were not fitted are the cause of the verdict: they give the location then.
+        "clock", "train" or "all trains" if recordings that were not fitted are the cause of the verdict: they give the
+        location then. All trains together give none.
     absorbed : StrainedValue or None
         The value of the base model that has absorbed the cause. What it is fixed to is the location, unless the
         residual is above the control level and has more evidence for one location over all others than the value has
@@ -95,6 +96,8 @@ def locate(
     if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed_recordings)
         return Location("clock", names, max(d.excess for d in case.disturbed_recordings))
+    if cause == "all trains":
+        return None
     if cause == "train":
         return Location("train", case.mismatched_trains[0], 0.0, train=case.mismatched_trains[0])
     floor = {name: case.control_level.get(name, 1.0) for name in fit.level}

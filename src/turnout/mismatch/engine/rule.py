@@ -26,7 +26,7 @@ class Rule(Generic[Facts]):
     page : str
         Page below ``docs`` that gives the reason for the rule.
     cause : str
-        "clock" or "train" if the answer rests on recordings that were not fitted, else "".
+        "clock", "train" or "all trains" if the answer rests on recordings that were not fitted, else "".
     """
 
     name: str

@@ -25,8 +25,8 @@ class Verdict:
 
     ``answer`` of ``ANSWERS``. ``names`` are the families (two for a or b). ``grade`` "A" or "B". ``probability`` of the
     answer. ``posterior`` over families, "none" and "unknown". ``scores`` best of each family. ``reason`` in words.
-    ``cause`` is "clock" or "train" if the verdict rests on recordings that were not fitted, else "". ``trail`` are the
-    names of the rules that applied, in order.
+    ``cause`` is "clock", "train" or "all trains" if the verdict rests on recordings that were not fitted, else "".
+    ``trail`` are the names of the rules that applied, in order.
     """
 
     answer: str

@@ -97,7 +97,8 @@ class TrackCase(PredictedCase):
         self.reuses_derivatives = any(sensitivity.is_in_switch(predictor, a) for a in data.aligned_passages.values())
         self.max_simulations = SIMULATION.max_in_switch if self.reuses_derivatives else None
         self.reservation = reservation(predictor.zone.turnout)
-        self.mismatched_trains, self.measured_range = data.mismatched_trains, data.measured_range
+        self.mismatched_trains, self.no_train_matches = data.mismatched_trains, data.no_train_matches
+        self.measured_range = data.measured_range
         self.control_level = {"hammer": data.settings.hammer_control, "passage": data.settings.passage_control}
         self.cell_level = {"passage": data.settings.cell_control}
         self.log_mass_ratios: Mapping[str, float] = {}

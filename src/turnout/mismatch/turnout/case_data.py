@@ -83,6 +83,14 @@ class CaseData:
         )
 
     @property
+    def no_train_matches(self) -> bool:
+        """Whether several passages were recorded, and none correlates with the simulation of its train.
+
+        A single one may be of another train.
+        """
+        return len(self.unmatched) > 1 and not self.aligned_passages
+
+    @property
     def measured_range(self) -> tuple[float, float]:
         """First and last position of sensors and impacts [m]."""
         positions = self.campaign.positions()
