@@ -11,10 +11,16 @@ from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import CONDITION_QUANTITIES, TEMPERATURES
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import number_and_unit
-from turnout.readers.stated_units import is_unit_of_condition, known_unit
+from turnout.readers.stated_units import conditions_of_unit, known_unit
+from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
 
-NO_VALUE = frozenset(("", "-", "--", "none", "n/a", "na", "nan", "null", "unknown", "?"))
+# Notations of units of temperature: "°C", "ºC", "oC", "deg. C", "degrees Celsius", "c".
+TEMPERATURE_UNIT = re.compile(
+    r"(?:[°º˚o]|deg(?:r(?:ees?)?)?\.?|grad(?:er|en|i)?)?[\s_]*(c|f|k)(?:elsius|ahrenheit|elvin)?", re.IGNORECASE
+)
+SCALES = {"c": "°C", "f": "°F", "k": "K"}
+SEPARATORS = "[]() \t;,|"  # between number and unit, and around it
 
 
 def with_converted_conditions(record: RawRecord) -> RawRecord:
@@ -41,17 +47,19 @@ def with_converted_conditions(record: RawRecord) -> RawRecord:
 
 def _number_in_unit(name: str, value: Any, entries: Sequence[Entry]) -> float | None:
     """A condition in the unit of its quantity; None where nothing has to be or can be converted."""
-    text = decode_text(value) if isinstance(value, bytes) else str(value)
+    text = (decode_text(value) if isinstance(value, bytes) else str(value)).replace("\u2212", "-")
     stated = number_and_unit(text) if isinstance(value, (str, bytes, int, float)) else None
     if stated is None:
         return None
     number, unit = stated
-    beside = (str(e.value) for e in entries if is_unit_of_condition(e.name) and _plain(e.name).startswith(name))
-    unit = unit.strip("[]() ") or next(beside, "")
+    beside = (str(e.value) for e in entries if name in conditions_of_unit(e.name))
+    unit = (unit.strip(SEPARATORS) or next(beside, "")).strip(SEPARATORS)
     if not unit:
         return number
-    unit = unicodedata.normalize("NFKC", unit)  # the one character of degrees Celsius
-    conversion = known_unit(unit) or known_unit(f"°{unit}")
+    unit = unicodedata.normalize("NFKC", unit)  # "℃" is one character
+    if match := TEMPERATURE_UNIT.fullmatch(unit):
+        unit = SCALES[match[1].lower()]
+    conversion = known_unit(unit)
     if conversion is None or conversion.dimension != CONDITION_QUANTITIES[name]:
         return None
     return number * conversion.scale + conversion.offset
@@ -79,4 +87,7 @@ def unread_conditions(conditions: Mapping[str, Any], entries: Sequence[Entry]) -
     """
     of_entries = {_plain(e.name): e.value for e in entries}
     texts = {name: conditions.get(name, of_entries.get(name)) for name in TEMPERATURES}
-    return {n: v.strip() for n, v in texts.items() if isinstance(v, str) and v.strip().casefold() not in NO_VALUE}
+    texts = {name: text.strip() for name, text in texts.items() if isinstance(text, str)}
+    return {
+        name: text for name, text in texts.items() if re.search(r"\w", text) and text.casefold() not in PLACEHOLDERS
+    }

@@ -173,7 +173,7 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     if plain_name in TIMES_OF_START and len(re.findall(r"\d+", value)) > 1 and not is_number(value):
         return plain_name, value  # "13 May 2026 10:00" is no number with a unit
     if plain_name in CONDITION_QUANTITIES:
-        return plain_name, f"{value} {match[2] or ''}"
+        return plain_name, f"{value} {match[2] or ''}".strip()
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 

@@ -90,8 +90,8 @@ def is_unit_of_other(name: str) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def is_unit_of_condition(name: str) -> bool:
-    """Whether a name means the unit of a condition, as "rail_temperature_unit", which is none of a channel "rail".
+def conditions_of_unit(name: str) -> frozenset[str]:
+    """Conditions of which a name means the unit, as of "rail_temperature_unit", which is none of a channel "rail".
 
     Parameters
     ----------
@@ -100,10 +100,27 @@ def is_unit_of_condition(name: str) -> bool:
 
     Returns
     -------
-    bool
+    frozenset of str
+        Names of conditions; of all temperatures for "temperature_unit".
+
+    Examples
+    --------
+    >>> sorted(conditions_of_unit("Rail temperature unit")), sorted(conditions_of_unit("temperature_unit"))
+    (['rail_temperature'], ['air_temperature', 'rail_temperature'])
+    >>> sorted(conditions_of_unit("rail_unit")), sorted(conditions_of_unit("rail_temperature"))
+    ([], [])
     """
-    is_of_condition = re.sub(r"[ -]", "_", name.strip().lower()).startswith(tuple(CONDITION_QUANTITIES))
-    return is_of_condition and any(UNIT_WORD.fullmatch(word) for word in words_of(name))
+    words = words_of(name)
+    if not any(map(UNIT_WORD.fullmatch, words)):
+        return frozenset()
+    plain = re.sub(r"[ -]", "_", name.strip().lower())
+    others = {word for word in words if not UNIT_WORD.fullmatch(word)}
+
+    def is_meant(condition: str) -> bool:
+        of_condition = condition.split("_")
+        return plain.startswith(condition) or (of_condition[-1] in others and others <= {*of_condition})
+
+    return frozenset(filter(is_meant, CONDITION_QUANTITIES))
 
 
 @lru_cache(maxsize=4096)
@@ -231,8 +248,6 @@ def _owners_by_name(name: str, record: RawRecord) -> frozenset[int]:
 
 @lru_cache(maxsize=4096)
 def _states_unit(place: str, name: str) -> bool:
-    if is_unit_of_condition(name):
-        return False
     return is_unit_name(name) or is_unit_name(container_of(Entry(place, name, None)).rpartition("/")[2])
 
 
@@ -265,6 +280,10 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
         texts = _texts(entry.value)
         owners = owners_of(entry, record.entries, record.names)
         owners = owners or numbered_channels(entry.name, record.entries, n)
+        if of_conditions := {text.rpartition("_")[2] for text in conditions_of_unit(entry.name)}:
+            owners = frozenset(i for i in owners if not of_conditions.isdisjoint(words_of(record.names[i])))
+            if not owners:
+                continue
         in_chain = bool(_words(entry.name) & CHAIN_WORDS)
         if owners and len(texts) == 1:
             if index in owners:

@@ -28,7 +28,22 @@ PLAUSIBLE_RATES = (10.0, 1e8)  # Hz: no vibration is sampled outside; a possible
 USUAL_RATES = (100.0, 1e6)  # Hz: "25.600" is 25600 and not 25.6; a number without unit outside may have another one
 MIN_EPOCH = 10**8  # s since 1970
 PREFIXES_ALONE = tuple("kKMGnuµ\u03bc")  # without their unit, as in "20k"; "m" would be metres
-PLACEHOLDERS = {"", "-", "none", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set", "unset", "[]"}
+PLACEHOLDERS = {
+    "",
+    "-",
+    "none",
+    "n/a",
+    "n.a.",
+    "na",
+    "?",
+    "unknown",
+    "nan",
+    "null",
+    "undefined",
+    "not set",
+    "unset",
+    "[]",
+}
 ANY_UNIT = tuple(
     RateUnit(is_step, scale)
     for is_step, scale in (

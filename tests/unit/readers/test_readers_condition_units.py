@@ -56,6 +56,33 @@ def test_a_temperature_is_converted_from_its_unit(text, tmp_path):
         assert not errors
 
 
+@pytest.mark.parametrize(
+    "unit", ["°c", "c", "ºC", "oC", "deg. C", "degrees C", "degrees Celsius", ";°C", "\t°C", ",°C"]
+)
+def test_a_unit_of_temperature_has_many_notations(unit, tmp_path):
+    """Before, a temperature in one of these was lost; the sign of −3 may be a minus sign, too."""
+    for number, value in (("12.5", 12.5), ("\u22123", -3.0)):
+        lines = [f"rail_temperature: {number} {unit}"]
+        conditions, errors = read_with(tmp_path, "csv", {}, lines)
+        assert conditions["rail_temperature"] == value and not errors
+
+
+@pytest.mark.parametrize("name", ["temperature_unit", "Temperature unit", "temperature_units", "rail temperature unit"])
+def test_a_unit_of_all_temperatures_is_that_of_each(name, tmp_path):
+    """Before, 54.5 °F were 54.5 °C without a message."""
+    conditions, errors = read_with(tmp_path, "h5", {"rail_temperature": 54.5, name: "°F"})
+    assert conditions["rail_temperature"] == pytest.approx(12.5) and not errors
+
+
+@pytest.mark.parametrize("name", ["temperature", "rail_temperature"])
+def test_the_unit_of_a_channel_with_the_name_of_a_condition_is_that_of_the_channel(name, tmp_path):
+    description = RawDescription((RawChannel(name, name, "temperature", "°C"),), rate=1000.0, kind="passage")
+    for stated, reasons in (("°C", []), ("°F", ["unit_unknown"])):
+        rows = [f"{a}" for a in FORCE]
+        (tmp_path / "a.csv").write_text("\n".join([f"{name}_unit: {stated}", name, *rows, ""]), encoding="utf-8")
+        assert [error.reason for error in read("a.csv", tmp_path, description).errors] == reasons
+
+
 @pytest.mark.parametrize("text", ["twelve", "12.5;13.0", "12.5 bar", "warm (12)"])
 def test_a_temperature_that_cannot_be_read_is_reported(text, tmp_path):
     for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
@@ -63,7 +90,7 @@ def test_a_temperature_that_cannot_be_read_is_reported(text, tmp_path):
         assert [error.reason for error in errors] == ["condition_lost"] and "°C" in errors[0].remedy
 
 
-@pytest.mark.parametrize("text", ["n/a", "-", "", "NaN"])
+@pytest.mark.parametrize("text", ["n/a", "n.a.", "-", "---", "?", "", "NaN"])
 def test_no_temperature_is_not_reported(text, tmp_path):
     for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
         assert not read_with(tmp_path, *case)[1]
