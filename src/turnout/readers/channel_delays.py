@@ -9,13 +9,17 @@ from turnout.readers.entry_owners import numbered_channels, owners_of, spaced_wo
 from turnout.readers.rate_units import SAMPLES, rate_unit, words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
+from turnout.readers.stated_units import known_unit
 
 DELAY = re.compile(r"delay|latenc|skew$|^lag$|verzog|retard|forsink|fordroj|vertraging|^timeshift$")
 # Times at which the samples of a channel begin.
 BEGIN = re.compile(r"\b(?:start offset|t ?0|t start|pre ?trig(?:ger)?)\b")
+PRE_TRIGGER = re.compile(r"\bpre ?trig")  # a setting of the channel that triggers: of the others it says nothing
 SHIFT = re.compile(rf"{BEGIN.pattern}|\btime (?:shift|offset)\b")
 # Delays before a recording begins, and what is beside a delay.
-OTHER_DELAY = re.compile(r"trig|start|hold|wait|settl|warm|auslos|unit|einheit|type|mode|name|enabl|max|toler|alarm")
+OTHER_DELAY = re.compile(
+    r"trig|start|hold|wait|settl|warm|auslos|unit|einheit|type|mode|name|enabl|max|toler|alarm|level"
+)
 MAX_LISTED = 4  # channels in one message
 MAX_LAG = 0.5  # of a sampling step that the first samples may be apart: converters that take turns are
 MAX_SHARE = 0.01  # of a sampling step that delays may differ: 1.8° of phase at half the sampling rate
@@ -25,8 +29,8 @@ DELAY_REMEDY = "Let the export shift the samples; if they are in time already, n
 def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     """What the metadata of a record state about delays that differ between its channels.
 
-    A number without a unit counts as seconds. No unit in use is longer, so a difference far below a sampling step in
-    seconds is negligible in any of them.
+    A number without a known unit counts as seconds. No unit in use is longer, so a difference far below a sampling
+    step in seconds is negligible in any of them.
 
     Parameters
     ----------
@@ -56,7 +60,7 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
         elif owners and len(numbers) == 1:
             delays.setdefault(name, {}).update(dict.fromkeys(owners, numbers[0]))
     for name, of_channels in delays.items():
-        values = [of_channels.get(i, 0.0) for i in rows]
+        values = [of_channels.get(i, 0.0) for i in rows if i in of_channels or not PRE_TRIGGER.search(name)]
         if values and (max(values) - min(values)) * rate > (MAX_LAG if BEGIN.search(name) else MAX_SHARE):
             listed = ", ".join(f"{record.names[i]!r} {value:g} s" for i, value in [*zip(rows, values)][:MAX_LISTED])
             problem = f"its metadata state different delays ({labels[name]}: {listed})"
@@ -97,13 +101,30 @@ def is_delay_name(name: str) -> bool:
 
 
 def _seconds(entry: Entry, rate: float) -> list[float]:
-    """The numbers of an entry in seconds: of a list, or the one at the beginning of a text."""
+    """The numbers of an entry in seconds, of texts those at their beginning; none where one has another unit."""
     in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", entry.name)
-    unit = next(iter([*in_brackets, *words_of(entry.name)[-1:]]), "")
-    numbers = finite_numbers(entry.value)
-    if isinstance(entry.value, str) and (number := number_and_unit(entry.value)):
-        numbers, unit = finite_numbers(number[0]), number[1] or unit
-    factor = 1.0 / rate if SAMPLES.fullmatch(unit.strip()) else 1.0
-    if (time_unit := rate_unit(unit)) and time_unit.is_step:
-        factor = float(time_unit.scale)
-    return [] if numbers is None else [float(x) * factor for x in numbers]
+    last_word = next(iter(words_of(entry.name)[-1:]), "")
+    unit = in_brackets[0] if in_brackets else last_word if len(last_word) > 1 or rate_unit(last_word) else ""
+    value = re.split(r"[;\t]", entry.value) if isinstance(entry.value, str) else entry.value
+    if isinstance(value, list) and all(isinstance(cell, str) for cell in value):
+        *cells, last = value
+        if cells and number_and_unit(last) is None:  # "Delay;0;2;ms"
+            unit = last
+        else:
+            cells.append(last)
+        pairs = [number_and_unit(cell) for cell in cells]
+    else:
+        numbers = finite_numbers(value)
+        pairs = [] if numbers is None else [(float(x), "") for x in numbers]
+    seconds = [None if pair is None else _in_seconds(pair[0], pair[1] or unit, rate) for pair in pairs]
+    return [x for x in seconds if x is not None] if None not in seconds else []
+
+
+def _in_seconds(number: float, unit: str, rate: float) -> float | None:
+    """A number in seconds, without a known unit the number itself; None for another quantity, or part of a date."""
+    word = next(iter(unit.strip("[]() ").split()), "")
+    if (time_unit := rate_unit(word)) and time_unit.is_step:
+        return number * float(time_unit.scale)
+    if SAMPLES.fullmatch(word):
+        return number / rate
+    return None if known_unit(word) or re.match(r"°|[-:/.]\d", word) else number

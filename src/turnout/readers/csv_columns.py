@@ -220,6 +220,18 @@ class Columns(NamedTuple):
     further: list[str]
 
 
+def _holds_unit(text: str) -> bool:
+    return not text.isdigit() and any(_is_known(word) for word in text.split())
+
+
+def _told_apart_by_brackets(pairs: Sequence[tuple[str, str]]) -> set[str]:
+    """Names that several columns share, with different texts in brackets that are no units: "Y[0]", "acc (left)"."""
+    texts: dict[str, list[str]] = {}
+    for bare, text in pairs:
+        texts.setdefault(bare, []).append(text)
+    return {n for n, t in texts.items() if len(set(t)) == len(t) > 1 and not any(map(_holds_unit, t)) and all(t)}
+
+
 def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     """Names and units of the columns. A separator after the last number, as in "1;2;", makes a column without a name.
 
@@ -246,9 +258,9 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     pairs = [name_and_unit(name) for name in names]
-    bare_names = [bare for bare, _ in pairs]
+    told_apart = _told_apart_by_brackets(pairs)
     for i, (name, (bare, unit)) in enumerate(zip(names, pairs)):
-        if unit.isdigit() and bare_names.count(bare) > 1:  # "Y[0]", "Y[1]"
+        if bare in told_apart:
             continue
         names[i], units[i] = bare, unit if unit or bare != name else units[i]
     return Columns(names, units, further)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
-from turnout.readers.entries import Entry
+from turnout.readers.entries import FREE_TEXT, Entry
 
 
 def container_of(entry: Entry) -> str:
@@ -62,11 +62,15 @@ def _named_channels(text: str, names: tuple[str, ...]) -> frozenset[int]:
     )
 
 
+MAX_NAME = 40  # characters at the beginning of a text in which the number of a channel stands
 CHANNEL = re.compile(r"(?<![^\W_])(?:ch(?:an(?:nel)?)?s?|kanal|canal|voie)[\s.#_-]*(\d+)", re.IGNORECASE)
 
 
 def numbered_channels(text: str, entries: Sequence[Entry], n_channel: int) -> frozenset[int]:
     """Channels that a text calls by their numbers, as in "Ch2 delay", from 0 where another entry has a channel 0.
+
+    Where several numbers and not the first one occur, a part of the logger's channels is in the file, and their order
+    is not known.
 
     Parameters
     ----------
@@ -88,10 +92,22 @@ def numbered_channels(text: str, entries: Sequence[Entry], n_channel: int) -> fr
     ([1], [])
     >>> sorted(numbered_channels("Ch1", [Entry("line 1", "Ch0", "N")], 2))
     [1]
+    >>> sorted(numbered_channels("Ch2", [Entry("line 1", "Ch2", "N"), Entry("line 2", "Ch3", "g")], 2))
+    []
     """
     numbers = [int(n) for n in CHANNEL.findall(text)]
-    first = 0 if numbers and any("0" in CHANNEL.findall(f"{e.name} {e.value}"[:40]) for e in entries) else 1
-    return frozenset(n - first for n in numbers if 0 <= n - first < n_channel)
+    if not numbers:
+        return frozenset()
+    all_numbers = {int(n) for e in entries for n in CHANNEL.findall(_name_of_text(e)[:MAX_NAME])}
+    first = min(1, *numbers, *all_numbers)
+    if len(all_numbers) > 1 and first not in all_numbers:
+        return frozenset()
+    return frozenset(n - first for n in numbers if n - first < n_channel)
+
+
+def _name_of_text(entry: Entry) -> str:
+    """Name of an entry, of a free text the text."""
+    return str(entry.value) if entry.name == FREE_TEXT else entry.name
 
 
 @lru_cache(maxsize=4096)

@@ -7,6 +7,7 @@ have reversed axes. The number of channels and the longer axis identify the axes
 import io
 import re
 import warnings
+from itertools import zip_longest
 from typing import Any
 
 import h5py
@@ -115,12 +116,15 @@ def _cells_of_channels(variables: dict[str, Any]) -> dict[str, Any] | None:
     """Records of cells that each hold the vectors of one channel, as force{k} and rail{k}; None for other variables.
 
     The channels of one record are equally long, so the vectors of such a cell are no channels of one record where their
-    lengths differ. Cells whose names differ in numbers alone are records themselves.
+    lengths differ and those of the other channels differ alike. Cells whose names differ in numbers alone are records
+    themselves.
     """
     cells = {n: v for n, v in variables.items() if isinstance(v, list) and v and all(map(_is_list_of_numbers, v))}
     is_uneven = any(len(set(map(len, vectors))) > 1 for vectors in cells.values())
     words = {re.sub(r"\d+", "", name) for name in cells}
-    if not is_uneven or len(cells) < 2 or len(words) < len(cells):
+    vectors_by_record = zip_longest(*cells.values())
+    are_alike = all(len({len(v) for v in vectors if v is not None}) == 1 for vectors in vectors_by_record)
+    if not is_uneven or not are_alike or len(cells) < 2 or len(words) < len(cells):
         return None
     n_record = max(map(len, cells.values()))
     records = {

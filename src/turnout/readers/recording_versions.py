@@ -34,12 +34,12 @@ def check_groups(names: Sequence[str], channels: Iterable[str], source: Source) 
     Raises
     ------
     ReadError
-        If two names differ only in words for versions, or the groups have names of sensors and the channels have not.
+        If two names differ only in words for versions, or the groups have names of different sensors and the channels
+        have not.
     """
     channels = list(channels)
-    words_of_groups = {re.sub(r"[\d_\W]+", "", name).casefold() for name in names}
-    is_of_sensors = len(names) > 1 and len(words_of_groups) == len(names) and any(map(quantity_of_sensor, names))
-    if is_of_sensors and len(channels) > 1 and not any(map(quantity_of_sensor, channels)):
+    are_of_sensors = len(set(map(quantity_of_sensor, names))) > 1
+    if are_of_sensors and len(channels) > 1 and not any(map(quantity_of_sensor, channels)):
         groups_listed, channels_listed = (" and ".join(map(repr, texts[:3])) for texts in (names, channels))
         problem = f"{groups_listed} are named as channels, and each holds {channels_listed}"
         remedy = "Export a group for each record, with its channels by their names"

@@ -170,7 +170,9 @@ def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
 
 DELAYS = {  # name: 12 of its units [s], and 0 for what is no delay of a channel
     "delay_samples": 0.012, "latency_us": 12e-6, "Verzögerung [ms]": 0.012, "time shift": 12.0, "group delay": 12.0,
-    "start_offset": 12.0, "t0 [ms]": 0.012, "pre-trigger (samples)": 0.012,
+    "start_offset": 12.0, "t0 [ms]": 0.012, "delay (s)": 12.0, "rail_delay_a": 12.0,
+    "pre-trigger (samples)": 0.0, "pretrigger level": 0.0, "start_offset [mm]": 0.0, "phase delay (°)": 0.0,
+    "start_offset_mm": 0.0,
     "trigger_delay": 0.0, "settling delay": 0.0, "delay unit": 0.0, "offset [V]": 0.0, "latency [ns]": 0.0,
 }  # fmt: skip
 
@@ -194,6 +196,40 @@ def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_pat
     delay = DELAYS[name]
     assert bool(of_rail) == (delay > 0.0) and all(f"{name}: 'force' 0 s, 'rail' {delay:g} s" in t for t in of_rail)
     assert not delays({"rail": 12}, (name,)) and not delays({"force": 12, "rail": 12, "aux": 3})
+
+
+@pytest.mark.parametrize("value", ["2024-05-13 10:00:00", "10:00:00", "13.05.2024", "12 mm", "12 %", "12 °"])
+def test_a_date_and_another_quantity_of_one_channel_are_no_delay(value, tmp_path):
+    """Before, a start as a date on one channel was a delay of 2024 s."""
+    np.savez(tmp_path / "a.npz", force=np.arange(50) % 7.0, rail=np.arange(50) % 5.0, rail_t0=np.array(value))
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    assert len(read("a.npz", tmp_path, RawDescription(sensors, rate=1e3)).recordings) == 1
+
+
+@pytest.mark.parametrize("text", ["12;24", "0 ms;2 ms", "0;2;ms", "0\t2 samples", "0; 0,002 s", "1e-3 s;0"])
+@pytest.mark.parametrize("format", ["csv", "npz"])
+def test_a_list_of_delays_has_its_units_in_the_cells_or_behind_them(text, format, tmp_path):
+    values = np.random.default_rng(5).normal(size=(50, 2))
+    separator = "\t" if "\t" in text else ";"
+    if format == "npz":
+        np.savez(tmp_path / "a.npz", force=values[:, 0], rail=values[:, 1], delays=np.array(text))
+    else:
+        rows = [f"{a:.6f}{separator}{b:.6f}" for a, b in values]
+        lines = [f"Delay{separator}{text}", f"force{separator}rail", *rows, ""]
+        (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-8")
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    result = read(f"a.{format}", tmp_path, RawDescription(sensors, rate=1e3))
+    assert [error.reason for error in result.errors] == ["clock_drift"]
+
+
+def test_pre_triggers_of_two_channels_that_differ_are_an_error(tmp_path):
+    """That of one channel alone is a setting of the one that triggers."""
+    samples = np.random.default_rng(5).normal(size=(2, 50))
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    for of_rail, reasons in (({}, []), ({"rail_pretrigger_samples": 12}, ["clock_drift"])):
+        np.savez(tmp_path / "a.npz", force=samples[0], rail=samples[1], force_pretrigger_samples=24, **of_rail)
+        result = read("a.npz", tmp_path, RawDescription(sensors, rate=1e3))
+        assert [error.reason for error in result.errors if error.reason == "clock_drift"] == reasons
 
 
 OF_NAMES = {  # entries, and whether the channels differ by more than a hundredth of a step of 1 ms

@@ -46,6 +46,16 @@ def test_a_record_that_a_cell_lacks_costs_that_record(tmp_path):
         assert [error.reason for error in result.errors] == ["channel_missing"]
 
 
+def test_cells_whose_vectors_have_other_lengths_than_those_of_the_other_cells_are_records(tmp_path):
+    """Before, the forces of two records were force and response of one."""
+    records = {"north": (FORCE[0], RAIL[0]), "south": (FORCE[2], RAIL[2])}
+    cells = {name: cell([*channels, np.arange(2.0, 22.0)]) for name, channels in records.items()}
+    scipy.io.savemat(tmp_path / "a.mat", {**cells, "fs": 5000.0})
+    recordings = read("a.mat", tmp_path, layout(0, 1)).recordings
+    for recording, channels in zip(recordings, records.values(), strict=True):
+        np.testing.assert_array_equal(recording.samples, channels)
+
+
 def test_cells_whose_names_differ_in_numbers_alone_are_records(tmp_path):
     cells = {f"run{k}": cell([force, rail, np.arange(2.0, 22.0)]) for k, (force, rail) in enumerate(zip(FORCE, RAIL))}
     scipy.io.savemat(tmp_path / "a.mat", {**cells, "fs": 5000.0})
@@ -81,7 +91,7 @@ def test_a_group_for_each_channel_is_an_error(tmp_path, name, inner, outer):
 
 
 @pytest.mark.parametrize("name", ["a.h5", "a.mat", "a.tdms"])
-@pytest.mark.parametrize("outer", [("hammer1", "hammer2"), ("left", "right")])
+@pytest.mark.parametrize("outer", [("hammer1", "hammer2"), ("left", "right"), ("hammer_left", "hammer_right")])
 @pytest.mark.parametrize("inner", [("force", "rail"), ("ch0", "ch1")])
 def test_a_group_for_each_record_is_read(tmp_path, name, outer, inner):
     groups = {g: dict(zip(inner, pair)) for g, *pair in zip(outer, FORCE, RAIL)}

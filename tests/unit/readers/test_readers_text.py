@@ -581,8 +581,11 @@ def test_names_without_cells_are_an_error_and_a_comment_is_none(tmp_path):
     assert read("a.csv", tmp_path, description).recordings[0].n_sample == 40
 
 
-@pytest.mark.parametrize("names", ["Y[0];Y[1]", "ai (1);ai (2)"])
-def test_numbers_in_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
+BRACKETS_OF_NAMES = ["Y[0];Y[1]", "ai (1);ai (2)", "acc [x];acc [y]", "rail (left);rail (right)", "Y[ch0];Y[ch1]"]
+
+
+@pytest.mark.parametrize("names", BRACKETS_OF_NAMES)
+def test_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
     """Before, both columns were called Y, and no layout could name one of them."""
     first, second = names.split(";")
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
@@ -591,6 +594,14 @@ def test_numbers_in_brackets_that_tell_columns_apart_are_no_units(names, tmp_pat
     np.testing.assert_allclose(recording.samples, X.T.round(4), atol=1e-12)
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce [1];acc [1]\n{ROWS}")
     assert read("a.csv", tmp_path, NAMED).errors == ()
+
+
+@pytest.mark.parametrize("names", ["Y [N];Y [g]", "a [mm/s² rms];a [m/s² peak]", "a [furlong];a [furlong]"])
+def test_units_in_brackets_behind_one_name_remain_units(names, tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
+    channels = tuple(replace(c, source=i, unit="V") for i, c in enumerate(NAMED.channels))
+    result = read("a.csv", tmp_path, replace(NAMED, channels=channels))
+    assert [error.reason for error in result.errors] == ["unit_unknown"]
 
 
 TEMPERATURES = ["T [°C]", "t (K)", "T [Nm]", "Time [kN]"]
