@@ -2,15 +2,20 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
 
 from turnout.readers.entries import Entry
-from turnout.readers.overload_flags import DENYING_WORDS
+from turnout.readers.overload_flags import CLAUSES, is_denied
 from turnout.readers.rate_units import words_of
+from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
 
-EXPONENTIAL = re.compile(r"exp(?:o(?:nent\w*)?)?")
+EXPONENTIAL = re.compile(r"exp(?:on?|onent\w*)?")
 WINDOW = re.compile(r"window\w*|wdw|\w*fenster\w*|fenetre\w*|vindue|finestra|ventana|weighting|bewertung|decay")
-OTHER = re.compile(r"averag\w*|mittel\w*|moyenn\w*|fft\w*|display\w*|exposure|export\w*|expected|experiment\w*")
+OTHER = re.compile(r"averag\w*|mittel\w*|moyenn\w*|fft\w*|display\w*")
+TIME_WEIGHTING = re.compile(r"\btime weighting\b")  # of a level
 WINDOW_PROBLEM = "that an exponential window was applied to its samples, which adds damping to every mode"
 WINDOW_REMEDY = "Export the signals without a window, or subtract its decay rate from that of each mode"
 MAX_WORDS = 12  # of a name and a value that state a window
@@ -50,10 +55,27 @@ def window_entries(entries: Iterable[Entry]) -> Iterator[Entry]:
     >>> [entry.name for entry in window_entries([*stated, Entry("line 3", "Averaging", "exponential")])]
     ['Response window']
     """
-    for entry in entries:
-        value = decode_text(entry.value) if isinstance(entry.value, bytes) else str(entry.value)
-        words = words_of(f"{entry.name} {value[:200]}")
-        is_stated = any(map(EXPONENTIAL.fullmatch, words)) and any(map(WINDOW.fullmatch, words))
-        is_denied = not DENYING_WORDS.isdisjoint(words) or value in ("0", "0.0") or any(map(OTHER.fullmatch, words))
-        if is_stated and not is_denied and len(words) <= MAX_WORDS and not entry.is_piece:
+    for entry in (e for e in entries if not e.is_piece):
+        values = entry.value if isinstance(entry.value, (list, tuple, np.ndarray)) else [entry.value]
+        if any(_states_window(entry.name, value) for value in np.ravel(np.asarray(values, dtype=object)).tolist()):
             yield entry
+
+
+def _states_window(name: str, value: Any) -> bool:
+    """Whether a value, or one of its clauses with the name, states an exponential window that nothing denies."""
+    text = (decode_text(value) if isinstance(value, bytes) else str(value))[:200]
+    if len(words_of(f"{name} {text}")) > MAX_WORDS or text.strip().casefold() in PLACEHOLDERS:
+        return False
+    if _is_exponential_window(name):
+        return not is_denied(text)
+    clauses = CLAUSES.split(text)
+    denied = [*map(is_denied, clauses), False]  # "exponential, not used": by the next clause, too
+    return any(
+        _is_exponential_window(f"{name} {clause}") and not any(denied[i : i + 2]) for i, clause in enumerate(clauses)
+    )
+
+
+def _is_exponential_window(text: str) -> bool:
+    words = words_of(TIME_WEIGHTING.sub("", " ".join(words_of(text))))
+    kinds = (any(map(pattern.fullmatch, words)) for pattern in (EXPONENTIAL, WINDOW))
+    return all(kinds) and not any(map(OTHER.fullmatch, words))

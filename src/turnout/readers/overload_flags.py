@@ -9,6 +9,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import CHANNEL
 from turnout.readers.rate_units import words_of
 from turnout.readers.scale_words import plain_word
+from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
 
 OVERLOAD = re.compile(
@@ -16,13 +17,19 @@ OVERLOAD = re.compile(
 )
 # What is beside an overload: how it is detected, and at which value.
 BESIDE_OVERLOAD = re.compile(
-    r"detect|enabl|check|level|limit|thresh|schwell|mode|action|hold|time|margin|recover|type|%"
+    r"detect|enabl|check|level|limit|thresh|schwell|mode|action|hold|time|margin|recover|type|protect|proof|capacity"
+    r"|factor|ratio|rating|%"
 )
-TRUE_WORDS = frozenset("true yes ja oui si on overload overloaded clipped saturated".split())
+# Words that are said of rails, ballast and wagons, too: beside them only channels are named, or their signals.
+AMBIGUOUS = re.compile(r"clipped|saturated|overloaded")
+OF_SIGNALS = frozenset("adc amplifier at channel channels eingang input is kanal of on sensor signal the was".split())
+CLAUSES = re.compile(r"[,;/|&\n]|\b(?:and|und|et|og|och)\b")
+TRUE_WORDS = frozenset("true yes y ja oui si on overload overloaded clipped saturated".split())
 DENYING_WORDS = frozenset(
-    "no not non none nein nicht kein keine ohne without sans aucun free never ok ingen off aus false".split()
+    "no not non none nein nicht kein keine ohne without sans aucun free never ok ingen off aus false disabled inactive "
+    "deactivated deaktiviert inaktiv unused uniform rectangular".split()
 )
-MAX_WORDS = 5  # of a text that states an overload: a longer one may speak of it for another reason
+MAX_WORDS = 5  # of a clause that states an overload: a longer one may speak of it for another reason
 
 
 def overload_entries(entries: Iterable[Entry], names: Collection[str] = ()) -> Iterator[Entry]:
@@ -54,7 +61,7 @@ def overload_entries(entries: Iterable[Entry], names: Collection[str] = ()) -> I
     for entry in (e for e in entries if not e.is_piece):
         value = decode_text(entry.value) if isinstance(entry.value, bytes) else entry.value
         is_stated = is_of_overload(entry.name) and _is_true(value, names)
-        if is_stated or (isinstance(value, str) and is_of_overload(value) and _is_statement(value)):
+        if is_stated or (isinstance(value, str) and any(_is_statement(c, names) for c in CLAUSES.split(value))):
             yield entry
 
 
@@ -74,10 +81,43 @@ def is_of_overload(text: str) -> bool:
     return bool(OVERLOAD.search(word)) and not BESIDE_OVERLOAD.search(word)
 
 
-def _is_statement(text: str) -> bool:
-    """Whether a text has few words, of which none denies it, and no numbers but those of channels."""
-    words = words_of(text)
-    return len(words) <= MAX_WORDS and DENYING_WORDS.isdisjoint(words) and not re.search(r"\d", CHANNEL.sub("", text))
+def is_denied(text: str) -> bool:
+    """Whether a text says no: by a word, the number 0, or no value at all.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry, or a part of it.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_denied(text) for text in ("not used", "0 %", "n/a", "", "0.5 %", "on")]
+    [True, True, True, True, False, False]
+    """
+    is_zero = bool(re.match(r"\s*0+(?:[.,]0*)?(?![\d.,])", text))
+    return is_zero or text.strip().casefold() in PLACEHOLDERS or not DENYING_WORDS.isdisjoint(words_of(text))
+
+
+def _is_statement(clause: str, names: Collection[str]) -> bool:
+    """Whether a clause of a few words says that a channel left its range; its only numbers are those of channels."""
+    words = words_of(clause)
+    if not is_of_overload(clause) or is_denied(clause) or len(words) > MAX_WORDS:
+        return False
+    others = [word for word in words_of(_without_channels(clause, names)) if not OVERLOAD.search(plain_word(word))]
+    if any(map(AMBIGUOUS.search, words)):
+        return len(words) > 1 and OF_SIGNALS.issuperset(others)
+    return not any(word.isdigit() for word in others)
+
+
+def _without_channels(clause: str, names: Collection[str]) -> str:
+    """A clause without the numbers and the names of channels."""
+    of_names = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True) if name.strip())
+    clause = CHANNEL.sub(" ", clause)
+    return re.sub(rf"(?i)(?<![^\W_])(?:{of_names})(?![^\W_])", " ", clause) if of_names else clause
 
 
 def _is_true(value: object, names: Collection[str]) -> bool:
@@ -85,11 +125,15 @@ def _is_true(value: object, names: Collection[str]) -> bool:
     if isinstance(value, bytes):
         value = decode_text(value)
     if isinstance(value, str):
-        word = value.strip().casefold()
-        if re.fullmatch(r"[\d\s,;]+", word):
-            return any(map(int, re.findall(r"\d+", word)))
-        is_channel = bool(CHANNEL.search(word)) and _is_statement(word)
-        return word in TRUE_WORDS or is_channel or word in {name.strip().casefold() for name in names}
+        return any(_is_clause_true(clause, names) for clause in CLAUSES.split(value))
     if isinstance(value, (list, tuple, np.ndarray)):
         return any(_is_true(v, names) for v in np.ravel(np.asarray(value, dtype=object)).tolist())
     return isinstance(value, (bool, int, float, np.number, np.bool_)) and bool(value > 0)
+
+
+def _is_clause_true(clause: str, names: Collection[str]) -> bool:
+    """Whether a clause is a word that says yes, a number above 0, or names a channel and does not deny it."""
+    remainder = _without_channels(clause, names).strip(" :=")
+    if remainder.casefold() in TRUE_WORDS or re.fullmatch(r"[\d\s.]+", remainder):
+        return not is_denied(remainder) or bool(re.search("[1-9]", remainder))
+    return remainder != clause.strip(" :=") and OF_SIGNALS.issuperset(words_of(remainder))

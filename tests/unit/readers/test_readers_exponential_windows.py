@@ -24,6 +24,10 @@ STATED = [
     ("Fenster Antwort", "Exponentialfenster, exponentiell"),
     ("Windows", np.array(["force", "exponential"])),
     ("text", "response: exponential window, decay 20 ms"),
+    ("Window", "Expon."),
+    ("Windows", np.array(["none", "exponential"])),
+    ("Windows", "force: none; response: exponential"),
+    ("Exponential window decay", "0.5 %"),
 ]
 
 
@@ -46,13 +50,24 @@ def test_a_stated_exponential_window_is_reported_for_a_hammer_test(name, value, 
         ("Window of averaging", "exponential averaging"),
         ("FFT window", "exponential"),
         ("Comment", "no exponential window"),
+        ("Exponential window", "disabled"),
+        ("Exponential window", "inactive"),
+        ("Exponential window", "n/a"),
+        ("Exponential window", ""),
+        ("Exponential decay", "0 %"),
+        ("Exponential window", "off, 10 %"),
+        ("Window", "exponential, not used"),
+        ("Time weighting", "exponential"),
+        ("Window", "experimental"),
     ],
 )
 def test_another_window_or_one_that_is_off_is_not_reported(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
 
 
-@pytest.mark.parametrize("line", ["Window;rectangular;exponential", "Response window: exponential"])
+@pytest.mark.parametrize(
+    "line", ["Window;rectangular;exponential", "Window;none;exponential", "Response window: exponential"]
+)
 def test_a_window_in_the_head_of_a_text_is_reported(line, tmp_path):
     rows = [f"{a};{b}" for a, b in zip(FORCE, RAIL)]
     (tmp_path / "a.csv").write_text("\n".join([line, "force;rail", *rows, ""]), encoding="utf-8")

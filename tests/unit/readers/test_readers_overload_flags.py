@@ -41,6 +41,14 @@ STATEMENTS = [
     ("Status", "overload"),
     ("Status", "OVLD channel 2"),
     ("Quality", np.array("Übersteuerung Kanal 1")),
+    ("Status", "CH1 ok, CH2 overload"),
+    ("Overload", "CH1 no, CH2 yes"),
+    ("Overload", "rail, force"),
+    ("Overload", "channel force"),
+    ("Overload", "1.0"),
+    ("Overload", "ch1=0 ch2=1"),
+    ("Remark", "signal clipped"),
+    ("Remark", "force saturated"),
 ]
 
 
@@ -59,6 +67,16 @@ def test_an_overload_of_a_channel_and_one_in_a_value_are_reported(name, value, t
         ("Status", "no overload"),
         ("Status", "Overload limit 10 V"),
         ("Status", "0 overloads"),
+        ("Overload", "0.0"),
+        ("Overload", "ch1: 0, ch2: 0"),
+        ("Overload", "force ok"),
+        ("Mounting", "clipped to rail foot"),
+        ("Ballast", "saturated"),
+        ("Comment", "ballast saturated with water"),
+        ("Train", "freight, overloaded"),
+        ("Sensor", "overload protected accelerometer"),
+        ("Overload protection", "on"),
+        ("Overload factor", 1.5),
         ("Comment", "the sensor that showed an overload last year was replaced"),
     ],
 )
@@ -68,7 +86,13 @@ def test_a_text_that_denies_an_overload_or_is_about_another_one_is_no_statement(
 
 @pytest.mark.parametrize(
     ("line", "is_above"),
-    [("CH2 overload", True), ("Overload: CH2", False), ("OVLD ch 2", False), ("Overload;0;1", True)],
+    [
+        ("CH2 overload", True),
+        ("Overload: CH2", False),
+        ("OVLD ch 2", False),
+        ("Overload;0;1", True),
+        ("Overload;0.0;1.0", True),
+    ],
 )
 def test_an_overload_above_or_below_the_numbers_of_a_text_is_reported(line, is_above, tmp_path):
     lines = ["force [N]", *(f"{x:.6f}" for x in SAMPLES)]
