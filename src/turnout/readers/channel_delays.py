@@ -104,7 +104,7 @@ def _seconds(entry: Entry, rate: float) -> list[float]:
     """The numbers of an entry in seconds, of texts those at their beginning; none where one has another unit."""
     in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", entry.name)
     last_word = next(iter(words_of(entry.name)[-1:]), "")
-    unit = in_brackets[0] if in_brackets else last_word if len(last_word) > 1 or rate_unit(last_word) else ""
+    unit = in_brackets[0] if in_brackets else last_word if len(last_word) > 1 else ""
     value = re.split(r"[;\t]", entry.value) if isinstance(entry.value, str) else entry.value
     if isinstance(value, list) and all(isinstance(cell, str) for cell in value):
         *cells, last = value

@@ -48,7 +48,6 @@ HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}
 NUMERIC_HEAD_NAMES = {
     *TEMPERATURES, *SAMPLE_COUNT_NAMES,
 }  # a head line only if a number follows, else the name of a column  # fmt: skip
-NUMBER_WITH_UNIT = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?\s*[^\d;,\t|]*")  # "12.5°C"
 GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 
 
@@ -161,7 +160,6 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     is_note = (
         plain_name in HEAD_NAMES
         or (plain_name in NUMERIC_HEAD_NAMES and is_number(value.split()[0] if value else ""))
-        or (plain_name in TEMPERATURES and bool(NUMBER_WITH_UNIT.fullmatch(value)))
         or _states_scale(name_with_unit, value)
     )
     if plain_name in SAMPLE_COUNT_NAMES and (grouped := GROUPED_NUMBER.match(value)):

@@ -234,7 +234,7 @@ def _name_and_unit(name: str, text: str) -> tuple[str, str] | None:
     if name == FREE_TEXT:
         name, _, text = text.replace("(", "[", 1).partition("[")
     unit = text.strip("[]() ")
-    return (name, unit) if known_unit(unit) and not is_meaningless(unit) else None
+    return (name, unit) if known_unit(unit) else None
 
 
 def _owners_by_name(name: str, record: RawRecord) -> frozenset[int]:

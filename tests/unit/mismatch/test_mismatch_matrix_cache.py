@@ -73,6 +73,22 @@ def test_tracks_that_differ_in_chairs_and_toe_share_a_skeleton_and_are_the_assem
     assert len(matrix_cache._templates) == 1
 
 
+@pytest.mark.parametrize("first", [0, 1, 2, 3])
+def test_blades_with_the_same_nodes_that_differ_in_heel_rail_or_direction_are_the_assembled_ones(first):
+    """Each after each other one, so that no matrices of one blade are taken for those of another."""
+    track = uniform_track(24.0)
+    light = replace(track.rail, mass=0.7 * track.rail.mass)
+    ends = (6.6, 13.2, 18.0, track.rail), (6.6, 10.2, 18.0, track.rail), (18.0, 13.2, 6.6, track.rail)
+    blades = [Blade(*of_blade, 3e8, 3e4, 2.0, 0.5) for of_blade in (*ends, (6.6, 13.2, 18.0, light))]
+    matrix_cache._templates.clear()
+    for blade in (blades[first], *blades):
+        full, filled = (f(track.with_(blade=blade)) for f in (assemble, matrices_of))
+        assert filled.index == full.index and filled.blade_rails == full.blade_rails
+        for name in ("mass", "damping", "stiffness"):
+            a, b = getattr(full, name), getattr(filled, name)
+            assert b == pytest.approx(a, rel=1e-9, abs=1e-9 * np.abs(a).max())
+
+
 PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 

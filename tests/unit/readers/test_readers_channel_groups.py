@@ -206,6 +206,16 @@ def test_a_date_and_another_quantity_of_one_channel_are_no_delay(value, tmp_path
     assert len(read("a.npz", tmp_path, RawDescription(sensors, rate=1e3)).recordings) == 1
 
 
+@pytest.mark.parametrize(("name", "is_error"), [("rail_start_offset [ms]", False), ("rail_delay [ms]", True)])
+def test_a_start_may_be_half_a_sample_late_and_a_delay_may_not(name, is_error, tmp_path):
+    """Converters that take turns begin within one sample; what a delay states is none of that."""
+    samples = np.random.default_rng(5).normal(size=(2, 50))
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
+    np.savez(tmp_path / "a.npz", force=samples[0], rail=samples[1], **{name: 0.4})
+    errors = read("a.npz", tmp_path, RawDescription(sensors, rate=1e3)).errors
+    assert [error.reason for error in errors] == ["clock_drift"][: int(is_error)]
+
+
 @pytest.mark.parametrize("text", ["12;24", "0 ms;2 ms", "0;2;ms", "0\t2 samples", "0; 0,002 s", "1e-3 s;0"])
 @pytest.mark.parametrize("format", ["csv", "npz"])
 def test_a_list_of_delays_has_its_units_in_the_cells_or_behind_them(text, format, tmp_path):

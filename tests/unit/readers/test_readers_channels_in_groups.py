@@ -46,6 +46,12 @@ def test_a_record_that_a_cell_lacks_costs_that_record(tmp_path):
         assert [error.reason for error in result.errors] == ["channel_missing"]
 
 
+def test_a_single_cell_with_a_short_vector_is_one_record(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"impact": cell([FORCE[0], RAIL[0], np.arange(2.0, 22.0)]), "fs": 5000.0})
+    (recording,) = read("a.mat", tmp_path, layout(0, 1)).recordings
+    np.testing.assert_array_equal(recording.samples, [FORCE[0], RAIL[0]])
+
+
 def test_cells_whose_vectors_have_other_lengths_than_those_of_the_other_cells_are_records(tmp_path):
     """Before, the forces of two records were force and response of one."""
     records = {"north": (FORCE[0], RAIL[0]), "south": (FORCE[2], RAIL[2])}

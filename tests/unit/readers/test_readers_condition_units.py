@@ -83,11 +83,20 @@ def test_the_unit_of_a_channel_with_the_name_of_a_condition_is_that_of_the_chann
         assert [error.reason for error in read("a.csv", tmp_path, description).errors] == reasons
 
 
-@pytest.mark.parametrize("text", ["twelve", "12.5;13.0", "12.5 bar", "warm (12)"])
+@pytest.mark.parametrize("text", ["twelve", "12.5;13.0", "12.5 bar", "12.5 V", "warm (12)"])
 def test_a_temperature_that_cannot_be_read_is_reported(text, tmp_path):
     for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
         _, errors = read_with(tmp_path, *case)
         assert [error.reason for error in errors] == ["condition_lost"] and "°C" in errors[0].remedy
+
+
+def test_a_temperature_that_no_record_states_is_reported_once_for_the_first(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in (1, 2):
+            file[f"impact_{k}/force"], file[f"impact_{k}/rail"] = FORCE, RAIL * k
+            file[f"impact_{k}"].attrs["rail_temperature"] = f"warm {k}"
+    (error,) = read("a.h5", tmp_path, IN_SI).errors
+    assert error.reason == "condition_lost" and error.where == "record 1" and "'warm 1'" in error.problem
 
 
 @pytest.mark.parametrize("text", ["n/a", "n.a.", "-", "---", "?", "", "NaN"])

@@ -48,6 +48,13 @@ def test_units_that_are_exchanged_or_others_contradict_the_layout(form, units, t
     assert not read_text(tmp_path, form, units, layout(("N!", "m/s²!"))).errors
 
 
+@pytest.mark.parametrize("line", ["Ch2 delay: 2 ms", "Kanal 2 Verzögerung: 0,002 s", "delay ch2: 2 samples"])
+def test_a_delay_of_one_numbered_channel_is_that_of_the_column(line, tmp_path):
+    rows = [f"{a};{b}" for a, b in zip(FORCE, RAIL)]
+    (tmp_path / "a.csv").write_text("\n".join([line, "force;rail", *rows, ""]), encoding="utf-8")
+    assert [error.reason for error in read("a.csv", tmp_path, layout(("N", "m/s²"))).errors] == ["clock_drift"]
+
+
 @pytest.mark.parametrize("lines", [("CH2: N", "CH3: m/s²"), ("Trigger: CH0", "CH1: N", "CH2: m/s²")])
 def test_numbers_without_the_first_one_are_not_taken_for_those_of_the_columns(lines, tmp_path):
     """Before, a file of the channels 2 and 3 was rejected, and one with a trigger at a channel 0."""

@@ -31,6 +31,13 @@ def test_a_channel_with_repeated_samples_is_left_out_of_a_passage(tmp_path, hold
     assert reasons(tmp_path, rail, kind="hammer") == ([], [("wrong_rate", "'rail'")])
 
 
+def test_a_force_with_repeated_samples_costs_the_record(tmp_path):
+    force = np.repeat(RNG.normal(size=3000), 2)
+    np.savez(tmp_path / "a.npz", force=force, rail=RNG.normal(size=6000), rate=1000.0)
+    result = read("a.npz", tmp_path, RawDescription(CHANNELS[:2], rate=1000.0, kind="hammer"))
+    assert not result.recordings and [error.reason for error in result.errors] == ["wrong_rate"]
+
+
 def test_repeated_samples_are_found_in_a_long_record_that_stays_in_the_file(tmp_path):
     n = BLOCK_SIZE + 5000
     rail = np.repeat(RNG.normal(size=n // 4 + 1), 4)[:n]
@@ -42,5 +49,9 @@ def test_coarse_numbers_and_a_quiet_channel_are_no_repeated_samples(tmp_path):
     x[:4500] = np.repeat(x[:1500], 3)  # then at the rate of the file
     quiet = np.zeros(6000)
     quiet[1000:1040:2] = 1.0
-    for rail in (x, np.round(x), np.round(np.sin(np.arange(6000) / 50.0) * 3.0), quiet):
+    few = np.zeros(6000)
+    few[1000:1040] = np.repeat(np.tile([1.0, 0.0], 10), 2)
+    late = np.repeat(x[:3000], 2)
+    late[4300:4302] = late[4301:4303].copy()  # one change at an odd number of samples
+    for rail in (few, late, x, np.round(x), np.round(np.sin(np.arange(6000) / 50.0) * 3.0), quiet):
         assert reasons(tmp_path, rail) == ([["force", "rail", "air"]], [])

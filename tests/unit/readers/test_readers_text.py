@@ -135,6 +135,13 @@ def test_the_remedy_for_a_date_in_no_clear_order_is_another_order(date, head, tm
     assert error.reason == "start_unknown" and "YYYY-MM-DD" in error.remedy and "clock" not in error.remedy
 
 
+@pytest.mark.parametrize("stamp", ["31.02.2024 10:00", "2024-13-05 10:00:00"])
+def test_the_remedy_for_a_date_that_does_not_exist_is_the_clock(stamp, tmp_path):
+    (tmp_path / "a.csv").write_text(f"rate: 20000\nstart: {stamp}\nforce;acc\n{ROWS}")
+    (error,) = read("a.csv", tmp_path, NAMED).errors
+    assert error.reason == "start_unknown" and "clock" in error.remedy
+
+
 COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'échantillons", "Aantal samples",
           "Počet vzorků", "Antal målepunkter")  # fmt: skip
 
@@ -599,7 +606,7 @@ def test_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
 @pytest.mark.parametrize("names", ["Y [N];Y [g]", "a [mm/s² rms];a [m/s² peak]", "a [furlong];a [furlong]"])
 def test_units_in_brackets_behind_one_name_remain_units(names, tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
-    channels = tuple(replace(c, source=i, unit="V") for i, c in enumerate(NAMED.channels))
+    channels = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))
     result = read("a.csv", tmp_path, replace(NAMED, channels=channels))
     assert [error.reason for error in result.errors] == ["unit_unknown"]
 

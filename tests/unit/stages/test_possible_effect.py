@@ -8,7 +8,7 @@ import pytest
 from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
-from turnout.stages.possible_effect import agreement_sentence, sentence_on_possible_effect
+from turnout.stages.possible_effect import agreement_sentence, scope_of_agreement, sentence_on_possible_effect
 
 FINDING = {"train": None, "axle": None, "channel": None}
 
@@ -63,3 +63,10 @@ def test_what_is_too_small_to_act_on_or_contradicted_is_not_stated(case):
 def test_agreement_with_other_values_than_those_of_the_files_is_said_so():
     assert agreement_sentence("Both agree.", False) == "Both agree."
     assert agreement_sentence("Both agree.", True) == "Both agree, but only with other values than the files have."
+
+
+@pytest.mark.parametrize(("n_compared", "n_recorded"), [(6, 6), (0, 0)])
+def test_an_answer_that_all_passages_support_is_not_limited(n_compared, n_recorded):
+    assert scope_of_agreement("Simulation and recordings agree.", n_compared, n_recorded) == (
+        "Simulation and recordings agree."
+    )
