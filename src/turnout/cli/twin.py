@@ -97,12 +97,20 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
         yield f"visit {visit} is not used: its diagnosis is {answer.replace('_', ' ')}, and not accepted"
     yield from (f"note: {note}" for note in model.notes)
     yield from _table(model, show_all)
+    answers = list(_answers(model))
+    yield from answers
+    if any("±" in line for line in answers):
+        yield "± is one standard deviation"
+    if model.reservation:
+        yield model.reservation
+
+
+def _answers(model: CalibratedModel) -> Iterator[str]:
+    """The answers to both questions, one line each."""
     yield "against the file: " + ("; ".join(_differences(model)) or "nothing differs")
     for change in (a for a in model.answers if a.question == "change" and model.changes):
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
-    if model.reservation:
-        yield model.reservation
 
 
 def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:

@@ -15,7 +15,7 @@ from turnout.simulate.wheel_path import BladeTop, StockFall
 
 @pytest.fixture(scope="module")
 def campaign():
-    return measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
+    return measured_campaign(small_plan((15.0,), (28.0,), hammer_positions=(24.0,)), (), 3)
 
 
 def test_a_case_on_plain_track_is_proven(campaign):
