@@ -20,6 +20,7 @@ TEMPERATURE_UNIT = re.compile(
     r"(?:[°º˚o]|deg(?:r(?:ees?)?)?\.?|grad(?:er|en|i)?)?[\s_]*(c|f|k)(?:elsius|ahrenheit|elvin)?", re.IGNORECASE
 )
 SCALES = {"c": "°C", "f": "°F", "k": "K"}
+BESIDE_UNIT = re.compile(r"^(?:±|\+/-)\s*[\d.,]+\s*|(?<=[^\W\d_])\s*[(\[].*$")  # a tolerance and a note in brackets
 SEPARATORS = "[]() \t;,|"  # between number and unit, and around it
 
 
@@ -53,7 +54,7 @@ def _number_in_unit(name: str, value: Any, entries: Sequence[Entry]) -> float | 
         return None
     number, unit = stated
     beside = (str(e.value) for e in entries if name in conditions_of_unit(e.name))
-    unit = (unit.strip(SEPARATORS) or next(beside, "")).strip(SEPARATORS)
+    unit = (BESIDE_UNIT.sub("", unit).strip(SEPARATORS) or next(beside, "")).strip(SEPARATORS)
     if not unit:
         return number
     unit = unicodedata.normalize("NFKC", unit)  # "℃" is one character

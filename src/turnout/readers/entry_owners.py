@@ -95,14 +95,19 @@ def numbered_channels(text: str, entries: Sequence[Entry], n_channel: int) -> fr
     >>> sorted(numbered_channels("Ch2", [Entry("line 1", "Ch2", "N"), Entry("line 2", "Ch3", "g")], 2))
     []
     """
-    numbers = [int(n) for n in CHANNEL.findall(text)]
+    numbers = _channel_numbers(text)
     if not numbers:
         return frozenset()
-    all_numbers = {int(n) for e in entries for n in CHANNEL.findall(_name_of_text(e)[:MAX_NAME])}
+    all_numbers = frozenset().union(*(_channel_numbers(_name_of_text(entry)[:MAX_NAME]) for entry in entries))
     first = min(1, *numbers, *all_numbers)
     if len(all_numbers) > 1 and first not in all_numbers:
         return frozenset()
     return frozenset(n - first for n in numbers if n - first < n_channel)
+
+
+@lru_cache(maxsize=4096)
+def _channel_numbers(text: str) -> frozenset[int]:
+    return frozenset(map(int, CHANNEL.findall(text)))
 
 
 def _name_of_text(entry: Entry) -> str:
