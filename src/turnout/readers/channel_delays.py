@@ -105,7 +105,7 @@ def _seconds(entry: Entry, rate: float) -> list[float]:
     in_brackets = re.findall(r"[\[(]([^\])]*)[\])]", entry.name)
     last_word = next(iter(words_of(entry.name)[-1:]), "")
     unit = in_brackets[0] if in_brackets else last_word if len(last_word) > 1 else ""
-    value = re.split(r"[;\t]", entry.value) if isinstance(entry.value, str) else entry.value
+    value = re.split(r"[;\t]|,\s+", entry.value) if isinstance(entry.value, str) else entry.value
     if isinstance(value, list) and all(isinstance(cell, str) for cell in value):
         *cells, last = value
         if cells and number_and_unit(last) is None:  # "Delay;0;2;ms"

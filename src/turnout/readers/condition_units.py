@@ -72,7 +72,7 @@ def _plain(name: str) -> str:
 
 
 def unread_conditions(conditions: Mapping[str, Any], entries: Sequence[Entry]) -> dict[str, str]:
-    """Temperatures of which the file states no number in a known unit.
+    """Temperatures of which the file states no number in a known unit, and a speed in an unknown one.
 
     Parameters
     ----------
@@ -88,6 +88,8 @@ def unread_conditions(conditions: Mapping[str, Any], entries: Sequence[Entry]) -
     """
     of_entries = {_plain(e.name): e.value for e in entries}
     texts = {name: conditions.get(name, of_entries.get(name)) for name in TEMPERATURES}
+    if isinstance(speed := conditions.get("speed"), str) and number_and_unit(speed):
+        texts["speed"] = speed
     texts = {name: text.strip() for name, text in texts.items() if isinstance(text, str)}
     return {
         name: text for name, text in texts.items() if re.search(r"\w", text) and text.casefold() not in PLACEHOLDERS

@@ -13,12 +13,13 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.condition_units import unread_conditions
-from turnout.readers.metadata_names import START_NAMES
+from turnout.readers.metadata_names import START_NAMES, TEMPERATURES
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawRecord, Source
 
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many
 START = "start time"
 UNIT_REMEDY = "Write it as '12.5 °C', or as a number in °C"
+SPEED_REMEDY = "Write it as '120 km/h', or as a number in m/s"
 REMEDY = "Copy the file again; if it is whole, correct the entry in the logger's settings"
 
 
@@ -52,7 +53,7 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
             unread.setdefault(name, (k, text))
     for name, (k, text) in unread.items():
         problem = f"its {name} is {text[:40]!r}, no number in a known unit"
-        yield _error(f"record {k + 1}", name, problem, source, UNIT_REMEDY)
+        yield _error(f"record {k + 1}", name, problem, source, UNIT_REMEDY if name in TEMPERATURES else SPEED_REMEDY)
     everywhere = set.intersection(*(names for _, _, names in read))
     reported = set()
     for name in sorted(set.union(*(names for _, _, names in read)) - everywhere):

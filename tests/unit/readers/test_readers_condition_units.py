@@ -57,7 +57,8 @@ def test_a_temperature_is_converted_from_its_unit(text, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "unit", ["°c", "c", "ºC", "oC", "deg. C", "degrees C", "degrees Celsius", ";°C", "\t°C", ",°C"]
+    "unit",
+    ["°c", "c", "ºC", "oC", "deg. C", "degrees C", "degrees Celsius", ";°C", ",°C", "± 0.5 °C", "°C (sensor 2)"],
 )
 def test_a_unit_of_temperature_has_many_notations(unit, tmp_path):
     """Before, a temperature in one of these was lost; the sign of −3 may be a minus sign, too."""
@@ -109,3 +110,13 @@ def test_a_speed_is_converted_from_its_unit(tmp_path):
     for text, speed in (("33.3", 33.3), ("120 km/h", 120 / 3.6), ("33.3 m/s", 33.3)):
         for case in (("csv", {}, [f"# speed: {text}"]), ("h5", {"speed": text}, ())):
             assert read_with(tmp_path, *case)[0]["speed"] == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("text", ["60 mph", "120 km/t", "fast"])
+def test_a_speed_in_an_unknown_unit_is_reported_and_a_word_is_none(text, tmp_path):
+    """Before, 60 mph were 60 m/s."""
+    for case in (("csv", {}, [f"# speed: {text}"]), ("h5", {"speed": text}, ())):
+        conditions, errors = read_with(tmp_path, *case)
+        assert conditions["speed"] == text
+        assert [error.reason for error in errors] == ["condition_lost"][: int(text != "fast")]
+        assert all("km/h" in error.remedy for error in errors)
