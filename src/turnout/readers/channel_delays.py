@@ -117,7 +117,7 @@ def _seconds(entry: Entry, rate: float) -> list[float]:
         numbers = finite_numbers(value)
         pairs = [] if numbers is None else [(float(x), "") for x in numbers]
     seconds = [None if pair is None else _in_seconds(pair[0], pair[1] or unit, rate) for pair in pairs]
-    return [x for x in seconds if x is not None] if None not in seconds else []
+    return [x for x in seconds if x is not None]
 
 
 def _in_seconds(number: float, unit: str, rate: float) -> float | None:

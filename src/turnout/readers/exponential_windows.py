@@ -9,7 +9,6 @@ import numpy as np
 from turnout.readers.entries import Entry
 from turnout.readers.overload_flags import CLAUSES, is_denied
 from turnout.readers.rate_units import words_of
-from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
 
 EXPONENTIAL = re.compile(r"exp(?:on?|onent\w*)?")
@@ -64,7 +63,7 @@ def window_entries(entries: Iterable[Entry]) -> Iterator[Entry]:
 def _states_window(name: str, value: Any) -> bool:
     """Whether a value, or one of its clauses with the name, states an exponential window that nothing denies."""
     text = (decode_text(value) if isinstance(value, bytes) else str(value))[:200]
-    if len(words_of(f"{name} {text}")) > MAX_WORDS or text.strip().casefold() in PLACEHOLDERS:
+    if len(words_of(f"{name} {text}")) > MAX_WORDS:
         return False
     if _is_exponential_window(name):
         return not is_denied(text)

@@ -107,15 +107,17 @@ def _is_statement(clause: str, names: Collection[str]) -> bool:
     words = words_of(clause)
     if not is_of_overload(clause) or is_denied(clause) or len(words) > MAX_WORDS:
         return False
-    others = [word for word in words_of(_without_channels(clause, names)) if not OVERLOAD.search(plain_word(word))]
+    remainder = _without_channels(clause, names)
     if any(map(AMBIGUOUS.search, words)):
+        others = [word for word in words_of(remainder) if not OVERLOAD.search(plain_word(word))]
         return len(words) > 1 and OF_SIGNALS.issuperset(others)
-    return not any(word.isdigit() for word in others)
+    return not re.search(r"\d", remainder)
 
 
 def _without_channels(clause: str, names: Collection[str]) -> str:
-    """A clause without the numbers and the names of channels."""
-    of_names = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True) if name.strip())
+    """A clause without the numbers of channels and their names, of which one may be a number and says nothing."""
+    words = [name for name in sorted(names, key=len, reverse=True) if re.search(r"[^\W\d]", name)]
+    of_names = "|".join(map(re.escape, words))
     clause = CHANNEL.sub(" ", clause)
     return re.sub(rf"(?i)(?<![^\W_])(?:{of_names})(?![^\W_])", " ", clause) if of_names else clause
 
@@ -125,7 +127,8 @@ def _is_true(value: object, names: Collection[str]) -> bool:
     if isinstance(value, bytes):
         value = decode_text(value)
     if isinstance(value, str):
-        return any(_is_clause_true(clause, names) for clause in CLAUSES.split(value))
+        is_empty = value.strip().casefold() in PLACEHOLDERS
+        return not is_empty and any(_is_clause_true(clause, names) for clause in CLAUSES.split(value))
     if isinstance(value, (list, tuple, np.ndarray)):
         return any(_is_true(v, names) for v in np.ravel(np.asarray(value, dtype=object)).tolist())
     return isinstance(value, (bool, int, float, np.number, np.bool_)) and bool(value > 0)

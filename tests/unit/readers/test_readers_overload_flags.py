@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.readers import read
+from turnout.readers.entries import Entry
+from turnout.readers.overload_flags import overload_entries
 from turnout.records import RawChannel, RawDescription
 
 SAMPLES = np.sin(np.arange(400) / 9)
@@ -68,6 +70,9 @@ def test_an_overload_of_a_channel_and_one_in_a_value_are_reported(name, value, t
         ("Status", "Overload limit 10 V"),
         ("Status", "0 overloads"),
         ("Overload", "0.0"),
+        ("Overload", ""),
+        ("Overload", "sensor"),
+        ("Status", "overload 5 kN"),
         ("Overload", "ch1: 0, ch2: 0"),
         ("Overload", "force ok"),
         ("Mounting", "clipped to rail foot"),
@@ -82,6 +87,11 @@ def test_an_overload_of_a_channel_and_one_in_a_value_are_reported(name, value, t
 )
 def test_a_text_that_denies_an_overload_or_is_about_another_one_is_no_statement(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
+
+
+def test_a_number_or_no_value_is_none_of_a_channel_with_that_name():
+    for value, names in (("0", ("0", "1")), ("0;0", ("0", "1")), ("n/a", ("n", "a"))):
+        assert not list(overload_entries([Entry("head", "Overload", value)], names))
 
 
 @pytest.mark.parametrize(

@@ -603,7 +603,9 @@ def test_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
     assert read("a.csv", tmp_path, NAMED).errors == ()
 
 
-@pytest.mark.parametrize("names", ["Y [N];Y [g]", "a [mm/s² rms];a [m/s² peak]", "a [furlong];a [furlong]"])
+@pytest.mark.parametrize(
+    "names", ["Y [N];Y [g]", "a [mm/s² rms];a [m/s² peak]", "a [furlong];a [furlong]", "a [furlong];a"]
+)
 def test_units_in_brackets_behind_one_name_remain_units(names, tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
     channels = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))
