@@ -76,8 +76,9 @@ def scope_of_agreement(sentence: str, n_compared: int, n_recorded: int) -> str:
     if n_left_out <= 0:
         return sentence
     if n_compared:
+        simulations = "its simulation" if n_left_out == 1 else "their simulations"
         left_out = f"{n_left_out} of {n_recorded} passages"
-        return f"{sentence} {left_out} could not be compared with its simulation: see the notes."
+        return f"{sentence} {left_out} could not be compared with {simulations}: see the notes."
     passages = "The passage" if n_recorded == 1 else f"None of {n_recorded} passages"
     verb = "could not be" if n_recorded == 1 else "could be"
     sentence = sentence.replace("Simulation and recordings agree", "Simulation and hammer tests agree")

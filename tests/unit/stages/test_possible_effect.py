@@ -70,3 +70,8 @@ def test_an_answer_that_all_passages_support_is_not_limited(n_compared, n_record
     assert scope_of_agreement("Simulation and recordings agree.", n_compared, n_recorded) == (
         "Simulation and recordings agree."
     )
+
+
+def test_several_passages_that_were_not_compared_have_simulations():
+    sentence = scope_of_agreement("Both agree.", 4, 6)
+    assert sentence == "Both agree. 2 of 6 passages could not be compared with their simulations: see the notes."
