@@ -348,7 +348,7 @@ VALUES = {
     "vehicles/axle_patterns.yaml: vehicles: => vehicle:": (
         "no train: config/vehicles/axle_patterns.yaml, vehicles and trains: 'vehicles' is missing."
     ),
-    "vehicles/axle_patterns.yaml: trains: => trains: []\nothers:": "they are not two tables of names with values. See",
+    "vehicles/axle_patterns.yaml: trains: => trains: []\nothers:": "names with values. Compare it with the file",
 }
 
 
