@@ -80,6 +80,16 @@ def test_a_restart_that_gains_less_changes_nothing(monkeypatch):
     assert after["other wave"].gain == before["other wave"].gain
 
 
+def test_a_restart_ends_where_it_does_not_lead_to_half_a_name(monkeypatch):
+    """The bar is below the cost of the fit without the effect, so a restart without a gain does not use all steps."""
+    case, bars = Imitated(), []
+    base, fit = fit_jointly(case, values={"stiffness": IMITATION}), Search.fit
+    monkeypatch.setattr(Search, "fit", lambda self, *a, **k: bars.append(k.get("sought_cost")) or fit(self, *a, **k))
+    search = Search.of(case)
+    start_from_priors(search, base, RefitTask(case.candidates[1], np.array([0.1]), {}, 20.0))
+    assert bars == [pytest.approx(base.cost - search.settings.threshold)]
+
+
 @pytest.mark.parametrize(("family", "is_continued"), [("wave", True), ("other wave", False)])
 def test_only_a_restart_that_leads_to_a_gain_goes_on_to_convergence(monkeypatch, family, is_continued):
     case, continued = Imitated(), []
