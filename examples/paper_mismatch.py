@@ -213,7 +213,7 @@ def outcome(diagnosis):
     if v.answer == "a_or_b" and "pad_preload" in v.names:
         return "The tool named it as one of two."
     leads = v.scores and v.scores[0].family == "pad_preload"
-    text = "The tool missed it: nothing above its thresholds" if v.answer == "none" else "The tool gave it no name"
+    text = "The tool missed it: no effect has enough evidence" if v.answer == "none" else "The tool gave it no name"
     return text + (", though the right name leads the ranking." if leads else ", and the right name does not lead.")
 
 

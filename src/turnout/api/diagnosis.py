@@ -155,7 +155,7 @@ def diagnose(
     ...     def predict(self, values, terms, observations):
     ...         return [values["stiffness"] * x + sum(terms) * x**3 for _ in observations]
     >>> turnout.diagnose(Spring())
-    Diagnosis(named cubic_spring, grade A; probability 0.97, 1 candidates)
+    Diagnosis(named: cubic spring, grade A; probability 0.97, 1 candidate)
 
     References
     ----------

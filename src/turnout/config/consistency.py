@@ -7,9 +7,10 @@ from zoneinfo import available_timezones
 from turnout.config.document import Branch, merge_branches
 from turnout.config.file_names import file_key, name_problem
 from turnout.config.filename_pattern import compile_pattern
-from turnout.config.schema import number_text, suggestion
+from turnout.config.schema import suggestion
 from turnout.config.settings_schema import settings_keys
 from turnout.errors import ConfigError
+from turnout.number_text import number_text
 from turnout.units import IGNORED, SI, volts_per_unit
 
 # (quantity, unit, sensitivity, sensitivity_unit) -> conversion, as turnout.units.to_si
@@ -140,7 +141,7 @@ def _range_errors(channel: Branch) -> Iterator[ConfigError]:
         if value is not None and (value > high or (key == "limit" and value < low)):
             least = "above 0 and up" if key == "resolution" else f"from {number_text(low)}"
             remedy = f"No sensor of {quantity} has it: write a number {least} to {number_text(high)} {SI[quantity]}"
-            yield channel[key].place.error(f"{key} is {value:g} {SI[quantity]}", remedy)
+            yield channel[key].place.error(f"{key} is {number_text(value)} {SI[quantity]}", remedy)
     sensitivity, unit = _value(channel, "sensitivity"), _value(channel, "sensitivity_unit") or ""
     if not sensitivity or quantity not in SENSITIVITIES:
         return

@@ -3,7 +3,8 @@
 import json
 from typing import Any
 
-from turnout.config.schema import Key, number_text
+from turnout.config.schema import Key
+from turnout.number_text import number_text
 
 
 def describe_key(key: Key) -> str:

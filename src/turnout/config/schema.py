@@ -9,6 +9,7 @@ from typing import Any
 from turnout.config.document import Branch, Leaf
 from turnout.config.settings.setting import MAIL_ADDRESSES, MAIL_SENDER, WEB_ADDRESS
 from turnout.errors import ConfigError
+from turnout.number_text import number_text
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
 LABEL = r"[A-Za-z][A-Za-z0-9-]*"
@@ -131,27 +132,6 @@ def quotation(value: Any) -> str:
     """
     text = repr(value)
     return text if len(text) <= MAX_QUOTED else text[:MAX_QUOTED] + " ..."
-
-
-def number_text(value: float) -> str:
-    """A limit as a message states it: in digits, with marks for thousands from a million on.
-
-    Parameters
-    ----------
-    value : float
-        The limit.
-
-    Returns
-    -------
-    str
-        Its text.
-
-    Examples
-    --------
-    >>> number_text(10_000_000), number_text(250), number_text(0.004), number_text(1e-9)
-    ('10,000,000', '250', '0.004', '1e-09')
-    """
-    return f"{value:,.0f}" if abs(value) >= 1e6 else f"{value:g}"
 
 
 def value_problem(key: Key, value: Any) -> tuple[str, str] | None:

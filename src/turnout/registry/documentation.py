@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from turnout.errors import REASONS, RegistryError
+from turnout.number_text import number_text
 from turnout.registry.comments import row_meaning
 from turnout.registry.schema import Column, tables
 from turnout.registry.view_texts import view_columns, view_files
@@ -167,11 +168,11 @@ def _values(column: Column) -> str:
     if column.allowed:
         words.append(", ".join(column.allowed))
     elif column.minimum is not None and column.maximum is not None and abs(column.maximum) < 1e300:
-        words.append(f"{column.minimum:g} to {column.maximum:g}")
+        words.append(f"{number_text(column.minimum)} to {number_text(column.maximum)}")
     elif column.minimum is not None and column.minimum > -1e300:
-        words.append(f"at least {column.minimum:g}")
+        words.append(f"at least {number_text(column.minimum)}")
     if column.decimals is not None:
-        words.append(f"kept to {10.0**-column.decimals:g}")
+        words.append(f"rounded to {number_text(10.0**-column.decimals)}")
     return "; ".join(words)
 
 

@@ -10,6 +10,8 @@ from importlib.resources import files
 from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
+from turnout.number_text import number_text
+
 if TYPE_CHECKING:
     from typing import NoReturn
 
@@ -86,8 +88,8 @@ class Column:
         if self.is_list:
             return "every element finite and none empty"
         if self.minimum is not None and self.maximum is not None:
-            return f"between {self.minimum:g} and {self.maximum:g} {self.unit}".rstrip()
-        return f"at least {self.minimum:g}" if self.minimum is not None else "finite"
+            return f"between {number_text(self.minimum)} and {number_text(self.maximum)} {self.unit}".rstrip()
+        return f"at least {number_text(self.minimum)}" if self.minimum is not None else "finite"
 
     @property
     def ddl(self) -> str:

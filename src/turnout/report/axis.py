@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.number_text import SUPERSCRIPTS
 from turnout.report.formatting import escape
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 N_AXES = 256  # axes whose ticks are remembered: those of one turnout's charts
-SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def linear_ticks(low: float, high: float, n_target: int = 5) -> list[float]:

@@ -86,7 +86,7 @@ WRONG = {
     ),
     "samples beyond any file": (
         layout("rate: 20000", "rate: 20000\n  samples: 10000000000000"),
-        "samples is 10000000000000. Write a whole number from 1 to 1,000,000,000,000.",
+        "samples is 10000000000000. Write a whole number from 1 to 10¹².",
     ),
     "rate in kHz": (
         layout("rate: 20000", "rate: 12.8"),
@@ -107,11 +107,11 @@ WRONG = {
     ),
     "limit beyond any sensor": (
         layout("source: rail, ", "source: rail, limit: 1e12, "),
-        "limit is 1e+12 m/s². No sensor of acceleration has it: write a number from 1e-06 to 2,000,000 m/s²",
+        "limit is 10¹² m/s². No sensor of acceleration has it: write a number from 0.000001 to 2,000,000 m/s²",
     ),
     "step beyond any sensor": (
         layout("source: force, ", "source: force, resolution: 1e9, "),
-        "resolution is 1e+09 N. No sensor of force has it: write a number above 0 and up to 10,000,000 N",
+        "resolution is 10⁹ N. No sensor of force has it: write a number above 0 and up to 10,000,000 N",
     ),
     "sensitivity in V for mV": (
         layout("sensitivity: 0.23, sensitivity_unit: mV/N", "sensitivity: 230, sensitivity_unit: V/N"),

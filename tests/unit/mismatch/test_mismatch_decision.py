@@ -111,9 +111,14 @@ def test_each_rule_on_an_effect_applies_to_a_case_of_its_own(name):
 
 def test_the_reason_holds_the_figures_of_the_case():
     verdict = judge([score(explained=0.4)], 2.0, MismatchSettings())
-    assert verdict.reason == "the best candidate explains 40% of the excess"
+    assert verdict.reason == (
+        "the best candidate effect explains only 40 % of the residual in excess of the intact state"
+    )
     verdict = judge([score(worst=-9.0)], 2.0, MismatchSettings())
-    assert verdict.reason == "with soft at 3.0 m, one condition is predicted worse (evidence lost: 9 nats)"
+    assert verdict.reason == (
+        "with soft at 3.0 m, recordings of one condition are predicted worse than without it "
+        "(evidence against it: 9 nats, odds of 8,100 to 1)"
+    )
 
 
 @pytest.mark.parametrize(

@@ -349,7 +349,10 @@ def test_a_train_that_is_unlike_its_type_is_reported_and_localized(campaign):
     other = {p.train: p.vehicle for p in campaign.passages}
     swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
     case = TrackCase(replace(campaign, passages=tuple(swapped)))
-    assert case.mismatched_trains == ("heavy",) and len([n for n in case.notes if "likeness" in n]) == 2
+    assert (
+        case.mismatched_trains == ("heavy",)
+        and len([n for n in case.notes if "correlation with the simulation of heavy" in n]) == 2
+    )
     at_file = {n.name: n.mean for n in case.nuisances}
     tolerances = np.diag([n.sd**2 for n in case.nuisances])
     common = {"values": at_file, "covariance": tolerances, "jacobian": {}}  # no derivatives: no local change

@@ -54,7 +54,7 @@ BAD_MODES = [
     ("frequency_hz", True, "True", "of type double"),
     ("frequency_se_hz", NAN, "nan", "between 0 and 2000 Hz"),
     ("frequency_se_hz", -0.1, "-0.1", "between 0 and 2000 Hz"),
-    ("damping_ratio", 1.0, "1.0", "between 1e-06 and 0.999"),
+    ("damping_ratio", 1.0, "1.0", "between 0.000001 and 0.999"),
     ("rail_temperature_c", 80.1, "80.1", "between -50 and 80 °C"),
     ("rail_temperature_c", NAN, "nan", "between -50 and 80 °C"),
     ("band", "rail", "rail", "one of ballast, railpad"),

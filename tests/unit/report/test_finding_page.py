@@ -150,7 +150,7 @@ def test_the_words_of_the_answers_are_those_of_the_documentation(repository):
 
 
 def test_what_shows_beside_a_name_stands_in_its_sentence():
-    reason = "a second effect without a name remains in channel A8: the residual is above the control level"
+    reason = "a second effect without a name remains in channel A8: the residual is larger than in the intact state"
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
     said = "hangs 1.1 mm above its ballast. A second effect without a name remains in channel A8: the residual"
     assert said in headline(row) and "above its ballast." in headline(named())

@@ -47,54 +47,59 @@ def _always(_: Any) -> bool:
 # fmt: off
 NUMERICS_RULES: tuple[Rule[NumericalError], ...] = (
     Rule("own_error_is_material", lambda e: e.is_material and e.exceeds_limit, "numerics",
-         "the numerical error of the simulation is {e.share:.0%} of the mismatch: refine mesh and step first", HOW),
+         "the numerical error of the simulation is {e.share:.0%} of the difference from the recordings: use a finer "
+         "mesh and a shorter time step first", HOW),
     Rule("simulation_is_accurate", _always, "", "", HOW),
 )  # the answer of one effect is sought if no error is material
 
 EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("explains_too_little", lambda e: e.has_leader and e.explains_too_little and not e.exemption, "unknown",
-         "the best candidate explains {e.leader.explained:.0%} of the excess", HOW),
+         "the best candidate effect explains only {e.leader.explained:.0%} of the residual in excess of the intact "
+         "state", HOW),
     Rule("leaves_too_much", lambda e: e.has_leader and e.residual_excess > e.settings.leftover, "unknown",
-         "with {e.leader.in_words}, the residual is still {e.residual_excess:.0f} times the control level", HOW),
+         "with {e.leader.in_words}, the residual is still {e.residual_excess:.0f} times that of the intact state", HOW),
     Rule("excess_without_candidate", lambda e: e.shows_nothing and e.excess > 1.0, "unknown",
-         "the residual is above the control level, and no candidate explains it", HOW),
+         "the residual is larger than in the intact state, and no effect of the catalogue explains it", HOW),
     Rule("sensors_shake_without_wheel", lambda e: e.shows_nothing and e.disturbed, "unknown",
          "all sensors vibrate while no wheel is near", LOCATED, cause="clock"),
     Rule("train_unlike_its_file", lambda e: e.shows_nothing and e.mismatched_trains, "unknown",
-         "most passages of {e.train_names} do not fit its vehicle file", LOCATED, cause="train"),
+         "most passages of {e.train_names} do not agree with the vehicle file", LOCATED, cause="train"),
     Rule("no_train_matches", lambda e: e.shows_nothing and e.no_train_matches, "unknown",
          "no passage resembles the simulation of its train: a large fault of the track, or wrong vehicle files or "
          "positions of sensors", LOCATED, cause="all trains"),
     Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
-         "the recordings are explained only with a value too far from its file: {e.strained}", LOCATED),
+         "the recordings are explained only if a value is far from that of the file: {e.strained}", LOCATED),
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
-         "a component there has another value under trains than under impacts (evidence {e.local_change:.0f} nats)",
+         "a component there has another value under trains than under impacts (evidence: {e.change_in_words})",
          LOCATED),
     Rule(COMPONENT_UNUSUAL, lambda e: e.shows_nothing and e.local_deviation > e.settings.threshold, "unknown",
          "a component there differs from others of its kind by more than they differ among themselves "
-         "(evidence {e.local_deviation:.0f} nats)", LOCATED),
+         "(evidence: {e.deviation_in_words})", LOCATED),
     Rule(AMBIGUOUS, lambda e: e.shows_nothing and e.is_ambiguous, "unknown", "{e.ambiguity.words}",
          "decisions/short-wave-corrugation.md"),
-    Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "nothing above the thresholds", HOW),
+    Rule("no_candidate_passes", lambda e: not e.has_leader, "none", "no effect has the evidence that a name needs",
+         HOW),
     Rule("weak_and_contradicted", lambda e: e.shows_nothing, "none",
          "only weak evidence for {e.leader.in_words}, which other recordings contradict or do not confirm", ENDS),
     Rule("reserved_not_predicted", lambda e: not e.consistent, "unknown",
-         "with {e.leader.in_words}, recordings to which it was not fitted are predicted worse than the others", HOW),
+         "with {e.leader.in_words}, recordings that took no part in its fit are predicted worse than the others", HOW),
     Rule("residual_has_structure", lambda e: e.structure > e.settings.structure_left and e.residual_excess > 1.0,
          "unknown",
-         "an unconstrained force law still explains {e.structure:.0%} of the residual beside {e.leader.in_words}", HOW),
+         "beside {e.leader.in_words}, a force that depends freely on motion or load still explains {e.structure:.0%} "
+         "of the residual", HOW),
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
          "{e.leader.in_words} would have a value that is physically impossible", HOW),
     Rule("single_witness", lambda e: e.leader.single_witness, "unknown",
-         "only {e.leader.single_witness} shows {e.leader.in_words}, and nothing else confirms it", ENDS),
+         "only {e.leader.single_witness} shows {e.leader.in_words}, and no other recording confirms it", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
-         "with {e.leader.in_words}, one condition is predicted worse (evidence lost: {e.largest_loss:.0f} nats)", ENDS),
+         "with {e.leader.in_words}, recordings of one condition are predicted worse than without it "
+         "(evidence against it: {e.loss_in_words})", ENDS),
     Rule("size_at_limit", lambda e: e.limit_forms, "a_or_b",
-         "the size of {e.leader.in_words} is at its limit, where both look alike", PAIRS),
+         "the size of {e.leader.in_words} is at its limit, where both effects cause the same response", PAIRS),
     Rule("rival_within_margin", lambda e: e.rivals, "a_or_b",
-         "the evidence for one is hardly larger than for the other", HOW),
+         "the evidence for one effect is hardly larger than for the other", HOW),
     Rule("exempt_from_explaining", lambda e: e.explains_too_little, "named",
-         "{e.exemption}; it explains {e.leader.explained:.0%} of the excess", PAIRS),
+         "{e.exemption}; it explains {e.leader.explained:.0%} of the residual in excess of the intact state", PAIRS),
     Rule("passes", _always, "named", "", HOW),
 )
 
@@ -117,7 +122,8 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
     Rule("first_stays_unknown", lambda e: e.first_is_unknown, "unknown first", "", PAIRS),
     Rule("no_pair", lambda e: not e.is_pair, "all", "", PAIRS),
     Rule("second_left_alone_explains_too_little", lambda e: e.first_is_redundant and e.second_explains_too_little,
-         "unknown second", "the best candidate explains {e.second_score.explained:.0%} of the excess", PAIRS),
+         "unknown second", "the best candidate effect explains only {e.second_score.explained:.0%} of the "
+         "residual in excess of the intact state", PAIRS),
     Rule("first_adds_too_little", lambda e: e.first_is_redundant, "second", "", PAIRS),
     Rule("second_predicts_reserved_worse", lambda e: e.second_predicts_worse, "first",
          "a second effect is possible: {e.second_text}. With it, held-out recordings are predicted worse", PAIRS),
@@ -128,16 +134,18 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("strained_value_remains", lambda e: e.strained, "unknown",
-         "beside {e.score.in_words}, a value is still too far from its file: {e.strained}", LOCATED),
+         "beside {e.score.in_words}, a value is still far from that of the file: {e.strained}", LOCATED),
     Rule("local_change_remains", lambda e: e.local_change > e.threshold and not e.score.has_position, "unknown",
          "{e.score.in_words} does not explain why single components differ between trains and impacts", LOCATED),
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",
-         "only a lower limit is known for the size of {e.score.in_words}", PAIRS),
+         "of the size of {e.score.in_words} only a lower limit can be determined", PAIRS),
     Rule("free_law_predicts_better", lambda e: e.free_share > THRESHOLDS.max_free_law_share, "unknown",
-         "{e.score.in_words} misses {e.free_share:.0%} of what an unconstrained force law explains", HOW),
+         "{e.score.in_words} misses {e.free_share:.0%} of what a force that depends freely on motion or load explains",
+         HOW),
     Rule("reaches_control_level", lambda e: e.leaves_nothing, "A", "", HOW),
     Rule("must_reach_control_level", lambda e: e.score.candidate.naming.must_reach_control_level, "unknown",
-         "{e.score.in_words} would leave no excess, but the residual is larger than in intact turnouts", LOCATED),
+         "{e.score.in_words} can imitate many other effects, and with it the residual is still larger than in the "
+         "intact state", LOCATED),
     Rule("leaves_some_residual", _always, "B", "", HOW),
 )
 
@@ -155,17 +163,17 @@ UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
 )
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
-         "with {e.words}, the residual is larger than in intact turnouts, and held-out recordings are predicted worse",
+         "with {e.words}, the residual is larger than in the intact state, and held-out recordings are predicted worse",
          ENDS),
     Rule("reserved_fit_falls", lambda e: e.is_single_name and e.falls_clearly, "unknown",
-         "with {e.words}, held-out recordings are predicted clearly worse than without it (evidence lost: "
-         "{e.verification.lost_evidence:.0f} nats)", HOW),
+         "with {e.words}, held-out recordings are predicted clearly worse than without it "
+         "(evidence against it: {e.loss_in_words})", HOW),
     Rule("reserved_fit_falls_for_little_evidence", lambda e: e.is_single_name and e.has_fallen, "B",
          "with {e.words}, held-out recordings are predicted slightly worse than without it: too little to reject the "
          "name, enough for grade B", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
-         "unknown", "held-out recordings are predicted worse than in intact turnouts", HOW),
+         "unknown", "held-out recordings are predicted worse than in the intact state", HOW),
     Rule("not_contradicted", _always, "", "", HOW),
 )
 TOLERATED_RULES: tuple[Rule[ToleratedEvidence], ...] = (

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+from turnout.number_text import evidence_in_words
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -165,9 +166,19 @@ class EffectEvidence:
         return ", ".join(self.mismatched_trains)
 
     @property
-    def largest_loss(self) -> float:
-        """Loss of the condition that loses most by the leader. [nats]"""
-        return -self.leader.worst_gain
+    def loss_in_words(self) -> str:
+        """Loss of the condition that loses most by the leader."""
+        return evidence_in_words(-self.leader.worst_gain)
+
+    @property
+    def change_in_words(self) -> str:
+        """The evidence ``local_change``."""
+        return evidence_in_words(self.local_change)
+
+    @property
+    def deviation_in_words(self) -> str:
+        """The evidence ``local_deviation``."""
+        return evidence_in_words(self.local_deviation)
 
     @cached_property
     def limit_forms(self) -> list[Score]:
@@ -316,6 +327,11 @@ class ReservedEvidence:
         """
         gain = self.verdict.scores[0].gain if self.verdict.scores else 0.0
         return self.has_fallen and is_contradicted(-self.verification.lost_evidence, gain, self.settings)
+
+    @property
+    def loss_in_words(self) -> str:
+        """Evidence against the name from reserved recordings."""
+        return evidence_in_words(self.verification.lost_evidence)
 
     @property
     def verdict(self) -> Verdict:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.counts import count_of
 from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes, local_deviations
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
@@ -67,11 +68,12 @@ class Diagnosis:
     def __repr__(self) -> str:
         words = []
         for v in self.verdicts:
-            names = " or ".join(v.names) or v.reason
+            names = " or ".join(v.names_in_words) or v.reason
             words.append(
-                v.answer.replace("_", " ") + (f" {names}" if names else "") + f", grade {v.grade}" * bool(v.grade)
+                v.answer.replace("_", " ") + (f": {names}" if names else "") + f", grade {v.grade}" * bool(v.grade)
             )
-        return f"Diagnosis({'; '.join(words)}; probability {self.probability:.2f}, {len(self.scores)} candidates)"
+        candidates = count_of(len(self.scores), "candidate")
+        return f"Diagnosis({'; '.join(words)}; probability {self.probability:.2f}, {candidates})"
 
     @property
     def verdict(self) -> Verdict:

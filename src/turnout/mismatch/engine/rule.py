@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -48,7 +49,7 @@ class Rule(Generic[Facts]):
         -------
         str
         """
-        return self.reason.format(e=evidence)
+        return re.sub(r"(?<=\d)%", " %", self.reason.format(e=evidence))
 
 
 def first_applicable(rules: Sequence[Rule[Facts]], evidence: Facts) -> Rule[Facts]:

@@ -104,9 +104,9 @@ class Score:
             and evidence > settings.threshold
             and self.gain > evidence - settings.margin
         ):
-            return "its impacts alone show it"
+            return "the impacts of its wheels alone are evidence enough"
         is_unmasked = self.unmasked_gain - position_cost > settings.threshold
-        return "seen where the effect named before does not show" if is_unmasked else ""
+        return "it is visible in recordings in which the effect named first is not" if is_unmasked else ""
 
     def explains_too_little(self, excess: float, settings: MismatchSettings) -> bool:
         """Whether it explains too little of an excess over controls to be its cause.

@@ -23,7 +23,10 @@ LOGARITHM = "ln "  # with it begins the meaning of a value whose logarithm is fi
 
 @dataclass(frozen=True)
 class StrainedValue:
-    """A value of the base model that is ``deviation`` prior standard deviations from its file. It has paid ``nats``."""
+    """A value of the base model that is ``deviation`` prior standard deviations from its file.
+
+    ``nats`` is its conflict with the prior.
+    """
 
     nuisance: Nuisance
     deviation: float
@@ -31,7 +34,7 @@ class StrainedValue:
 
     def __str__(self) -> str:
         words = (self.nuisance.meaning or self.nuisance.name).removeprefix(LOGARITHM).replace("_", " ")
-        return f"{words} ({self.deviation:.1f} times its tolerance from the file)"
+        return f"{words} (it differs from the file by {self.deviation:.1f} times its tolerance)"
 
 
 def strained_value(case: Case, fit: Fit, threshold: float) -> StrainedValue | None:

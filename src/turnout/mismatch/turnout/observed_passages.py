@@ -79,7 +79,7 @@ def observe_passages(
     if len(observations) - len(rejected) < 2:  # too few would remain: all are used
         rejected = {}
     notes += [
-        f"passage {name}: not used, {d.excess:.0f} dB louder {d.when} its train than the others"
+        f"passage {name}: not used, its vibration {d.when} the train is {d.excess:.0f} dB above that of other passages"
         for name, d in rejected.items()
     ]
     return ObservedPassages(
@@ -102,8 +102,9 @@ class _Unmatched:
 
     def __str__(self) -> str:
         return (
-            f"likeness {self.correlation:.2f} with the simulation of {self.passage.train or 'its train'}; "
-            "wrong vehicle file, wrong sensor places or another turnout"
+            f"not used, its correlation with the simulation of {self.passage.train or 'its train'} is "
+            f"{self.correlation:.2f}, and {ALIGNMENT.min_correlation:g} is needed; the vehicle file, the positions of "
+            "sensors or the turnout may be wrong"
         )
 
 
@@ -113,11 +114,11 @@ def _observe_passage(
     """The aligned passage and its observation without error modes, or the reason why it cannot be used."""
     sensors = aligner.campaign.sensors_of(passage)
     if not sensors:
-        return "none of the sensors recorded it"
+        return "not used, no sensor recorded it"
     try:
         reference, speed, correlation = aligner.align(values, passage)
     except SimulationError as error:
-        return f"cannot be simulated: {error}"
+        return f"not used, it cannot be simulated: {error}"
     if correlation < ALIGNMENT.min_correlation:
         is_timed = correlation > CASE.min_timed_correlation
         timed = AlignedPassage(passage.name, passage, sensors, np.zeros(0), reference, speed) if is_timed else None

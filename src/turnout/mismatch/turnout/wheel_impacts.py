@@ -113,24 +113,27 @@ def wheel_impacts(case: TrackCase) -> Ambiguity | None:
 
 def _at_position(levels: ImpactLevels) -> Ambiguity:
     position = levels.position()
-    words = f"wheels cause impacts there, {_loudness(levels)}. It may be {EXPLANATIONS}"
+    words = f"wheels cause impacts there: {_excess_in_words(levels)}. The cause may be {EXPLANATIONS}"
     measurement = "the running surface there, and look for loose parts of fastenings and guard rail"
     low, high = position - IMPACTS.position_error, position + IMPACTS.position_error
     return Ambiguity(levels.evidence(), words, measurement, "place", f"{position:.2f} m", low, high)
 
 
 def _of_train(levels: ImpactLevels, train: str) -> Ambiguity:
-    others = "and those of no other train" if len(levels.own) > 1 else "and no other train was fitted"
+    others = "and those of no other train do" if len(levels.own) > 1 else "and no other train was used"
     near = f"near {levels.position():.1f} m"
-    words = f"wheels of {train} cause impacts, {_loudness(levels)}, {others}. It may be a defect of a wheel, or {near} "
+    words = (
+        f"wheels of {train} cause impacts, {others}: {_excess_in_words(levels)}. "
+        f"The cause may be a defect of a wheel, or {near} "
+    )
     measurement = f"the wheels of {train}, and look for loose parts {near}"
     return Ambiguity(levels.evidence(), words + EXPLANATIONS, measurement, "train", train)
 
 
-def _loudness(levels: ImpactLevels) -> str:
-    """The loudest level over that of rolling, in words."""
+def _excess_in_words(levels: ImpactLevels) -> str:
+    """The highest level over that of rolling, in words."""
     decibels = 10.0 / np.log(10.0) * float(np.max(levels.of_all))
-    return f"{decibels:.0f} dB louder than rolling above {1e-3 * IMPACTS.low_frequency:.1f} kHz"
+    return f"their level above {1e-3 * IMPACTS.low_frequency:.1f} kHz exceeds that of rolling by {decibels:.0f} dB"
 
 
 def impact_signals(case: TrackCase) -> list[ImpactSignal]:

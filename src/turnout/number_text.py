@@ -1,0 +1,70 @@
+"""Numbers in texts: limits without an exponent of a programming language, evidence with the odds that it means."""
+
+from __future__ import annotations
+
+import math
+
+LARGEST_ODDS = 1_000_000  # to 1: beyond, the number tells nobody anything
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number_text(value: float) -> str:
+    """A limit as a message states it: in digits, with marks for thousands from a million on, else a power of ten.
+
+    Parameters
+    ----------
+    value : float
+        The limit.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> number_text(10_000_000), number_text(250), number_text(0.004), number_text(1e-6), number_text(-2.5e6)
+    ('10,000,000', '250', '0.004', '0.000001', '-2,500,000')
+    >>> number_text(1e15), number_text(-2e9), number_text(1e-12), number_text(0.0), number_text(float("inf"))
+    ('10¹⁵', '-2·10⁹', '10⁻¹²', '0', 'inf')
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    exponent = math.floor(math.log10(abs(value)) + 1e-12)
+    if -4 <= exponent < 6:
+        return f"{value:g}"
+    if 6 <= exponent < 9:
+        return f"{value:,.0f}"
+    if -6 <= exponent < 0:
+        return f"{value:.{5 - exponent}f}".rstrip("0")
+    mantissa = f"{value / 10.0**exponent:g}"
+    power = "10" + str(exponent).translate(SUPERSCRIPTS)
+    return {"1": power, "-1": f"-{power}"}.get(mantissa, f"{mantissa}·{power}")
+
+
+def evidence_in_words(nats: float) -> str:
+    """Evidence with its unit, and as odds of the likelier to the less likely explanation.
+
+    Parameters
+    ----------
+    nats : float
+        Log Bayes factor. [nats]
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> evidence_in_words(12.0), evidence_in_words(4.0), evidence_in_words(80.0)
+    ('12 nats, odds of 160,000 to 1', '4 nats, odds of 55 to 1', '80 nats, odds above 1,000,000 to 1')
+    >>> evidence_in_words(-3.0), evidence_in_words(float("inf"))
+    ('-3 nats, odds of 1 to 20', 'infinite nats, odds above 1,000,000 to 1')
+    """
+    number = f"{nats:.0f}" if math.isfinite(nats) else "infinite"
+    if abs(nats) > math.log(LARGEST_ODDS):
+        size = f"above {LARGEST_ODDS:,} to 1" if nats > 0.0 else f"below 1 to {LARGEST_ODDS:,}"
+        return f"{number} nats, odds {size}"
+    odds = int(float(f"{math.exp(abs(nats)):.2g}"))
+    return f"{number} nats, odds of {f'{odds:,} to 1' if nats >= 0.0 else f'1 to {odds:,}'}"
