@@ -37,8 +37,8 @@ def plot_recording(recording: Recording, figure: Figure | SubFigure | None = Non
 
     Returns
     -------
-    array
-        (n_channel,) axes; see ``Recording.plot``.
+    (n_channel,) array of Axes
+        See ``Recording.plot``.
     """
     n_channel = len(recording.channels)
     axes = _figure(figure, 1.0 + 1.5 * n_channel).subplots(n_channel, 1, sharex=True, squeeze=False)[:, 0]
@@ -63,8 +63,8 @@ def plot_receptance(receptance: Receptance, figure: Figure | SubFigure | None = 
 
     Returns
     -------
-    array
-        (2,) axes; see ``Receptance.plot``.
+    (2,) array of Axes
+        See ``Receptance.plot``.
     """
     grid = {"height_ratios": (2.0, 1.0)}
     axes = _figure(figure, 5.6).subplots(2, 1, sharex=True, gridspec_kw=grid)
@@ -99,7 +99,7 @@ def plot_model(model: ModalModel, figure: Figure | SubFigure | None = None) -> n
 
     Returns
     -------
-    array
+    (n_axes,) array of Axes
         See ``ModalModel.plot``.
     """
     rows: list[Any] = [["receptance"] * max(len(model.modes), 1)] if model.receptance is not None else []

@@ -1,6 +1,7 @@
-"""Public functions document their parameters."""
+"""Public functions document their parameters, the shapes of arrays and what they raise."""
 
 import ast
+import builtins
 import re
 
 from syntax_trees import tree_of
@@ -76,11 +77,59 @@ def test_what_is_returned_is_not_said_twice(repository):
             if "Returns\n-------\n" not in text:
                 continue
             summary, returned = text.split("\n\n")[0], text.split("Returns\n-------\n")[1].split("\n\n")[0]
+            summary = re.sub(r"^\([\w*+/,. ]+\) ", "", summary)  # a shape
             if words(summary) == words(" ".join(returned.splitlines()[1:])):
                 repeated.append(f"{path.relative_to(repository)}:{node.lineno} {node.name}")
     assert not repeated, "\n".join(repeated)
 
 
 def words(text):
-    """The words of a text, without blanks and signs between them."""
-    return re.findall(r"\w+", text)
+    """The words of a text in lower case, without blanks and signs between them."""
+    return re.findall(r"\w+", text.lower())
+
+
+def test_arrays_have_shapes(repository):
+    """An array without its shape leaves open which of its axes is which. ``(...)`` stands for any shape."""
+    shapeless = []
+    for place, function, _ in public_functions(repository):
+        text = ast.get_docstring(function) or ""
+        for heading in ("Parameters\n----------\n", "Returns\n-------\n"):
+            for line in text.partition(heading)[2].partition("\n\n")[0].splitlines():
+                if not line.startswith(" ") and re.search(r"\barrays?\b", line.split(" : ")[-1]) and "(" not in line:
+                    shapeless.append(f"{place}: {line}")
+    shapeless = [line for line in shapeless if line.startswith("src/turnout/")]
+    assert not shapeless, "\n".join(shapeless)
+
+
+def raised_names(function):
+    """Names of the exceptions that a function raises itself, outside a ``try`` that may handle them."""
+    handled = {
+        node
+        for block in ast.walk(function)
+        if isinstance(block, ast.Try) and block.handlers
+        for statement in block.body
+        for node in ast.walk(statement)
+    }
+    for node in ast.walk(function):
+        if isinstance(node, ast.Raise) and node not in handled:
+            name = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            if isinstance(name, ast.Name) and name.id[0].isupper():
+                yield name.id
+
+
+def exception_bases(name):
+    """A built-in exception with those that it is a special case of; any other name alone."""
+    bases = getattr(builtins, name).__mro__ if hasattr(builtins, name) else ()
+    return {name} | {base.__name__ for base in bases} - {"Exception", "BaseException", "object"}
+
+
+def test_public_functions_name_what_they_raise(repository):
+    unnamed = [
+        f"{place}: {name}"
+        for place, function, _ in public_functions(repository)
+        for name in raised_names(function)
+        if place.startswith("src/turnout/")
+        and name != "NotImplementedError"
+        and not exception_bases(name) & set(re.findall(r"\w+", ast.get_docstring(function) or ""))
+    ]
+    assert not unnamed, "\n".join(unnamed)

@@ -58,6 +58,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigErrors
+        A cell of the new row is wrong, or the row has no effect.
     """
     from datetime import UTC, datetime
     from pathlib import Path

@@ -41,6 +41,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        There is such a turnout already, or the new row is wrong.
     """
     from pathlib import Path
 

@@ -40,6 +40,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The settings name neither recipients nor a webhook.
     """
     from turnout.config import load_configuration
     from turnout.errors import ConfigError

@@ -57,6 +57,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    SimulationError
+        Both hammer tests and modes are given, or none, or a mode is not plausible.
     """
     from turnout.errors import SimulationError
     from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, resolve_track

@@ -55,6 +55,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The raw folder is absent.
     """
     from turnout.config import load_configuration
     from turnout.errors import ConfigError

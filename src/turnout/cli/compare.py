@@ -56,6 +56,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The name of an output is that of a folder.
     """
     from pathlib import Path
 

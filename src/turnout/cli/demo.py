@@ -47,6 +47,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        A number is too small, or the folder holds other turnouts.
     """
     import os
     from pathlib import Path

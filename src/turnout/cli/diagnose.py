@@ -86,6 +86,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        An option is given that acts with --accept only.
     """
     from turnout.errors import ConfigError
     from turnout.stages.mismatch_results import Results

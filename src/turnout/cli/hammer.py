@@ -63,6 +63,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The raw folder is absent, or the figure cannot be written.
     """
     from pathlib import Path
 

@@ -46,6 +46,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The name is not valid, or there is such a layout already.
     """
     import os
     import re

@@ -60,6 +60,11 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        The number of shards is out of its range, or the raw folder is absent.
     """
     from pathlib import Path
 

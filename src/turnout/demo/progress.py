@@ -85,8 +85,6 @@ def run_with_progress(command: Sequence[str], log: Path, say: Callable[[str], ob
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace",
             env=snakemake_environment(),
         )  # fmt: skip
-        if process.stdout is None:
-            raise ValueError("the output of the process is not a pipe")
         lines = []
 
         def log_lines() -> Iterable[str]:

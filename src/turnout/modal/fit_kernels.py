@@ -88,7 +88,7 @@ def iterate_mixed(
         Sampling rate. [Hz]
     decays : (n_impact, n_response, n) array of float
         Decays of each impact.
-    columns, power_sums : array of float
+    columns, power_sums : (n_column, n) array of float, (3, n_term) array of float
         As in :func:`~turnout.modal.wave_kernels.fit_waves`.
     dof : int
         Degrees of freedom of the residual.
@@ -154,7 +154,7 @@ def iterate_common(
         Sampling rate. [Hz]
     decays : (1, n_decay, n) array of float
         All decays.
-    columns, power_sums : array of float
+    columns, power_sums : (n_column, n) array of float, (3, n_term) array of float
         As in :func:`~turnout.modal.wave_kernels.fit_waves`.
     dof : int
         Degrees of freedom of the residual.

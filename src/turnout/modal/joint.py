@@ -198,7 +198,7 @@ def identify_joint(
         Settings of the identification.
     receptance : Receptance or None
         Receptance whose gate rejects modes and whose H1 gives the residues; None: no gate.
-    leads : sequence of array or None
+    leads : sequence of (n_lead,) arrays of float or None
         Not used.
     second : sequence of (n,) arrays of float, optional
         Decays of a second response to the same impacts, which has the same modes. [m/s²]

@@ -83,7 +83,7 @@ def powers(z: np.ndarray, n: int) -> np.ndarray:
 
     Parameters
     ----------
-    z : array of complex
+    z : (...) array of complex
         Factors, of any shape.
     n : int
         Number of powers.
@@ -158,12 +158,12 @@ def contiguous(values: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : array of float
+    values : (...) array of float
         Any.
 
     Returns
     -------
-    array of float
+    (...) array of float
         Contiguous and writeable; ``values`` itself if it is.
     """
     return np.require(values, dtype=float, requirements=("C", "W"))
@@ -199,7 +199,7 @@ def linearisation_of(fit: tuple[np.ndarray, ...]) -> Linearisation:
 
     Parameters
     ----------
-    fit : tuple of array
+    fit : tuple of (n_group, ...) arrays of float
         What it returns.
 
     Returns

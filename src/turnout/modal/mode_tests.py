@@ -72,8 +72,8 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    statistic : array
-        (n_decay, n_mode) values of ``mode_chi_squared``.
+    statistic : (n_decay, n_mode) array of float
+        Values of ``mode_chi_squared``.
 
     Returns
     -------
@@ -93,8 +93,8 @@ def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.nda
 
     Parameters
     ----------
-    statistic : array
-        (n_decay, n_mode) values of ``mode_chi_squared``.
+    statistic : (n_decay, n_mode) array of float
+        Values of ``mode_chi_squared``.
     probability : float
         Level of significance.
 

@@ -17,15 +17,15 @@ def modal_parameters(pole: ArrayLike, rate: float) -> tuple[np.ndarray, np.ndarr
 
     Parameters
     ----------
-    pole : array of complex
+    pole : (...) array of complex
         Eigenvalues z of the state matrix, any shape.
     rate : float
         Sampling rate. [Hz]
 
     Returns
     -------
-    frequency, damping : arrays of float
-        Undamped natural frequency [Hz] and damping ratio, same shape.
+    frequency, damping : (...) arrays of float
+        Undamped natural frequency [Hz] and damping ratio [-], of the shape of ``pole``.
 
     References
     ----------
@@ -53,9 +53,9 @@ def continuous_pole(frequency: ArrayLike, damping: ArrayLike) -> np.ndarray:
 
     Parameters
     ----------
-    frequency : float or array
+    frequency : float or (...) array
         Undamped natural frequency. [Hz]
-    damping : float or array
+    damping : float or (...) array
         Damping ratio, below 1 in magnitude, broadcast against ``frequency``.
 
     Returns
@@ -85,9 +85,9 @@ def discrete_pole(frequency: ArrayLike, damping: ArrayLike, rate: float) -> np.n
 
     Parameters
     ----------
-    frequency : float or array
+    frequency : float or (...) array
         Undamped natural frequency. [Hz]
-    damping : float or array
+    damping : float or (...) array
         Damping ratio, below 1 in magnitude.
     rate : float
         Sampling rate. [Hz]

@@ -15,14 +15,14 @@ def haversine_pulse(time: np.ndarray, duration: np.ndarray | float) -> np.ndarra
 
     Parameters
     ----------
-    time : array of float
+    time : (...) array of float
         Time from the start of contact. [s]
-    duration : float or array
+    duration : float or (...) array
         Length T of the contact, broadcast against ``time``. [s]
 
     Returns
     -------
-    array
+    (...) array
         Force relative to its peak, 0 to 1.
 
     Examples

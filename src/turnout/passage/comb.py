@@ -204,16 +204,16 @@ def evidence(share: np.ndarray | float, length: np.ndarray | float, n_sensor: in
 
     Parameters
     ----------
-    share : array of float
+    share : float or (...) array of float
         R², the explained share of the power. [-]
-    length : array of float
-        Audible length, of the same shape or one that broadcasts. [m]
+    length : float or (...) array of float
+        Audible length, broadcast against ``share``. [m]
     n_sensor : int
         Number of independent sensors.
 
     Returns
     -------
-    array of float
+    (...) array of float
         Log Bayes factor. [nat]
 
     References

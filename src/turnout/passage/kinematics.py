@@ -38,12 +38,12 @@ class Motion:
 
         Parameters
         ----------
-        distance : float or array of float
+        distance : float or (...) array of float
             Distance past the origin. [m]
 
         Returns
         -------
-        array of float
+        (...) array of float
             Of the shape of ``distance``. [s]
 
         Examples
@@ -58,12 +58,12 @@ class Motion:
 
         Parameters
         ----------
-        time : float or array of float
+        time : float or (...) array of float
             Time after the start of the recording. [s]
 
         Returns
         -------
-        array of float
+        (...) array of float
             Of the shape of ``time``. [m]
         """
         elapsed = np.asarray(time, dtype=float) - self.start
@@ -74,14 +74,14 @@ class Motion:
 
         Parameters
         ----------
-        offsets : array of float
+        offsets : (...) array of float
             Distances of the axles behind the first. [m]
         position : float
             Position along the turnout. [m]
 
         Returns
         -------
-        array of float
+        (...) array of float
             Of the shape of ``offsets``. [s]
         """
         return self.time(np.asarray(offsets, dtype=float) + self.direction * position)
@@ -91,12 +91,12 @@ class Motion:
 
         Parameters
         ----------
-        time : float or array of float
+        time : float or (...) array of float
             Time after the start of the recording. [s]
 
         Returns
         -------
-        array of float
+        (...) array of float
             Of the shape of ``time``. [m/s]
         """
         return self.speed + self.acceleration * (np.asarray(time) - self.start)

@@ -195,8 +195,11 @@ def weighted_mean(first: tuple[float, float], second: tuple[float, float]) -> tu
 
     Examples
     --------
-    >>> weighted_mean((10.0, 1.0), (20.0, 1e9))
-    (10.0, 1.0)
+    Errors of 3 and 4 weigh as 16 to 9.
+
+    >>> mean, se = weighted_mean((10.0, 3.0), (20.0, 4.0))
+    >>> print(f"{mean:.2f} {se:.2f}")
+    13.60 2.40
     """
     (a, sa), (b, sb) = first, second
     wa, wb = 1 / sa**2, 1 / sb**2

@@ -56,7 +56,7 @@ class WheelBasis:
 
         Parameters
         ----------
-        phi : float or array of float
+        phi : float or (...) array of float
             Fraction of a sample by which the impact precedes the first sample. [samples]
         jump : (n_state,) array of float, optional
             Jump of the state; b by default.
@@ -76,7 +76,7 @@ class WheelBasis:
 
         Parameters
         ----------
-        phi : float or array of float
+        phi : float or (...) array of float
             Fraction of a sample by which the impact precedes the first sample. [samples]
 
         Returns

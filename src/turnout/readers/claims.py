@@ -97,7 +97,7 @@ def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarra
 
     Returns
     -------
-    array or bytes
+    (...) array or bytes
         The numbers, read-only; the bytes of a member that is no array.
 
     Raises

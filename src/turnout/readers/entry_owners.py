@@ -8,12 +8,38 @@ from turnout.readers.entries import FREE_TEXT, Entry
 
 
 def container_of(entry: Entry) -> str:
-    """The place of an entry without its own name."""
+    """The place of an entry without its own name.
+
+    Parameters
+    ----------
+    entry : Entry
+        The entry.
+
+    Returns
+    -------
+    str
+        Its place without its name and without separators at the end.
+    """
     return entry.place.removesuffix(entry.name).rstrip("/: ")
 
 
 def owners_of(entry: Entry, entries: Sequence[Entry], names: Sequence[str]) -> frozenset[int]:
-    """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any."""
+    """Indices of the channels that the place of an entry, its name or a text beside it name; empty without any.
+
+    Parameters
+    ----------
+    entry : Entry
+        The entry.
+    entries : sequence of Entry
+        All entries of the record.
+    names : sequence of str
+        Names of the channels.
+
+    Returns
+    -------
+    frozenset of int
+        Indices of the channels, from 0.
+    """
     if owners := named_channels(f"{entry.place} {entry.name}", names):
         return owners
     container = container_of(entry)

@@ -151,7 +151,7 @@ def is_flag_series(array: Any) -> bool:
 
     Parameters
     ----------
-    array : array or LazyColumn
+    array : (...) array or LazyColumn
         Numbers of any type.
 
     Returns

@@ -157,6 +157,8 @@ class Source:
             If the call raises an exception that is no fault of the machine.
         InstallationError
             If a package is missing or broken.
+        KeyboardInterrupt
+            If the library turned one into an exception of its own.
         """
         try:
             yield

@@ -96,7 +96,18 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
 
 @lru_cache(maxsize=4096)
 def scales_in_text(text: str) -> tuple[tuple[str, str], ...]:
-    """Names and values of the scales in a free text, as in "gain 10, tip: steel"."""
+    """Names and values of the scales in a free text, as in "gain 10, tip: steel".
+
+    Parameters
+    ----------
+    text : str
+        Free text of an entry; longer than ``MAX_SCALE_TEXT`` it states none.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Name and value of each scale, in the order of the text.
+    """
     if len(text) > MAX_SCALE_TEXT or not re.search(r"[^\W\d]{3}.*\d", text):
         return ()
     entries = [e for e in entries_of_text(text, "") if scale_meaning(e.name)]

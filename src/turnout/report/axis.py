@@ -186,12 +186,12 @@ class Axis:
 
         Parameters
         ----------
-        values : float or array
+        values : float or (...) array
             Values.
 
         Returns
         -------
-        array
+        (...) array
             Position; outside 0 to 1 for values beyond the ends.
         """
         if isinstance(values, (float, int)):  # much faster than an array of one value

@@ -91,12 +91,12 @@ class Chart:
 
         Parameters
         ----------
-        values : float or array
+        values : float or (...) array
             Horizontal values.
 
         Returns
         -------
-        array
+        (...) array
             Pixels from the left.
         """
         return LEFT + self.x.share(values) * (self.width - LEFT - RIGHT)
@@ -106,12 +106,12 @@ class Chart:
 
         Parameters
         ----------
-        values : float or array
+        values : float or (...) array
             Vertical values.
 
         Returns
         -------
-        array
+        (...) array
             Pixels from the top.
         """
         return self.height - BOTTOM - self.y.share(values) * (self.height - self.top - BOTTOM)
@@ -121,9 +121,9 @@ class Chart:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Horizontal values.
-        y : array of float
+        y : (n,) array of float
             Vertical values; not finite: a gap.
         style : str
             Class of the style sheet.
@@ -140,11 +140,11 @@ class Chart:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Horizontal values.
-        low : array of float
+        low : (n,) array of float
             Values of the lower line.
-        high : array of float
+        high : (n,) array of float
             Values of the upper line.
         style : str
             Class of the style sheet.
@@ -172,17 +172,17 @@ class Chart:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Horizontal values.
-        y : array of float
+        y : (n,) array of float
             Vertical values; not finite: a gap.
         style : str
             Class of the style sheet.
         radius : float
             Radius of the dots. [px]
-        low : array of float or None
+        low : (n,) array of float or None
             Lower ends of the bars.
-        high : array of float or None
+        high : (n,) array of float or None
             Upper ends of the bars.
         labels : sequence of str or None
             Text of each dot on hovering.
@@ -253,9 +253,9 @@ class Chart:
 
         Parameters
         ----------
-        x_low : float or array
+        x_low : float or (...) array
             Start of each interval.
-        x_high : float or array
+        x_high : float or (...) array
             End of each interval.
         style : str
             Class of the style sheet.

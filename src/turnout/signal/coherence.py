@@ -22,14 +22,14 @@ def coherence_distribution(estimate: ArrayLike, true: ArrayLike, n: int) -> np.n
 
     Parameters
     ----------
-    estimate, true : array of float in [0, 1]
+    estimate, true : (...) array of float in [0, 1]
         Estimate z and true magnitude-squared coherence; broadcast against each other. [-]
     n : int
         Independent records averaged, 2 or more, else ValueError.
 
     Returns
     -------
-    array of float
+    (...) array of float
 
     Raises
     ------
@@ -94,7 +94,7 @@ def true_coherence_with_quantile(estimate: ArrayLike, n: int, probability: float
 
     Parameters
     ----------
-    estimate : array of float in [0, 1]
+    estimate : (...) array of float in [0, 1]
         Magnitude-squared coherence averaged over ``n`` records. [-]
     n : int
         Independent records averaged.
@@ -103,7 +103,7 @@ def true_coherence_with_quantile(estimate: ArrayLike, n: int, probability: float
 
     Returns
     -------
-    array of float
+    (...) array of float
         True coherence; nan where the estimate is nan. [-]
 
     Examples
@@ -159,7 +159,7 @@ def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> n
 
     Parameters
     ----------
-    estimate : array of float in [0, 1]
+    estimate : (...) array of float in [0, 1]
         Magnitude-squared coherence averaged over ``n`` records. [-]
     n : int
         Independent records averaged.
@@ -168,7 +168,7 @@ def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> n
 
     Returns
     -------
-    array of float
+    (...) array of float
         Lower limit. [-]
 
     Examples

@@ -135,12 +135,12 @@ def half_sine(x: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    x : array of float
+    x : (...) array of float
         Time since the first touch over the contact time. [-]
 
     Returns
     -------
-    array of float
+    (...) array of float
         Force over its peak. [-]
     """
     return np.sin(np.pi * x)
@@ -151,12 +151,12 @@ def haversine(x: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    x : array of float
+    x : (...) array of float
         Time since the first touch over the contact time. [-]
 
     Returns
     -------
-    array of float
+    (...) array of float
         Force over its peak. [-]
     """
     return np.sin(np.pi * x) ** 2
@@ -167,12 +167,12 @@ def hertzian(x: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    x : array of float
+    x : (...) array of float
         Time since the first touch over the contact time. [-]
 
     Returns
     -------
-    array of float
+    (...) array of float
         Force over its peak. [-]
 
     References
@@ -187,12 +187,12 @@ def skewed_pulse(x: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    x : array of float
+    x : (...) array of float
         Time since the first touch over the contact time. [-]
 
     Returns
     -------
-    array of float
+    (...) array of float
         Force over its peak. [-]
     """
     u = SKEW_END * np.asarray(x, dtype=float)
@@ -209,14 +209,14 @@ def force_pulse(family: str, time: np.ndarray, contact: float) -> np.ndarray:
     ----------
     family : str
         A key of ``FAMILIES``.
-    time : array of float
+    time : (...) array of float
         Since the first touch; 0 before it and after ``contact`` (the skewed pulse decays further). [s]
     contact : float
         Contact time. [s]
 
     Returns
     -------
-    array of float
+    (...) array of float
         Between 0 and 1. [-]
 
     Examples

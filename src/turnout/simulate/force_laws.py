@@ -42,14 +42,14 @@ class PowerLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Deformation, pressing positive. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force, never negative. [N]
         """
         d = np.maximum(d, 0.0)
@@ -105,14 +105,14 @@ class GapLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Deformation, pressing positive. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force, never negative. [N]
         """
         d = np.asarray(d, dtype=float)
@@ -145,14 +145,14 @@ class TableLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Deformation, pressing positive. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force. [N]
         """
         x, f = np.asarray(self.deformation), np.asarray(self.elastic)
@@ -181,14 +181,14 @@ class LinearLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Deformation, pressing positive. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force, including the static load. [N]
         """
         return self.preload + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)
@@ -212,14 +212,14 @@ class FrictionLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Only its shape matters. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force against the motion, at most ``limit``. [N]
         """
         return self.limit * np.tanh(np.asarray(rate) / self.slip_rate) + 0.0 * np.asarray(d)
@@ -247,14 +247,14 @@ class LiftLaw:
 
         Parameters
         ----------
-        d : float or array
+        d : float or (...) array
             Deformation from the static state, pressing positive. [m]
-        rate : float or array
+        rate : float or (...) array
             Rate of deformation. [m/s]
 
         Returns
         -------
-        array
+        (...) array
             Force, 0 while the support presses. [N]
         """
         return np.maximum(0.0, -(self.load + self.stiffness * np.asarray(d) + self.damping * np.asarray(rate)))

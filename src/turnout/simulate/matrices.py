@@ -91,12 +91,12 @@ class TrackMatrices:
 
         Parameters
         ----------
-        x : array of float
+        x : (...) array of float
             Positions. [m]
 
         Returns
         -------
-        array of bool
+        (...) array of bool
         """
         inside = self._blade_elements
         return (x >= self.node[inside.start]) & (x < self.node[inside.stop])
@@ -174,8 +174,8 @@ class TrackMatrices:
 
         Returns
         -------
-        array of int, array of float
-            Four rows and weights of the rail, one of a named degree of freedom.
+        (n,) array of int, (n,) array of float
+            Rows and weights: n is 4 for the rail, 1 for a named degree of freedom.
 
         Raises
         ------

@@ -52,12 +52,12 @@ class Rail:
 
         Parameters
         ----------
-        length : float or array
+        length : float or (...) array
             Length of the element. [m]
 
         Returns
         -------
-        array
+        (...) array
             Shear ratio P. [-]
         """
         if self.beam == "euler":
@@ -115,9 +115,9 @@ def shape_functions(s: float | np.ndarray, length: float | np.ndarray, shear_rat
     ----------
     s : float or (...,) array of float
         Position in the element as a share of its length.
-    length : float or array
+    length : float or (...) array
         Length h of the element, broadcast against ``s``. [m]
-    shear_ratio : float or array
+    shear_ratio : float or (...) array
         Shear ratio P, broadcast against ``s``. [-]
 
     Returns
@@ -152,9 +152,9 @@ def rotation_functions(
     ----------
     s : float or (...,) array of float
         Position in the element as a share of its length.
-    length : float or array
+    length : float or (...) array
         Length of the element, broadcast against ``s``. [m]
-    shear_ratio : float or array
+    shear_ratio : float or (...) array
         Shear ratio P, broadcast against ``s``. [-]
 
     Returns
@@ -248,9 +248,9 @@ def local_compliance(s1: float | np.ndarray, s2: float | np.ndarray, length: flo
 
     Parameters
     ----------
-    s1 : float or array
+    s1 : float or (...) array
         Position of the deflection as a share of the length.
-    s2 : float or array
+    s2 : float or (...) array
         Position of the force as a share of the length.
     length : float
         Length of the element. [m]
@@ -259,7 +259,7 @@ def local_compliance(s1: float | np.ndarray, s2: float | np.ndarray, length: flo
 
     Returns
     -------
-    array
+    (...) array
         Deflection per force; the shape of ``s1`` and ``s2`` broadcast. [m/N]
 
     Examples

@@ -45,14 +45,14 @@ def level(wavelength: float | np.ndarray, offset: float = 0.0) -> np.ndarray:
 
     Parameters
     ----------
-    wavelength : float or array
+    wavelength : float or (...) array
         Above 0. [m]
     offset : float
         Level above the limit curve. [dB]
 
     Returns
     -------
-    array
+    (...) array
         Level. [dB re 1 µm]
 
     References

@@ -70,7 +70,7 @@ def equilibrium(
         The train.
     ports : PortArrays
         Wheel contacts and ports of terms.
-    initial_ports : tuple of arrays
+    initial_ports : tuple of (n_port, ...) arrays
         Rows, weights, local compliance, stand-in share and dip of every port at time 0.
     stand_in_stiffness : float
         Stiffness of the stand-in track. [N/m]

@@ -63,12 +63,12 @@ def uniform_spline(value: np.ndarray | Sequence[float], start: float, step: floa
         Position of the first value. [m]
     step : float
         Distance of two values. [m]
-    x : float or array
+    x : float or (...) array
         Positions. [m]
 
     Returns
     -------
-    array
+    (...) array
         Value at each ``x``.
     """
     pieces = uniform_pieces(value)

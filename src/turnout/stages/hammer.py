@@ -61,6 +61,16 @@ def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: 
         Folder that the paths of ``unit.files`` start from.
     algo : str
         Version of the code, part of the model's id.
+
+    Returns
+    -------
+    dict of str to list of dict
+        Table -> rows.
+
+    Raises
+    ------
+    ValueError
+        The unit has no section or campaign, or the turnout no hammer tests.
     """
     if unit.section is None or unit.campaign is None or turnout.hammer is None:
         raise ValueError(f"{unit.turnout}/{unit.label} is no unit of hammer tests")

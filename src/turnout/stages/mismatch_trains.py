@@ -66,6 +66,11 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
     Returns
     -------
     IdentifiedTrain
+
+    Raises
+    ------
+    TrainUnknownError
+        The type or the speed of the train is not known, or there is no file of its type.
     """
     noted_speed = KMH * (noted_number(notes, "speed") or 0.0) or row.get("speed_listed_kmh")
     recorded, min_axle_share = row, MIN_AXLE_SHARE

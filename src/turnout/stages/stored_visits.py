@@ -264,7 +264,18 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
 
 
 def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
-    """One ``VisitInformation`` per visit, of all of its groups of sections."""
+    """One ``VisitInformation`` per visit, of all of its groups of sections.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+        Groups of sections of all visits.
+
+    Returns
+    -------
+    list of VisitInformation
+        In the order in which the visits first appear.
+    """
     members: dict[str, list[StoredVisit]] = {}
     for s in stored:
         members.setdefault(s.visit, []).append(s)

@@ -41,7 +41,7 @@ def unique_of(key: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Returns
     -------
-    two arrays
+    distinct, index : (n_distinct,) array of float, (n,) array of int
         Sorted distinct keys, and the index of each key among them.
     """
     code, unique = pd.factorize(key)

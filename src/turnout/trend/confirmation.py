@@ -30,14 +30,14 @@ def deviation_limit(sd: np.ndarray, settings: TrendSettings) -> np.ndarray:
 
     Parameters
     ----------
-    sd : array of float
+    sd : (...) array of float
         Standard deviation s of one campaign. [%]
     settings : TrendSettings
         Settings of the charts.
 
     Returns
     -------
-    array of float
+    (...) array of float
         Limit. [%]
 
     Examples

@@ -153,7 +153,7 @@ def stack_padded(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    array
+    (n + k, max(m, l)) array of float
         Rows of ``a``, then those of ``b``.
     """
     width = max(a.shape[1], b.shape[1])

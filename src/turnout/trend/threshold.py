@@ -27,13 +27,13 @@ def run_length(threshold: ArrayLike, allowance: ArrayLike, shift: ArrayLike = 0.
 
     Parameters
     ----------
-    threshold, allowance, shift : float or arrays
+    threshold, allowance, shift : float or (...) arrays of float
         h, k and the shift delta, all in standard deviations; H² where D = 0.
 
     Returns
     -------
-    array
-        Mean number of campaigns.
+    float or (...) array of float
+        Mean number of campaigns, of the shape to which the three broadcast.
 
     References
     ----------

@@ -93,7 +93,13 @@ class IdentifySettings:
     paper_bias_tests: int = setting(12, "", "simulated tests behind the bias printed with method paper", minimum=2)
 
     def bands(self) -> tuple[tuple[str, float, float], ...]:
-        """(name, low, high) [Hz] of every band, in the order of the state vector."""
+        """(name, low, high) [Hz] of every band, in the order of the state vector.
+
+        Raises
+        ------
+        ValueError
+            ``extra_bands`` has an odd number of edges.
+        """
         named = [
             ("ballast", self.ballast_low, self.ballast_high),
             ("railpad", self.railpad_low, self.railpad_high),

@@ -141,7 +141,7 @@ class JointProblem:
         ----------
         theta : (n,) array of float
             Nuisances, then parameters of the effects.
-        residuals : sequence of array
+        residuals : sequence of (n,) array of float
             Whitened residuals at ``theta``, by observation.
 
         Returns
@@ -189,9 +189,10 @@ class JointProblem:
         Parameters
         ----------
         theta : (p,) array of float
-        predictions : sequence of array
-            Those at ``theta``.
-        reused : sequence of array or None
+            Nuisances, then parameters of the effects.
+        predictions : sequence of (n,) array of float
+            Those at ``theta``, by observation.
+        reused : sequence of (n, p) array of float or None
             An earlier Jacobian, from which the columns of the nuisances are taken.
 
         Returns

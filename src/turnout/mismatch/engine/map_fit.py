@@ -50,8 +50,8 @@ def fit_jointly(
         Parameters of the effects where the fit starts; None: neutral.
     values : mapping or None
         Nuisance parameters where the fit starts; others start where the case says, or at their prior mean.
-    reused_jacobian : sequence of array or None
-        Its nuisance columns are used instead of new ones, and updated by Broyden's formula.
+    reused_jacobian : sequence of (n, p) array of float or None
+        A Jacobian by observation. Its nuisance columns are used instead of new ones, and updated by Broyden's formula.
     observations : iterable of Observation or None
         Those that are fitted; None: all of the case.
     iterations : int

@@ -87,8 +87,8 @@ class Observation:
 
         Returns
         -------
-        array of float
-            Of the same shape, without unit.
+        (n,) or (n, k) array of float
+            Of the shape of ``values``. [-]
 
         Examples
         --------

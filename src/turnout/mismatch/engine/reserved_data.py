@@ -30,7 +30,7 @@ def reserved_fit(case: Case, fit: Fit) -> tuple[list[np.ndarray], float] | tuple
 
     Returns
     -------
-    predictions : list of array or None
+    predictions : list of (n,) array of float or None
         None if the simulation fails.
     percent : float or None
         As ``fit_percent``. [%]

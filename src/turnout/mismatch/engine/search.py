@@ -125,7 +125,7 @@ class Search:
         psi : (n_term,) array of float
         values : mapping
             Nuisance parameter -> value. Others start at their default.
-        reused_jacobian : list of array or None
+        reused_jacobian : list of (n, p) array of float or None
             Nuisance columns that are updated instead of recomputed.
         stall : float
             Gain per sample that ends the fit of an expensive case.

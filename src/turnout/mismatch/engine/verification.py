@@ -154,7 +154,7 @@ def reserved_excess_ratio(search: Search, predictions: list[np.ndarray]) -> floa
     Parameters
     ----------
     search : Search
-    predictions : list of array
+    predictions : list of (n,) array of float
         Of each reserved recording.
 
     Returns

@@ -40,7 +40,7 @@ class AddedLinks:
         self._by_terms: dict[Hashable, LinkResponses] = {}
 
     def changes(self, pair: FrfPair) -> dict[tuple[str, int], np.ndarray]:
-        r"""(key, start) -> (n,) change of the observation of a pair.
+        r"""Change of the observation of a pair by each candidate at each of its starts.
 
         One link w with impedance z changes a receptance by :math:`-z\,u_w v_w / (1 + z\,g_w)`. Here u and v are the
         motion of its ends under unit forces at impact and sensor, g that under unit forces at its own ends. Several
@@ -53,8 +53,8 @@ class AddedLinks:
 
         Returns
         -------
-        (key, start) dict[tuple[str, int], array]
-            -> (n,) change of the observation of a pair.
+        dict of (str, int) to (n,) array of float
+            (key, start) -> change.
         """
         predictor, chosen = self.predictor, self.chosen
         if not chosen:

@@ -164,7 +164,7 @@ class TrackCase(PredictedCase):
     def own_jacobian(
         self, values: Values, terms: Terms, observation: Observation, predicted: np.ndarray, names: Sequence[str]
     ) -> np.ndarray:
-        """(n, n_name) derivatives of a passage by its own time, speed and load.
+        """Derivatives of a passage by its own time, speed and load.
 
         Parameters
         ----------
@@ -174,15 +174,14 @@ class TrackCase(PredictedCase):
             Physics terms of the effects.
         observation : Observation
             A receptance or passage.
-        predicted : array
-            (n,) prediction of the observation.
+        predicted : (n,) array of float
+            Prediction of the observation.
         names : sequence of str
             Names of the passage's own numbers.
 
         Returns
         -------
-        (n, n_name) array
-            Derivatives of a passage by its own time, speed and load.
+        (n, n_name) array of float
         """
         aligned = self.aligned_passages.get(observation.name)
         if aligned is None:
@@ -339,7 +338,7 @@ class TrackCase(PredictedCase):
 
         Returns
         -------
-        list[array] or None
+        list of (n,) array of float or None
         """
         if not self.aligned_passages:
             return None

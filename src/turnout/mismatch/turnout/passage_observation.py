@@ -57,14 +57,14 @@ class AlignedPassage:
 
         Parameters
         ----------
-        samples : array
-            (n_channel, n) signals.
+        samples : (n_channel, n) array of float
+            Signals.
         rate : float
-            Sampling rate [Hz].
+            Sampling rate. [Hz]
 
         Returns
         -------
-        array
+        (n_channel, n) array of float
         """
         return limit_band(samples, rate, high=self.high)
 

@@ -40,7 +40,7 @@ class PassagePredictor(SiteModel):
     def predict_passage(
         self, values: Values, terms: Terms, aligned: AlignedPassage, with_probes: bool = True
     ) -> np.ndarray:
-        """(n_sensor * n_time,) predicted signals of a passage, one sensor after the other [m/s²].
+        """Predicted signals of a passage, one sensor after the other.
 
         Parameters
         ----------
@@ -56,8 +56,8 @@ class PassagePredictor(SiteModel):
 
         Returns
         -------
-        (n_sensor * n_time,) array
-            Predicted signals of a passage, one sensor after the other [m/s²].
+        (n_sensor * n_time,) array of float
+            Acceleration. [m/s²]
         """
         signals = self.sensor_signals(values, terms, aligned, with_probes)
         return np.concatenate(
@@ -79,12 +79,13 @@ class PassagePredictor(SiteModel):
             A passage with its time shift, speed and load.
         sensor : Sensor
             A sensor.
-        signal : array
-            (n,) simulated acceleration [m/s²].
+        signal : (n,) array of float
+            Simulated acceleration. [m/s²]
 
         Returns
         -------
-        array
+        (n_time,) array of float
+            Acceleration. [m/s²]
         """
         signal = self.through_channel(values, terms, aligned, sensor, signal)
         return self.at_recorded_times(values, aligned, sensor, aligned.limit_band(signal, 4.0 * self.solver.rate))
@@ -161,7 +162,8 @@ class PassagePredictor(SiteModel):
 
         Returns
         -------
-        array
+        (n_sensor, n) array of float
+            Acceleration. [m/s²]
         """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals:
@@ -182,7 +184,8 @@ class PassagePredictor(SiteModel):
 
         Returns
         -------
-        array
+        (n_sensor + n_probe, n) array of float
+            Acceleration of the sensors, then of the probes. [m/s²]
         """
         passage_terms, key = self._terms_and_key(values, terms, aligned)
         if key not in self._signals_with_probes:

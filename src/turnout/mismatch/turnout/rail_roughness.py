@@ -48,39 +48,39 @@ class Waves:
         return [Nuisance(n, "m", 0.0, float(sd), can_mask=False, group="wave") for n, sd in zip(self.names, self.sd)]
 
     def fade(self, x: np.ndarray) -> np.ndarray:
-        """(n,) 0 to 1: envelope that fades the waves at both ends.
+        """Envelope that fades the waves at both ends.
 
         Parameters
         ----------
-        x : array
-            (n,) positions along the rail [m].
+        x : (n,) array of float
+            Positions along the rail. [m]
 
         Returns
         -------
-        (n,) array
-            0 to 1: envelope that fades the waves at both ends.
+        (n,) array of float
+            0 to 1.
         """
         edge = np.clip(np.minimum(x - self.start, self.end - x) / ROUGHNESS.fade_length, 0.0, 1.0)
         return edge * edge * (3.0 - 2.0 * edge)
 
     def shapes(self, x: np.ndarray | Sequence[float]) -> np.ndarray:
-        """(n_wave, n) waves at x, faded at both ends.
+        """Waves at some positions, faded at both ends.
 
         Parameters
         ----------
-        x : array or sequence of float]
-            (n,) positions along the rail [m].
+        x : (n,) array or sequence of float
+            Positions along the rail. [m]
 
         Returns
         -------
-        (n_wave, n) array
-            Waves at x, faded at both ends.
+        (n_wave, n) array of float
+            Of unit amplitude.
         """
         x = np.asarray(x, dtype=float)
         return self.fade(x) * np.cos(2.0 * np.pi * x / self.wavelength[:, None] - self.phase_offset[:, None])
 
     def amplitudes(self, values: Values) -> np.ndarray:
-        """(n_wave,) of ``values``.
+        """Amplitudes of the waves.
 
         Parameters
         ----------
@@ -89,8 +89,8 @@ class Waves:
 
         Returns
         -------
-        (n_wave,) array
-            Of ``values``.
+        (n_wave,) array of float
+            Amplitude. [m]
         """
         return np.array([values[n] for n in self.names])
 

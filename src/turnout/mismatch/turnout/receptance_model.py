@@ -110,7 +110,7 @@ class ReceptanceModel:
             self.by_position |= {p: displacements[:, k] for k, p in enumerate(new)}
 
     def displacement(self, position: float | tuple) -> np.ndarray:
-        """(n_line, n) displacement of all degrees of freedom under a unit force at a position.
+        """Displacement of all degrees of freedom under a unit force at a position.
 
         Parameters
         ----------
@@ -119,14 +119,14 @@ class ReceptanceModel:
 
         Returns
         -------
-        (n_line, n) array
-            Displacement of all degrees of freedom under a unit force at a position.
+        (n_line, n) array of complex
+            Per unit force. [m/N]
         """
         self.solve([position])
         return self.by_position[position]
 
     def nodal_motion(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
-        """(n_line,) displacement at one position under a unit force at another, from nodal motion alone. [m/N]
+        """Displacement at one position under a unit force at another, from nodal motion alone.
 
         Parameters
         ----------
@@ -137,8 +137,8 @@ class ReceptanceModel:
 
         Returns
         -------
-        (n_line,) array
-            Displacement at one position under a unit force at another, from nodal motion alone. [m/N]
+        (n_line,) array of complex
+            Per unit force. [m/N]
         """
         if measured not in self.weight:
             self.weight[measured] = self.matrices.weights(measured)
@@ -197,7 +197,7 @@ class ReceptanceModel:
         return sensor.probe(self.track).place
 
     def receptance(self, excited: float | tuple, measured: float | tuple) -> np.ndarray:
-        """(n_line,) complex [m/N].
+        """Receptance between two positions, with what a rail between two nodes yields locally.
 
         Parameters
         ----------
@@ -208,8 +208,8 @@ class ReceptanceModel:
 
         Returns
         -------
-        (n_line,) array
-            Complex [m/N].
+        (n_line,) array of complex
+            Receptance. [m/N]
         """
         return self.nodal_motion(excited, measured) + self._compliance(excited, measured)
 

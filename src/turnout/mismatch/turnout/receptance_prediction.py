@@ -159,7 +159,7 @@ class ReceptancePredictor(SiteModel):
         return tuple(dict.fromkeys((p.test.place, p.seat) for p in pairs)), seats
 
     def channel_response(self, values: Values, terms: Terms, pair: FrfPair) -> np.ndarray:
-        """(n_line,) complex factor of the channel of a pair.
+        """Factor of the channel of a pair.
 
         Parameters
         ----------
@@ -172,14 +172,14 @@ class ReceptancePredictor(SiteModel):
 
         Returns
         -------
-        (n_line,) array
-            Complex factor of the channel of a pair.
+        (n_line,) array of complex
+            Recorded over true response. [-]
         """
         factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED_LINES)
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def receptance(self, values: Values, pair: FrfPair, sensitivity: ReceptanceSensitivity) -> np.ndarray:
-        """(n_line,) receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+        """Receptance of a pair, corrected to first order for the rail of ``values``.
 
         Parameters
         ----------
@@ -192,8 +192,8 @@ class ReceptancePredictor(SiteModel):
 
         Returns
         -------
-        (n_line,) array
-            Receptance of a pair [m/N], corrected to first order for the rail of ``values``.
+        (n_line,) array of complex
+            Receptance. [m/N]
         """
         deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
         return sensitivity.receptance(pair) + sensitivity.rail_gradient(pair) @ deviation

@@ -200,7 +200,7 @@ class ReceptanceSensitivity:
         return rows
 
     def receptance(self, pair: FrfPair) -> np.ndarray:
-        """(n_line,) complex [m/N].
+        """Receptance of a pair.
 
         Parameters
         ----------
@@ -209,13 +209,13 @@ class ReceptanceSensitivity:
 
         Returns
         -------
-        (n_line,) array
-            Complex [m/N].
+        (n_line,) array of complex
+            Receptance. [m/N]
         """
         return self.receptances[self.row_of(pair)]
 
     def rail_gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivatives by the logarithms of the uncertain rail values (``rail_sds``), (n_line, n).
+        """Derivatives by the logarithms of the uncertain rail values, in the order of ``rail_sds``.
 
         Parameters
         ----------
@@ -224,12 +224,13 @@ class ReceptanceSensitivity:
 
         Returns
         -------
-        array
+        (n_line, n) array of complex
+            Derivatives. [m/N]
         """
         return self.rail_gradients[self.row_of(pair)]
 
     def gradient(self, pair: FrfPair) -> np.ndarray:
-        """Derivatives by the logarithms of common and support values, (n_line, n) in order of ``track_value_names``.
+        """Derivatives by the logarithms of common and support values, in the order of ``track_value_names``.
 
         Parameters
         ----------
@@ -238,7 +239,8 @@ class ReceptanceSensitivity:
 
         Returns
         -------
-        array
+        (n_line, n) array of complex
+            Derivatives. [m/N]
         """
         return self._by_supports[self.row_of(pair)]
 

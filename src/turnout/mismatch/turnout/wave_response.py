@@ -83,7 +83,7 @@ class WaveTransfer:
         return [self.wheel(w) for w in range(self.wheel_delays.size)]
 
     def wheel(self, w: int) -> np.ndarray:
-        """(f,) delay of one wheel.
+        """Phase factor by which a wheel follows the first one.
 
         Parameters
         ----------
@@ -92,25 +92,23 @@ class WaveTransfer:
 
         Returns
         -------
-        (f,) array
-            Delay of one wheel.
+        (f,) array of complex
         """
         return np.exp(-2j * np.pi * self.grid * self.wheel_delays[w])
 
     def spectra(self, lengths: np.ndarray | Sequence[float], envelope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(f, sensor, wave) for cosines exp(i 2 pi x / length), positive and negative frequency.
+        """Responses to waves exp(i 2 pi x / length), at positive and negative frequency.
 
         Parameters
         ----------
-        lengths : array or sequence of float]
-            (n_wave,) wavelengths [m].
-        envelope : array
-            (n_x,) weight of the wave at ``node``.
+        lengths : (n_wave,) array or sequence of float
+            Wavelengths. [m]
+        envelope : (n_x,) array of float
+            Weight of the wave at ``node``.
 
         Returns
         -------
-        (f, sensor, wave) tuple[array, array]
-            For cosines exp(i 2 pi x / length), positive and negative frequency.
+        positive, negative : (f, n_sensor, n_wave) array of complex
         """
         f0 = self.speed / np.asarray(lengths)
         along = slice(None) if self.sign > 0.0 else slice(None, None, -1)  # nodes in the direction of the wheel
@@ -126,38 +124,36 @@ class WaveTransfer:
         return plus, minus
 
     def signals(self, lengths: np.ndarray, envelope: np.ndarray, delay: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, 2 n_wave) response to cosine and sine of each length, one metre high.
+        """Response to cosine and sine of each length, one metre high.
 
         Parameters
         ----------
-        lengths : array
-            (n_wave,) wavelengths [m].
-        envelope : array
-            (n_x,) weight of the wave at ``path_grid``.
-        delay : array
-            (f,) phase factor that delays a wheel.
+        lengths : (n_wave,) array of float
+            Wavelengths. [m]
+        envelope : (n_x,) array of float
+            Weight of the wave at ``path_grid``.
+        delay : (f,) array of complex
+            Phase factor that delays a wheel.
 
         Returns
         -------
-        (n_sensor * n_time, 2 n_wave) array
-            Response to cosine and sine of each length, one metre high.
+        (n_sensor * n_time, 2 n_wave) array of float
         """
         return self.signals_from(self.spectra(lengths, envelope), delay)
 
     def signals_from(self, spectra: tuple[np.ndarray, np.ndarray], delay: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, 2 n_wave) signals of ``spectra`` at the times of the observation.
+        """Signals of ``spectra`` at the times of the observation.
 
         Parameters
         ----------
-        spectra : tuple[array, array]
-            Responses at positive and negative frequency, (f, sensor, wave) each.
-        delay : array
-            (f,) phase factor that delays a wheel.
+        spectra : (f, n_sensor, n_wave) array of complex, twice
+            Responses at positive and negative frequency.
+        delay : (f,) array of complex
+            Phase factor that delays a wheel.
 
         Returns
         -------
-        (n_sensor * n_time, 2 n_wave) array
-            Signals of ``spectra`` at the times of the observation.
+        (n_sensor * n_time, 2 n_wave) array of float
         """
         return self._on_clock(self.cosines_and_sines(spectra) * delay[:, None, None])
 
@@ -166,8 +162,8 @@ class WaveTransfer:
 
         Parameters
         ----------
-        spectra : tuple[array, array]
-            As ``signals_from``.
+        spectra : (f, n_sensor, n_wave) array of complex, twice
+            Responses at positive and negative frequency.
 
         Returns
         -------
@@ -242,20 +238,19 @@ class WaveTransfer:
         return *self.spectra(self.period / orders, np.ones(self.node.size)), amplitude
 
     def reactions(self, paths: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, n_key) response when each wheel follows a path of its own.
+        """Response when each wheel follows a path of its own.
 
-        ``paths`` (n_key, n_wheel, n_x) [m] are at ``path_grid``: how wheels respond to motion of the rail under them.
+        So do wheels respond to motion of the rail under them.
         In single precision, right to 1e-5 of its size: the products of all waves and wheels are most of the work.
 
         Parameters
         ----------
-        paths : array
-            (n_key, n_x) deviations of the running surface at ``path_grid`` [m].
+        paths : (n_key, n_wheel, n_x) array of float
+            Path of each wheel at ``path_grid``. [m]
 
         Returns
         -------
-        (n_sensor * n_time, n_key) array
-            Response when each wheel follows a path of its own.
+        (n_sensor * n_time, n_key) array of float
         """
         plus, minus, amplitude = (x.astype(np.complex64) for x in self._harmonics(paths))
         total: Any = 0.0
@@ -281,7 +276,7 @@ class WaveTransfer:
         return self.start + self.period * np.arange(n) / n
 
     def times(self, w: int, lead: float, x: np.ndarray) -> np.ndarray:
-        """(n_x,) time of wheel ``w`` at ``x``, in the time of the simulation [s].
+        """Time of wheel ``w`` at ``x``, in the time of the simulation.
 
         Parameters
         ----------
@@ -294,30 +289,26 @@ class WaveTransfer:
 
         Returns
         -------
-        (n_x,) array
-            Time of wheel ``w`` at ``x``, in the time of the simulation [s].
+        (n_x,) array of float
+            Time. [s]
         """
         return lead + self.sign * (x - self.first) / self.speed + self.wheel_delays[w]
 
     def force_response(self, histories: np.ndarray, transfer: np.ndarray, first: np.ndarray) -> np.ndarray:
-        """(n_sensor * n_time, n_key) response of the free track to forces (n_force, n) at the rate of the simulation.
-
-        The forces from ``first`` (n_key,) of each key on act together. ``transfer`` (n_line, n_sensor, n_force) are
-        accelerations per force on ``self.lines``.
+        """Response of the free track to forces; those of one key act together.
 
         Parameters
         ----------
-        histories : array
-            (n_force, n) forces at the rate of the simulation [N].
-        transfer : array
-            (n_line, n_sensor, n_force) acceleration per force [m/s²/N].
-        first : array
-            (n_key,) index of the first force of each key.
+        histories : (n_force, n) array of float
+            Forces at the rate of the simulation, those of a key next to each other. [N]
+        transfer : (n_line, n_sensor, n_force) array of complex
+            Acceleration per force on ``self.lines``. [m/s²/N]
+        first : (n_key,) array of int
+            Index of the first force of each key.
 
         Returns
         -------
-        (n_sensor * n_time, n_key) array
-            Response of the free track to forces (n_force, n) at the rate of the simulation.
+        (n_sensor * n_time, n_key) array of float
         """
         fold = round(self.simulation_rate / self.rate)
         n = min(histories.shape[1] // fold, self.size)

@@ -130,7 +130,7 @@ def fixed_text(text: str) -> np.ndarray:
 
     Returns
     -------
-    array
+    () array
         One text of fixed length in UTF-8.
     """
     data = text.encode("utf-8") or b" "

@@ -58,32 +58,33 @@ class RailScan:
         self.basis = 0.01 * 2.0 / self.waves.length * self.waves.shapes(self.x).T / self.sd
 
     def score(self, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(slope (m,), size (m, m)) of shapes (m, n) at ``x``, with the waves free.
+        """Gradient and negative curvature of the log likelihood by the sizes of shapes, with the waves free.
 
         Parameters
         ----------
-        shapes : array
-            (m, n) deviations of the rail surface at ``x`` [m].
+        shapes : (m, n) array of float
+            Deviations of the rail surface at ``x``. [m]
 
         Returns
         -------
-        tuple[array, array]
+        slope, size : (m,) array of float, (m, m) array of float
         """
         c = shapes @ self.basis
         across = self.gram[:, self.wave_slice] @ c.T
         return c @ self.inner, c @ self.gram[self.wave_slice, self.wave_slice] @ c.T - across.T @ self.normal @ across
 
     def waves_without(self, shape: np.ndarray) -> dict[str, float]:
-        """Wave amplitudes without ``shape`` (n,), which is an effect of its own: start of a joint fit.
+        """Wave amplitudes without ``shape``, which is an effect of its own: start of a joint fit.
 
         Parameters
         ----------
-        shape : array
-            (n,) deviation of the rail surface at ``x`` [m].
+        shape : (n,) array of float
+            Deviation of the rail surface at ``x``. [m]
 
         Returns
         -------
-        dict[str, float]
+        dict of str to float
+            Name of each wave -> amplitude. [m]
         """
         c = shape @ self.basis
         released = self.shift - (self.normal @ (self.gram[:, self.wave_slice] @ c))[self.wave_slice]

@@ -116,14 +116,14 @@ def log_density(deviations: np.ndarray, expected: np.ndarray | float) -> np.ndar
 
     Parameters
     ----------
-    deviations : array of float
+    deviations : (...) array of float
         Recorded levels. [deviations]
-    expected : array of float
-        Levels of an impact there. [deviations]
+    expected : float or (...) array of float
+        Levels of an impact there, broadcast against ``deviations``. [deviations]
 
     Returns
     -------
-    array of float
+    (...) array of float
         [nats]
     """
     spread = 1.0 + FLATS.impact_scatter * expected
