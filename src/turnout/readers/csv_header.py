@@ -21,7 +21,7 @@ from turnout.readers.csv_cells import (
     is_row,
 )
 from turnout.readers.csv_columns import are_names, name_and_unit, names_and_units
-from turnout.readers.entries import FREE_TEXT, Entry, entries_of_text
+from turnout.readers.entries import COLON, FREE_TEXT, Entry, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import (
@@ -38,10 +38,12 @@ from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_words import is_rate_name
 from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
+from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_units import is_unit_name
+from turnout.readers.time_texts import is_day, looks_dated
 
-HEAD_LINE = re.compile(r"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*[:=,;\t]\s*(.*)$")
+HEAD_LINE = re.compile(rf"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*(?:{COLON}|[=,;\t])\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
 HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}
@@ -314,12 +316,16 @@ def entries_of_lines(
                 pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
             elif name and rate_unit(second) and is_number(third):
                 pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
+            elif name and is_day(second) and re.match(r"\d{1,2}[:.]\d{2}", third):  # "Start;13.05.2026;10:20:30"
+                pairs = [(name, f"{second} {third}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
         if (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
+        elif len(cells) == 1 and (dated := _dated_line(text)):
+            pairs.append(dated)
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
@@ -330,6 +336,19 @@ def entries_of_lines(
         is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
         if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
+
+
+MAX_WORDS_OF_START = 5
+
+
+def _dated_line(text: str) -> tuple[str, str] | None:
+    """Name and value of a line that states a start without a mark between them, "start 2026-05-13 10:20:30"."""
+    words = text.split()
+    for n in range(1, min(len(words), MAX_WORDS_OF_START + 1)):
+        name, value = " ".join(words[:n]), " ".join(words[n:])
+        if may_state_start(name) and (looks_dated(value) or is_day(value) or CLOCK_ALONE.fullmatch(value)):
+            return name, value
+    return None
 
 
 def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:

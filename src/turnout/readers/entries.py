@@ -153,9 +153,10 @@ def _decode_json(text: str) -> Any:
         return text
 
 
+COLON = r"(?:(?<![ \t]\d)(?<![ \t]\d\d):|:(?!\d\d))"  # not that of a time of day, as in "start 10:20:30"
 # "name: value" with a word, numbers without unit, or a ratio as its value.
 NAMED_PIECE = re.compile(
-    r"(?:[^\d:=]*:)?\s*([^\W\d][^:=]{1,40}?)\s*[:=]\s*"
+    r"(?:[^\d:=]*:)?\s*([^\W\d][^:=]{1,40}?)\s*(?:" + COLON + r"|=)\s*"
     r"([+-]?[.,]?\d[^:=]{0,30}?|[^\W\d]{1,20}\.?|[-+]|[x×]\s?\d+|\d+\s?:\s?\d+)\s*"
 )
 

@@ -9,7 +9,6 @@ from functools import lru_cache
 
 from turnout.errors import ReadError
 from turnout.readers.entries import Entry
-from turnout.readers.metadata_names import START_DATE_NAMES
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.start_columns import start_in_cells
@@ -19,14 +18,16 @@ from turnout.readers.stated_starts import (
     OTHER,
     START,
     TIME_WORD,
+    is_of_begin,
     is_start_name,
     with_stated_start,
 )
-from turnout.readers.stated_zones import zone_in_name, zone_of
+from turnout.readers.stated_zones import ABBREVIATION, zone_in_name, zone_of
 from turnout.readers.time_texts import is_day, parse_time
 
 CLOCK_ALONE = re.compile(
     r"(\d{1,2}:\d{2})(:\d{2}(?:[.,]\d{1,12})?)?((?: ?[AaPp]\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?)"
+    rf"(?: \(?(?:{ABBREVIATION.pattern})\)?)?"
 )
 BARE_WORDS = frozenset(("date", "dato", "datum", "fecha", "time", "zeit"))
 
@@ -50,7 +51,7 @@ def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRec
     intact = [r for r in records if isinstance(r, RawRecord)]
     if len(intact) > 1 and any(r.started_at for r in intact):
         return tuple(records)
-    counts = Counter(key for r in intact for key in {_key(e) for e in r.entries if _may_state_start(e.name)})
+    counts = Counter(key for r in intact for key in {_key(e) for e in r.entries if may_state_start(e.name)})
     return tuple(
         _with_start(r, _entries_of_start(r, counts, len(intact))) if isinstance(r, RawRecord) else r for r in records
     )
@@ -61,8 +62,19 @@ def _key(entry: Entry) -> tuple[str, str, str]:
 
 
 @lru_cache(maxsize=4096)
-def _may_state_start(name: str) -> bool:
-    """Whether a name may mean the start of a recording, or its day or time of day."""
+def may_state_start(name: str) -> bool:
+    """Whether a name may mean the start of a recording, or its day or time of day.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+        False for the time of another event.
+    """
     words = words_of(name)
     is_part = any(DATE_WORD.search(word) or TIME_WORD.search(word) for word in words)
     return is_start_name(name) or (is_part and not any(OTHER.search(word) for word in words))
@@ -70,7 +82,7 @@ def _may_state_start(name: str) -> bool:
 
 def _entries_of_start(record: RawRecord, counts: Counter, n: int) -> tuple[Entry, ...]:
     """Entries that may state the start: those of the record alone if they do, else those of the file."""
-    entries = tuple(e for e in record.entries if _may_state_start(e.name))
+    entries = tuple(e for e in record.entries if may_state_start(e.name))
     of_record = tuple(e for e in entries if counts[_key(e)] < n)
     stated = _with_start(replace(record, started_at=None, unread_start=""), of_record)
     return of_record if stated.started_at or stated.unread_start else entries
@@ -95,7 +107,7 @@ def _with_joined_start(record: RawRecord) -> RawRecord:
     days = _texts(record.entries, is_day)
     clocks = _texts(record.entries, lambda text: bool(CLOCK_ALONE.fullmatch(text)))
     if not clocks:
-        stated = [day for day, name in days.items() if "_".join(words_of(name)) in START_DATE_NAMES]
+        stated = [day for day, name in days.items() if is_of_begin(name)]
         return replace(record, unread_start=stated[0]) if stated else record
     if not days:
         return record

@@ -3,11 +3,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta, timezone
+from datetime import datetime, timedelta
 
 import numpy as np
 
-from turnout.readers.clock_texts import CLOCK, DATE, DATE_ALONE, ClockColumn
+from turnout.readers.calendar_dates import DATED, orders_of_date, time_of_match
+from turnout.readers.clock_texts import CLOCK, DATE_ALONE, ClockColumn
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.rate_words import is_time_name
@@ -18,9 +19,7 @@ from turnout.readers.texts import decode_text
 from turnout.readers.time_numbers import SINCE, time_of_number
 
 TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
-DATED = re.compile(rf" *({DATE})[T ,_]+{CLOCK} *")
 UNIT_AT_END = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
-ZONE = re.compile(r"(?:(Z|UTC)|([+-])(\d{2}):?(\d{2})) *$")
 
 
 def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime | None, str]:
@@ -59,8 +58,8 @@ def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime
     if not dated:
         return None, ""
     match = DATED.fullmatch(dated[0])
-    orders = _orders(match[1]) if match else []
-    start = _time_of(orders[0], match, dated[0]) if match and len(orders) == 1 else None
+    orders = orders_of_date(match[1]) if match else []
+    start = time_of_match(orders[0], match) if match and len(orders) == 1 else None
     question = ": day or month first?" if len(orders) > 1 else ""
     return start, "" if start else dated[0] + question
 
@@ -90,50 +89,6 @@ def _text(column: Column) -> str:
     """Text of the first value of a column."""
     first = column[:1][0]
     return decode_text(first) if isinstance(first, bytes) else str(first)
-
-
-def _orders(date: str) -> list[tuple[int, int, int]]:
-    """(year, month, day) of a date in each order that its notation and the calendar allow.
-
-    The year comes first if it has four digits there. With dots the day comes first, with slashes and dashes the day or
-    the month. A year of two digits may be in front or behind.
-    """
-    parts = re.split("[-/.]", date)
-    a, b, c = map(int, parts)
-    if len(parts[0]) == 4:
-        orders = [(a, b, c)]
-    elif len(parts[2]) == 4:
-        orders = [(c, b, a)] if "." in date else [(c, b, a), (c, a, b)]
-    else:
-        orders = [(2000 + c, b, a), (2000 + c, a, b), (2000 + a, b, c)]
-    return list(dict.fromkeys(order for order in orders if _is_day(order)))
-
-
-def _is_day(order: tuple[int, int, int]) -> bool:
-    try:
-        datetime(*order)
-    except ValueError:
-        return False
-    return True
-
-
-def _time_of(day: tuple[int, int, int], match: re.Match[str], text: str) -> datetime | None:
-    """The time of a day and a matched time of day; None for an hour that no day has, and a zone that nobody uses."""
-    hour, minute, second, half = int(match[2]), int(match[3]), float(match[4].replace(",", ".")), match[5]
-    if half:
-        hour = hour % 12 + 12 * (half in "pP") if 1 <= hour <= 12 else 24
-    if hour > 23 or minute > 59 or second >= 60.0:
-        return None
-    start = datetime(*day) + timedelta(hours=hour, minutes=minute, seconds=second)
-    zone = ZONE.search(text)
-    if not zone:
-        return start
-    if zone[1]:
-        return start.replace(tzinfo=UTC)
-    offset = timedelta(hours=int(zone[3]), minutes=int(zone[4]))
-    if int(zone[4]) % 15 or offset > timedelta(hours=14):
-        return None
-    return start.replace(tzinfo=timezone(-offset if zone[2] == "-" else offset))
 
 
 def starts_of_axes(record: RawRecord) -> list[tuple[datetime | None, str]]:

@@ -268,7 +268,7 @@ def start_errors(
         )
         text = no_time[0][1]
         remedy = CLOCK_REMEDY
-        if SHORT_DATE.match(text):
+        if SHORT_DATE.match(text) and not is_date(text):
             remedy = ORDER_REMEDY
         elif "MATLAB class" in text:
             remedy = OBJECT_REMEDY

@@ -20,6 +20,7 @@ START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
     r"|acqui|erfass|optag|maling|timestamp|zeitstempel|horodat|datetime|^date$|^dato$|^datum$|^time$|^zeit$|^fecha$"
 )
+BEGIN = re.compile(r"start|begin|begyn|debut|inici|inizi|zacat")  # of these alone
 # Times of other events, and what is written about the recording.
 OTHER = re.compile(
     r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
@@ -27,6 +28,7 @@ OTHER = re.compile(
     r"|^not[ae]s?$|notiz|remar[kq]|comment|komment|bemerk|bemaerk|anmerk|anmark|opmerk|poznam|descri|beschreib"
     r"|maint|wartung|^tamp|stopf|grind|schleif|repair|repar|replac|ersetz|renew|erneuer"
 )
+OF_BEGIN = frozenset("of the der de la du del og at on".split())
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
 TIME_WORD = re.compile(r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|started|begun|recorded")
 MAX_UNREAD = 120  # characters of a start that cannot be read
@@ -54,6 +56,28 @@ def is_start_name(name: str) -> bool:
     """
     words = words_of(name)
     return any(START.search(word) for word in words) and not any(OTHER.search(word) for word in words)
+
+
+def is_of_begin(name: str) -> bool:
+    """Whether a name speaks of a beginning and of no other event or quantity.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_of_begin(n) for n in ("Start", "Messbeginn", "Startdatum", "Start position", "Messdatum")]
+    [True, True, True, False, False]
+    """
+    words = words_of(name)
+    others = [word for word in words if not (START.search(word) or DATE_WORD.search(word) or TIME_WORD.search(word))]
+    return any(map(BEGIN.search, words)) and not (set(others) - OF_BEGIN) and is_start_name(name)
 
 
 def has_date_word(name: str) -> bool:
@@ -119,7 +143,9 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
     elif isinstance(value, str) and not NUMBER_TEXT.fullmatch(value.strip()):
         if looks_dated(value.strip()):
             yield value.strip(), parse_time(value.strip())
-    elif isinstance(value, (str, int, float, np.number)) and (has_date_word(declared) or _is_long(value, declared)):
+    elif isinstance(value, (str, int, float, np.number)) and (
+        has_date_word(declared) or _is_long(value, declared) or _is_begin(value, declared)
+    ):
         time, problem = stated_time(value, declared)
         if time or problem:
             yield problem or str(value), time
@@ -128,6 +154,11 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
 def _is_long(value: Any, declared: str) -> bool:
     """Whether a number under the name of a time is too large for a duration."""
     return any(TIME_WORD.search(word) for word in words_of(declared)) and float(value) >= MIN_EPOCH
+
+
+def _is_begin(value: Any, declared: str) -> bool:
+    """Whether a number under the name of a beginning is no number of a sample: it has decimals, or is too large."""
+    return is_of_begin(declared) and (float(value) % 1 != 0 or float(value) >= MIN_EPOCH)
 
 
 def _naive(stamp: datetime) -> datetime:

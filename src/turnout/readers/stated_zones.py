@@ -13,6 +13,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_starts import is_start_name, times_of_entry
+from turnout.readers.time_texts import parse_time
 
 ZONE_NAME = re.compile(r"timezone|zeitzone|tidszone|tijdzone|fuseauhoraire|fusoorario|zonahoraria|tz|(?:utc|gmt)offset")
 NO_ZONE = frozenset(("", "-", "none", "n/a", "?", "unknown", "null", "local", "naive"))
@@ -20,6 +21,9 @@ OFFSET = re.compile(r"(?:UTC|GMT)? ?([+-])(\d{1,2})(?::?(\d{2}))?")
 SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST"}
 # Abbreviations that a name may hold; which offset they mean depends on the day and on the country.
 ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC)\b")
+STAMP_AND_ZONE = re.compile(
+    r"(.*\d(?: ?[AaPp]\.?[Mm]\.?)?)(?: ?[\[(]| )([A-Z]{2,5}(?: ?[+-]\d{1,2}(?::?\d{2})?)?|[A-Z]\w+/[\w/]+)[\])]?"
+)
 UTC_OFFSET = re.compile(r"(?:UTC|GMT) ?[+-]\d{1,2}(?::?\d{2})?(?!\d)", re.IGNORECASE)
 IN_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
 LARGEST_OFFSET = 14  # h
@@ -39,7 +43,8 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
     RawRecord
         With a start in that zone; a zone that cannot be read is its ``unread_zone``.
     """
-    if record.started_at is None or record.started_at.tzinfo is not None:
+    record = _with_zone_of_stamp(record)
+    if record.started_at is None or record.started_at.tzinfo is not None or record.unread_zone:
         return record
     in_names = [text for name in _names_of_start(record) if (text := zone_in_name(name))]
     texts = list(dict.fromkeys(in_names or _zone_texts(record.entries)))
@@ -49,6 +54,18 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
     if len(zones) != 1 or len(texts) > 1:
         return replace(record, unread_zone=" or ".join(texts)[:60])
     return replace(record, started_at=record.started_at.replace(tzinfo=zones.pop()))
+
+
+def _with_zone_of_stamp(record: RawRecord) -> RawRecord:
+    """The record with the start that was not read because a zone stands behind it, as "CEST" or "Europe/Berlin"."""
+    match = STAMP_AND_ZONE.fullmatch(record.unread_start)
+    stamp = parse_time(match[1]) if match and record.started_at is None else None
+    if not match or stamp is None or stamp.tzinfo is not None:
+        return record
+    zone = zone_of(match[2])
+    if zone is None and not ABBREVIATION.fullmatch(match[2]):
+        return record
+    return replace(record, started_at=stamp.replace(tzinfo=zone), unread_start="", unread_zone="" if zone else match[2])
 
 
 def _names_of_start(record: RawRecord) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.readers.calendar_dates import dated_time
 from turnout.readers.stamp_texts import DAY_OF_YEAR, month_of, with_calendar_date
 from turnout.readers.time_numbers import time_of_digits, time_of_number
 
@@ -22,6 +23,10 @@ DATE_ALONE = re.compile(
 )
 CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
+# A time of day as in "13.05.2026 10.20.30", and the words beside one: "13.05.2026 um 10:20:30 Uhr".
+DOTTED_CLOCK = re.compile(r"(?<=\d{4}[ T])(\d{1,2})\.(\d{2})\.(\d{2})(?!\.|\d)")
+BEFORE_CLOCK = re.compile(r"(?<=\d),? (?:um|at|kl\.?|à|om|alle|ore|ob) (?=\d{1,2}[:.]\d{2})", re.IGNORECASE)
+BEHIND_CLOCK = re.compile(r"(?<=\d) (?:Uhr|hrs?|h)\.?$", re.IGNORECASE)
 WITH_UTC = re.compile(r"(.*\d) ?\(?(?:UTC|GMT)\)?")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
@@ -128,8 +133,8 @@ def parse_time(value: Any) -> datetime | None:
 
     These are ISO 8601 text, also with slashes, or with the month as a word, numpy datetime64 (without a zone), and
     numbers that only one usual count explains (``time_numbers``): since 1970, a MATLAB datenum ... With dots the day
-    comes first, "13.05.2024 10:00"; dates with slashes that do not begin with the year are ambiguous and not read. A
-    date without a time of day is not read either.
+    comes first, "13.05.2024 10:00"; with slashes or dashes a date that does not begin with the year is read if only one
+    order of day and month is possible. A date without a time of day is not read.
 
     Parameters
     ----------
@@ -194,6 +199,9 @@ def _time_of_stamp(value: Any) -> datetime | None:
         return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
     if DAY_OF_YEAR.match(value):
         value = with_calendar_date(value)
+    value = DOTTED_CLOCK.sub(r"\1:\2:\3", BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", value)))
+    if time := dated_time(value.strip()):
+        return time
     if match := DOTTED_DATE.fullmatch(value.strip()):
         value = f"{match[3]}-{match[2]:0>2}-{match[1]:0>2}T{match[4]:0>2}:{match[5]}"
     if (zone := re.search(r"[+-]\d{2}:?(\d{2})$", value.strip())) and int(zone[1]) % 15 and ":" in value:

@@ -27,7 +27,7 @@ SCALES = {
     "Level correction": "3 dB", "Mean removed": 2, "Baseline": 1.5, "Slope1": 2.0, "Comment": "amplifier gain 10",
     "data_scale": 0.5, "Voltage gain": 10,
 }  # fmt: skip
-STARTS = ["05/13/2024 10:00:00 AM", "2024-05-13T25:00:00", "2024-367T10:00:00", "13. Mayo 2024 10:00:00 PM"]
+STARTS = ["05/06/2024 10:00:00 AM", "2024-05-13T25:00:00", "2024-367T10:00:00", "13. Mayo 2024 10:00:00 PM"]
 READ_STARTS = [
     "13 May 2024 10:00:00",
     "Mon May 13 10:00:00 2024",
@@ -36,6 +36,10 @@ READ_STARTS = [
     "2024-134T10:00:00",
     "2024134 10:00:00",
     "13. Mai 2024 10:00",
+    "05/13/2024 10:00:00 AM",
+    "13-05-2024 10:00",
+    "13.05.2024 10.00.00",
+    "13.05.2024 um 10:00:00 Uhr",
 ]
 OTHERS = {
     "CPU clock": "400 MHz", "Line frequency": "50 Hz", "Rail temperature": 31.2,

@@ -66,9 +66,9 @@ def test_start_times_of_a_clock_change_and_of_an_epoch_are_reported(make):
     described = RawDescription(SENSORS, rate=20000.0, time_zone="Europe/Copenhagen")
     night = read("night.csv", folder, described)
     assert night.errors == () and f"{night.recordings[0].started_at:%d %H:%M}" == "12 22:30"
-    for name, words in (("gap_hour.csv", "does not exist"), ("slashes.csv", "cannot be read")):
-        (error,) = read(name, folder, described).errors
-        assert error.reason == "start_unknown" and words in error.problem
+    assert read("slashes.csv", folder, described).recordings[0].started_at == night.recordings[0].started_at
+    (error,) = read("gap_hour.csv", folder, described).errors
+    assert error.reason == "start_unknown" and "does not exist" in error.problem
     folder = make("30_tdms_1904")
     result = read("relative.tdms", folder, replace(described, time_zone="UTC"))
     (error,) = result.errors
