@@ -109,8 +109,8 @@ def _is_statement(clause: str, names: Collection[str]) -> bool:
         return False
     remainder = _without_channels(clause, names)
     if any(map(AMBIGUOUS.search, words)):
-        others = [word for word in words_of(remainder) if not OVERLOAD.search(plain_word(word))]
-        return len(words) > 1 and OF_SIGNALS.issuperset(others)
+        further_words = [word for word in words_of(remainder) if not OVERLOAD.search(plain_word(word))]
+        return len(words) > 1 and OF_SIGNALS.issuperset(further_words)
     return not re.search(r"\d", remainder)
 
 

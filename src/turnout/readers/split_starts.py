@@ -116,8 +116,8 @@ def _with_joined_start(record: RawRecord) -> RawRecord:
     (day, _), (clock, name) = *days.items(), *clocks.items()
     start, text = _start_of_pair(day, clock)
     if start and start.tzinfo is None and (zone := zone_in_name(name)):
-        known = zone_of(zone)
-        return replace(record, started_at=start.replace(tzinfo=known), unread_zone="" if known else zone)
+        zone_of_name = zone_of(zone)
+        return replace(record, started_at=start.replace(tzinfo=zone_of_name), unread_zone="" if zone_of_name else zone)
     return replace(record, started_at=start, unread_start="" if start else text)
 
 

@@ -76,8 +76,10 @@ def is_of_begin(name: str) -> bool:
     [True, True, True, False, False]
     """
     words = words_of(name)
-    others = [word for word in words if not (START.search(word) or DATE_WORD.search(word) or TIME_WORD.search(word))]
-    return any(map(BEGIN.search, words)) and not (set(others) - OF_BEGIN) and is_start_name(name)
+    further_words = [
+        word for word in words if not (START.search(word) or DATE_WORD.search(word) or TIME_WORD.search(word))
+    ]
+    return any(map(BEGIN.search, words)) and not (set(further_words) - OF_BEGIN) and is_start_name(name)
 
 
 def has_date_word(name: str) -> bool:
@@ -117,8 +119,8 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     if not stated:
         return record
     if record.started_at is not None:
-        others = [text for text, time in stated.items() if is_other_start(time, record.started_at)]
-        return replace(record, unread_start=others[0][:60]) if others else record
+        contradicting = [text for text, time in stated.items() if is_other_start(time, record.started_at)]
+        return replace(record, unread_start=contradicting[0][:60]) if contradicting else record
     if len({_naive(time) for time in times}) != 1:
         return replace(record, unread_start=" or ".join(stated)[:MAX_UNREAD])
     return replace(record, started_at=times[0])
