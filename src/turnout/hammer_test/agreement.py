@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from turnout.hammer_test.impact_window import Cut
     from turnout.records import Impact
 
+# Least number of impacts among which one is an outlier. Of three, the median coherence of the two that agree is halfway
+# between their own and that with the third: no value of ``agreement_factor`` then makes the third an outlier.
+MIN_COMPARED = 4
 # Least number of impacts from which the spread of a test is estimated.
 MIN_IMPACTS = 5
 # Share of the largest peak above which an impact may be clipped: sampling can miss a fifth of a short pulse's peak.
@@ -124,7 +127,7 @@ def judge_agreement(cuts: Sequence[Cut], settings: ReceptanceSettings) -> None:
         Limits of the quality of an impact.
     """
     cuts = [c for c in cuts if not c.rejections]
-    if len(cuts) < 3:
+    if len(cuts) < MIN_COMPARED:
         return
     force, acceleration = spectra_of(cuts, settings)
     _judge_coherence(cuts, force, acceleration, settings)
@@ -139,11 +142,11 @@ def _judge_coherence(
 
     The worst impact is an outlier under two conditions. Its median pairwise coherence lies ``agreement_gap`` below the
     others' median, and its incoherence is ``agreement_factor`` times theirs. The detail gives the coherence of the test
-    with and without it. Of two impacts that disagree none can be called an outlier.
+    with and without it. With fewer than ``MIN_COMPARED`` impacts there is no majority that could call one an outlier.
     """
     pairs = pairwise_coherence(force, acceleration)
     remaining = list(range(len(cuts)))
-    while len(remaining) >= 3:
+    while len(remaining) >= MIN_COMPARED:
         remaining_pairs = pairs[np.ix_(remaining, remaining)]
         np.fill_diagonal(remaining_pairs, np.nan)
         medians = np.nanmedian(remaining_pairs, axis=1)

@@ -110,9 +110,13 @@ def train_amplitude(per_axle: np.ndarray) -> tuple[float, float]:
 
     Examples
     --------
-    >>> mean, se = train_amplitude([1.0, 1.2, 0.8, 1.0])
+    Half the difference is the standard error of the mean of two.
+
+    >>> mean, se = train_amplitude([1.0, 4.0])
     >>> print(f"{mean:.2f} ± {se:.2f}")
-    1.00 ± 0.08
+    2.50 ± 1.50
+    >>> train_amplitude([2.0])
+    (2.0, inf)
     """
     per_axle = np.asarray(per_axle, dtype=float)
     if per_axle.size < 2:

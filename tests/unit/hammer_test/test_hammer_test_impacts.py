@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from turnout.hammer_test import find_impacts, receptance_of
+from turnout.hammer_test.contact import measure_contact
+from turnout.hammer_test.impact_window import Cut
 
 RATE = 20_000.0
 
@@ -25,6 +27,21 @@ def test_measurements_of_a_half_sine_are_those_of_its_formula(hammer):
     assert impact.noise_force == pytest.approx(0.5, rel=0.3)  # 95 samples ahead: 3 sigma is 22 %
     assert impact.band_edge * 2e-3 == pytest.approx(1.2976, abs=0.02)
     assert impact.accepted and not impact.notes
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_a_contact_of_few_samples_has_the_measures_of_its_polygon(hammer, polarity):
+    """The contact is samples 20 to 24, above 2 % of the peak. Half the peak is crossed at 21 1/6 and at 23 1/2."""
+    force = np.zeros(200)
+    force[20:26] = [100.0, 400.0, 1000.0, 700.0, 300.0, 15.0]
+    recording = hammer.recording(np.stack([force, force]), rate=1000.0)
+    force_and_response = polarity * force, np.zeros(200)
+    cut = Cut(*force_and_response, 1000.0, 21, 24, polarity, 0.0, recording, recording.channels)
+    contact = measure_contact(cut, 0.02)
+    assert (contact.onset, contact.end, contact.top) == (20, 24, 22)
+    assert contact.peak == polarity * 1000.0
+    assert contact.impulse == pytest.approx(polarity * 2500.0 / 1000.0)  # sum of the five samples over the rate
+    assert contact.half_width == pytest.approx(23.5 - (22.0 - 5.0 / 6.0))
 
 
 def test_a_continuous_record_is_cut_into_its_impacts(hammer):

@@ -193,10 +193,13 @@ def test_a_response_of_opposite_sign_is_named_even_if_a_third_of_the_test_has_it
     assert all("opposite sign" in impacts[k].rejections[0].detail for k in (0, 3, 6))
 
 
-def test_of_two_impacts_none_is_odd(hammer):
-    recordings = hammer.recordings(2)
+@pytest.mark.parametrize("n, is_found", [(2, False), (3, False), (4, True)])
+def test_an_odd_impact_needs_three_others_that_agree(hammer, n, is_found):
+    recordings = hammer.recordings(n)
     recordings[1] = replace(recordings[1], samples=recordings[1].samples * [[1], [-1]])
-    assert [i.accepted for i in hammer.impacts(recordings)] == [True] * 2
+    assert [findings(i) for i in hammer.impacts(recordings)] == [
+        ["odd_one_out"] if k == 1 and is_found else [] for k in range(n)
+    ]
 
 
 def test_pairs_are_symmetric_and_between_nothing_and_one():
