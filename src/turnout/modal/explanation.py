@@ -112,6 +112,17 @@ def leaves_common(fit: MixedFit | None, settings: IdentifySettings) -> bool:
 
     It is their combination with the weights of the signal, as large as the sum of what the modes leave of each impact,
     with the noise of one. So a rest shows that is too small to colour the noise of single impacts.
+
+    Parameters
+    ----------
+    fit : MixedFit or None
+        Fit of whitened decays; None has no residual.
+    settings : IdentifySettings
+        Settings of the identification.
+
+    Returns
+    -------
+    bool
     """
     if fit is None:
         return False

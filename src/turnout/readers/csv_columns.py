@@ -224,7 +224,7 @@ def _holds_unit(text: str) -> bool:
     return not text.isdigit() and any(_is_known(word) for word in text.split())
 
 
-def _told_apart_by_brackets(pairs: Sequence[tuple[str, str]]) -> set[str]:
+def _distinguished_by_brackets(pairs: Sequence[tuple[str, str]]) -> set[str]:
     """Names that several columns share, with different texts in brackets that are no units: "Y[0]", "acc (left)"."""
     texts: dict[str, list[str]] = {}
     for bare, text in pairs:
@@ -258,7 +258,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     pairs = [name_and_unit(name) for name in names]
-    told_apart = _told_apart_by_brackets(pairs)
+    told_apart = _distinguished_by_brackets(pairs)
     for i, (name, (bare, unit)) in enumerate(zip(names, pairs)):
         if bare in told_apart:
             continue

@@ -90,11 +90,33 @@ class Effect:
         return ()
 
     def rail(self, track: Track) -> Track:
-        """The track with changed rails; its supports are changed by links."""
+        """The track with changed rails; its supports are changed by links.
+
+        Parameters
+        ----------
+        track : Track
+            The track without the effect.
+
+        Returns
+        -------
+        Track
+            With other rails.
+        """
         return track
 
     def sensor(self, sensor: Sensor) -> Sensor:
-        """The sensor at its true position, if its description is wrong."""
+        """The sensor at its true position, if its description is wrong.
+
+        Parameters
+        ----------
+        sensor : Sensor
+            The sensor as it is described.
+
+        Returns
+        -------
+        Sensor
+            At its true position.
+        """
         return sensor
 
     def under_conditions(self, conditions: Mapping[str, Any]) -> Self:
@@ -132,5 +154,16 @@ class Effect:
         return signal
 
     def vehicle(self, vehicle: Vehicle) -> Vehicle:
-        """The vehicle with the effect."""
+        """The vehicle with the effect.
+
+        Parameters
+        ----------
+        vehicle : Vehicle
+            The vehicle without the effect.
+
+        Returns
+        -------
+        Vehicle
+            With other masses, springs or wheels.
+        """
         return vehicle

@@ -152,7 +152,7 @@ def _with_a_file(names: Sequence[str], folder: Path) -> str:
 
 def _loaded_vehicle(
     name: str,
-    n_axles_heard: int | None,
+    n_axles_recorded: int | None,
     row: Mapping[str, Any],
     notes: Mapping[str, Any],
     folder: Path,
@@ -169,14 +169,14 @@ def _loaded_vehicle(
     n = len(single_unit.wheels)
     units = _noted_units(notes, n) or 1
     axle_doubts: tuple[str, ...] = ()
-    if n_axles_heard and n_axles_heard % n:
+    if n_axles_recorded and n_axles_recorded % n:
         axle_doubts = (
-            f"{n_axles_heard} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
+            f"{n_axles_recorded} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
         )
-        if n_axles_heard < min_axle_share * n * units:
+        if n_axles_recorded < min_axle_share * n * units:
             raise TrainUnknownError(*axle_doubts)
-    elif n_axles_heard:
-        units = n_axles_heard // n
+    elif n_axles_recorded:
+        units = n_axles_recorded // n
     share, load_sd, doubts = _load_share(name, row, notes, folder, units)
     return load_vehicle(name, share, folder, units), load_sd, doubts, axle_doubts
 

@@ -109,6 +109,10 @@ def run_shard(
         checkpoint and at the end, so a kill loses at most the work since the last checkpoint.
     stage : Stage
         The computation.
+    configuration : Configuration
+        Configuration of all turnouts.
+    raw_root : Path
+        Folder that the paths of the plan start from.
     threads : int
         Processes; the results do not depend on it.
     only : sequence of str, optional
@@ -117,6 +121,11 @@ def run_shard(
         Raise faults of the program instead of noting them.
     launched : datetime, optional
         Start of the run that this job belongs to; a further attempt in the same run counts as the first one.
+
+    Returns
+    -------
+    Summary
+        Numbers of units by what became of them.
     """
     with state_lock(state):
         run = _Run(Path(state), stage, configuration, Path(raw_root), threads, strict, launched)

@@ -74,7 +74,17 @@ class NormalPrior:
         return cls(mean, np.linalg.inv(covariance))
 
     def cost(self, x: np.ndarray) -> float:
-        """Minus twice the log density of ``x`` (n,), up to a constant."""
+        """Minus twice the log density, up to a constant.
+
+        Parameters
+        ----------
+        x : (n,) array of float
+            Parameters, in the order of ``mean``.
+
+        Returns
+        -------
+        float
+        """
         return float((x - self.mean) @ self.precision @ (x - self.mean))
 
 

@@ -97,6 +97,14 @@ class SiteModel:
 
 
 def drop_oldest(cache: OrderedDict[Hashable, Any], size: int) -> None:
-    """Drop the oldest entries beyond ``size``."""
+    """Drop the oldest entries beyond ``size``.
+
+    Parameters
+    ----------
+    cache : OrderedDict
+        Entries, the oldest first; it is changed.
+    size : int
+        Largest number of entries that stay.
+    """
     while len(cache) > size:
         cache.popitem(last=False)
