@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
 from turnout.records import Channel
@@ -171,7 +172,7 @@ def _apply_filters(sensor: Sensor, signal: np.ndarray, rate: float, substeps: in
     """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around."""
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
-    padded = _fast_length(signal.size + max(4096, signal.size // 8))
+    padded = next_fast_len(signal.size + max(4096, signal.size // 8), real=True)
     frequency = np.fft.rfftfreq(padded, 1.0 / (rate * substeps))
     transfer = np.ones(frequency.size, dtype=complex)
     if sensor.mount_frequency:
@@ -194,13 +195,3 @@ def _anti_alias(cutoff: float, frequency: np.ndarray, substeps: int) -> np.ndarr
     for m, tap in zip(k[reach + 1 :], taps[reach + 1 :]):
         cosine += 2.0 * tap * np.cos(2.0 * np.pi * frequency * m)
     return cosine
-
-
-def _fast_length(n: int) -> int:
-    """Smallest 2^a 3^b 5^c that is at least ``n``."""
-    length = 1 << (n - 1).bit_length()
-    for three in (1, 3, 9, 27):
-        for five in (1, 5, 25):
-            factor = three * five
-            length = min(length, factor << max(0, (-(-n // factor) - 1).bit_length()))
-    return length
