@@ -82,10 +82,14 @@ def uniform_spline(value: np.ndarray | Sequence[float], start: float, step: floa
 
 @dataclass(frozen=True)
 class Dip:
-    r"""Dipped joint or weld of two halves :math:`p = d\,e^{-|x-x_0|/a}` cut to be flat at ``reach``.
+    r"""Dipped joint or weld of two halves :math:`p = d\,e^{-|x-x_0|/a}`.
 
-    Both sides slope by α at ``place``: the total angle 2α = 2 d / a of Jenkins et al. 1974. ``depth`` [m],
+    Both sides slope by α at ``place`` x₀ [m]: the total angle 2α = 2 d / a of Jenkins et al. 1974. ``depth`` d [m],
     ``length`` a [m].
+
+    >>> dip = Dip(10.0, depth=2e-3, length=0.5)
+    >>> [round(float(dip(10.0 + 0.5 * np.log(n))), 6) for n in (1.0, 2.0, 4.0)]
+    [0.002, 0.001, 0.0005]
     """
 
     place: float

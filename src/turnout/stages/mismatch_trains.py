@@ -152,7 +152,7 @@ def _with_a_file(names: Sequence[str], folder: Path) -> str:
 
 def _loaded_vehicle(
     name: str,
-    n_axles_recorded: int | None,
+    n_axles: int | None,
     row: Mapping[str, Any],
     notes: Mapping[str, Any],
     folder: Path,
@@ -169,14 +169,14 @@ def _loaded_vehicle(
     n = len(single_unit.wheels)
     units = _noted_units(notes, n) or 1
     axle_doubts: tuple[str, ...] = ()
-    if n_axles_recorded and n_axles_recorded % n:
+    if n_axles and n_axles % n:
         axle_doubts = (
-            f"{n_axles_recorded} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
+            f"{n_axles} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
         )
-        if n_axles_recorded < min_axle_share * n * units:
+        if n_axles < min_axle_share * n * units:
             raise TrainUnknownError(*axle_doubts)
-    elif n_axles_recorded:
-        units = n_axles_recorded // n
+    elif n_axles:
+        units = n_axles // n
     share, load_sd, doubts = _load_share(name, row, notes, folder, units)
     return load_vehicle(name, share, folder, units), load_sd, doubts, axle_doubts
 

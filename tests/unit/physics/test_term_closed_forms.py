@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from turnout import physics
-from turnout.physics.hypothesis import SupportMotion
+from turnout.physics.hypothesis import ContactSite, SupportMotion
 from turnout.simulate import car, uniform_track
 from turnout.simulate.frequency_response import receptance, responses
 from turnout.simulate.matrices import assemble
@@ -300,6 +300,13 @@ def test_three_waves_around_a_wheel_repeat_every_third_of_a_turn():
     wave = cosine(x, 0) + sine(x, 0)
     assert np.max(wave) == pytest.approx(5e-4, rel=1e-3)
     assert np.allclose(cosine(x + 2.0 * np.pi * 0.43 / 3.0, 0), cosine(x, 0), atol=1e-12)
+
+
+def test_corrugation_is_asked_for_under_all_sensors_and_beside_them():
+    hypotheses = list(physics.RailCorrugation.hypotheses(ContactSite((10.0, 12.1, 14.0))))
+    assert hypotheses
+    for fixed in (h.fixed for h in hypotheses):
+        assert fixed["start"] < 10.0 and fixed["end"] > 14.0
 
 
 def test_corrugation_shakes_at_speed_over_wavelength():

@@ -59,9 +59,21 @@ def test_chairs_are_the_supports_from_toe_to_end_and_slide_before_the_heel(toe, 
     assert blade.slide_chairs(TRACK) == slides and slides != under
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_wheels_change_rails_where_two_straight_tops_cross(mirrored):
+    """5 mm a metre down from 10 m on the stock rail, 2.5 mm a metre up from 15 mm at 9 m: level at 11 2/3 m."""
+    toe, length, fall = (9.0, 6.0, 4.0) if not mirrored else (21.0, -6.0, -4.0)
+    blade = Blade(toe, toe + length, toe + 2.0 * length, TRACK.rail, 3e8, 3e4)
+    surfaces = (
+        (StockFall(20.0 if mirrored else 10.0, fall, 0.02, power=1.0),),
+        (BladeTop(toe, length, 0.015, power=1.0),),
+    )
+    level_at = 30.0 - 35.0 / 3.0 if mirrored else 35.0 / 3.0
+    assert transfer_position(surfaces, blade) == pytest.approx(level_at, abs=6.0 / 2000)  # a step of its grid
+
+
 def test_wheels_change_rails_only_between_a_surface_of_each():
     stock, top = SURFACES
-    assert transfer_position(SURFACES, BLADE) is not None
     for surfaces in ((), (stock,), (stock, stock), (top,), (top, top)):
         assert transfer_position(surfaces, BLADE) is None
 
