@@ -181,7 +181,7 @@ def page(results):
     return PAGE.format(
         n_laws=len(LAWS), answer=full.verdict.answer, names=", ".join(full.names).replace("_", " "),
         grade=full.verdict.grade, probability=full.verdict.probability, before=check.before, after=check.after,
-        sentence=" ".join(f"What the model left out: {t.sentence()}." for t in full.fit.terms),
+        sentence=" ".join(f"The linear model lacks an effect: {t.sentence()}." for t in full.fit.terms),
         rival=check.rival, decoy=check.decoy, cubic="yes" if full.names == ("cubic_spring",) else "no", sine=sine,
         arrow=arrow, answer_2=reduced.verdict.answer, reason_2=reduced.verdict.reason.replace("_", " "),
         best_2=best_score.family.replace("_", " "),

@@ -14,7 +14,8 @@ from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.effects_page import page
 from turnout.stages.finding_row import recommendation
-from turnout.stages.mismatch_text import parameter_in_words, title
+from turnout.stages.mismatch_text import title
+from turnout.stages.parameter_text import parameter_in_words
 
 FILE = '''"""A box on one sleeper: drive, cabinet, heater."""
 
@@ -96,7 +97,7 @@ def test_a_finding_names_it_and_says_what_to_do(box):
     term["parameters"] = {"mass": {"value": 62.0, "se": 3.0, "unit": "kg"}}
     finding = {"verdict": "named", "term_json": json.dumps([term]), "rival_term": None, "train": None, "channel": None}
     finding |= {"place_low_m": 20.0, "place_high_m": 28.0}
-    assert title(finding) == "A box of 62 kg stands on the sleeper at 24.6 m."
+    assert title(finding) == "A box of 62 kg stands on the sleeper at 24.6 m (95 % interval: 56 to 68 kg)."
     assert parameter_in_words("sleeper_box", "mass") == "mass: mass on one sleeper"
     named = SimpleNamespace(verdict=SimpleNamespace(answer="named", names=("sleeper_box",)))
     assert recommendation(named) == "Look for a box on this sleeper"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
 from turnout.counts import count_of
+from turnout.number_text import evidence_in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -107,7 +108,7 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
 
 def _answers(model: CalibratedModel) -> Iterator[str]:
     """The answers to both questions, one line each."""
-    yield "against the file: " + ("; ".join(_differences(model)) or "nothing differs")
+    yield "differences from the track file: " + ("; ".join(_differences(model)) or "none")
     for change in (a for a in model.answers if a.question == "change" and model.changes):
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
@@ -156,14 +157,14 @@ def _change(answer: ModelAnswer) -> str:
     from turnout.stages.visit_time import day_of
 
     start, end = (day_of(t) for t in answer.onset)
-    evidence = "" if answer.gain is None else f" ({answer.gain:.0f} nats)"
+    evidence = "" if answer.gain is None else f" (evidence: {evidence_in_words(answer.gain)})"
     return f"{_effect(answer)}, appeared after {start}, at the latest at {end}{evidence}"
 
 
 def _effect(answer: ModelAnswer) -> str:
     """Names, parameter and size of an answer."""
     if answer.verdict == "unknown":
-        return f"unknown effect at {answer.parameter}, no name explains it alone"
+        return f"unknown effect at {answer.parameter}, no single effect of the catalogue explains it"
     assert answer.size is not None and answer.sd is not None
     unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
     names = " or ".join(answer.names).replace("_", " ")
@@ -182,4 +183,4 @@ def _strongest(model: CalibratedModel) -> Iterator[str]:
         yield "changes: cannot tell from fewer than two visits"
     elif all(a.verdict == "none" for a in model.answers if a.question == "change"):
         best = model.changes[0]
-        yield f"the largest evidence of a change is {best.gain:.1f} nats ({best.effect.name})"
+        yield f"the most likely change is {best.effect.name}, with evidence of {evidence_in_words(best.gain)}"

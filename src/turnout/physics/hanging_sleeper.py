@@ -67,7 +67,7 @@ class HangingSleeper(PhysicsTerm):
             unit="-",
             neutral=0.0,
             bounds=(0.0, 0.95),
-            meaning="share of the ballast that bears the unloaded sleeper",
+            meaning="share of the ballast that carries the unloaded sleeper",
             source="Kaewunruen and Remennikov 2008, Dynamic properties of railway track and its components",
         ),
     )

@@ -34,7 +34,7 @@ class HighPass(TransferTerm):
     smallest_reportable = 2.0
     min_significance = 1.0
     parameters = (
-        Parameter("corner", "Hz", 0.0, (0.0, 80.0), "frequency of 3 dB loss",
+        Parameter("corner", "Hz", 0.0, (0.0, 80.0), "frequency at which 3 dB are lost",
                   "ISO 16063-1:1998 and data sheets: 0.1 to 5 Hz; failing coupling more"),
     )  # fmt: skip
 

@@ -34,7 +34,7 @@ class LowPass(TransferTerm):
     smallest_reportable = 1 / 2000.0
     component = "channel"
     parameters = (
-        Parameter("period", "s", 0.0, (0.0, 1 / 200.0), "one over the frequency of 3 dB loss",
+        Parameter("period", "s", 0.0, (0.0, 1 / 200.0), "reciprocal of the frequency at which 3 dB are lost",
                   "Butterworth 1930, On the theory of filter amplifiers"),
     )  # fmt: skip
 

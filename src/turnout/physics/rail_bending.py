@@ -28,7 +28,7 @@ class RailBending(PhysicsTerm):
     frame = "place"
     asked = False
     parameters = (
-        Parameter("factor", "-", 1.0, (0.3, 5.0), "bending stiffness over that of the base",
+        Parameter("factor", "-", 1.0, (0.3, 5.0), "bending stiffness over that of the base model",
                   "Esveld 2001, Modern railway track: EI grows about as the square of a profile's mass"),
     )  # fmt: skip
 

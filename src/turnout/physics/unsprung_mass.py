@@ -28,7 +28,7 @@ class UnsprungMass(PhysicsTerm):
 
     name = "unsprung_mass"
     left_out = "wheelsets of {who} have {factor:.2f} times their mass"
-    message = "The wheelsets of {train} are {factor} times as heavy as in its file"
+    message = "The wheelsets of {train} are {factor} times as heavy as in the vehicle file"
     site_check = "Check the vehicle file of this train"
     effect_type = "vehicle"
     frame = "train"

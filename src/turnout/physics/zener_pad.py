@@ -47,7 +47,14 @@ class ZenerPad(PhysicsTerm):
     smallest_reportable = 0.1
     prescreen_group = name  # common values of the base model change first to hide it
     parameters = (
-        Parameter("ratio", "-", 0.0, (0.0, 10.0), "stiffness of the branch over the pad's static stiffness", SOURCE),
+        Parameter(
+            "ratio",
+            "-",
+            0.0,
+            (0.0, 10.0),
+            "stiffness added at high frequency, over the static one",
+            SOURCE,
+        ),
     )
 
     @classmethod

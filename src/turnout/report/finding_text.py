@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
 from turnout.counts import count_of
-from turnout.stages.mismatch_text import estimate_in_words, interval, number_in_words, parameter_in_words, title
+from turnout.number_text import evidence_in_words
+from turnout.stages.mismatch_text import title
+from turnout.stages.parameter_text import (
+    estimate_in_words,
+    interval,
+    number_in_words,
+    parameter_in_words,
+    unit_in_words,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -24,6 +32,7 @@ __all__ = [
     "title",
     "unmet_requirements",
 ]
+FRAMES = {"place": "position", "condition": "recordings at"}  # others are called as in the glossary
 ANSWERS = {  # verdict: its word, as in docs/mismatch.md, and what it means
     "named": ("named", "the effect that the simulation lacks"),
     "a_or_b": ("a or b", "two effects explain the recordings equally well"),
@@ -75,6 +84,7 @@ def _parameter(
     term: str, position: float | None, name: str, value: float, low: float | None, high: float | None, unit: str
 ) -> dict[str, str]:
     effect = term.replace("_", " ") + (f" at {position:.1f} m" if position is not None else "")
+    unit = unit_in_words(term, name, unit)
     if low is None or high is None:
         text, interval_text = number_in_words(value, unit, 3), "–"
     else:
@@ -109,7 +119,7 @@ def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
             ("When", f"four fifths of it while a wheel is within {finding['wheel_within_m']:.1f} m of the sensor")
         )
     if words := _conditions(evidence):
-        pairs.append(("Shows most in", words))
+        pairs.append(("Most evidence in", words))
     pairs.append(("From", _amount(finding)))
     pairs.append(("Prediction", _held_out_fit(finding)))
     pairs.append(("How sure", _certainty(finding, evidence)))
@@ -140,10 +150,12 @@ def _frame_words(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str
         return f"the train: {finding['train']}"
     frames = [f for f in evidence.get("frames", ()) if f["q"] is not None and f["q"] < 0.05]
     words = [
-        f"{f['frame']} {f['level']} ({f['effect_db']:+.1f} dB, q = {f['q']:.3f}, n = {f['n']})" for f in frames[:3]
+        f"{FRAMES.get(f['frame'], f['frame'])} {f['level']}{' m' * (f['frame'] == 'place')} ({f['effect_db']:+.1f} dB, "
+        f"false discovery rate {f['q']:.3f}, n = {f['n']})"
+        for f in frames[:3]
     ]
     if finding["verdict"] in ("named", "a_or_b", "unknown") and finding["locked_to"]:
-        most = f"; before, most was left at {'; '.join(words)}" if words else ""
+        most = f"; the residual of the base model is largest at {'; '.join(words)}" if words else ""
         return f"{_owner(finding)}{most}"
     return "; ".join(words) or "no position, sensor or train stands out"
 
@@ -175,7 +187,7 @@ def _owner(finding: Mapping[str, Any]) -> str:
 
 def _conditions(evidence: Mapping[str, Any]) -> str:
     gains = sorted(((v or 0.0, k) for k, v in evidence.get("by_condition", {}).items()), reverse=True)
-    return ", ".join(f"{k} ({v:+.0f} nats)" for v, k in gains[:3] if v > 0.0)
+    return "; ".join(f"{k} ({evidence_in_words(v)})" for v, k in gains[:3] if v > 0.0)
 
 
 def _amount(finding: Mapping[str, Any]) -> str:
@@ -192,7 +204,7 @@ def _certainty(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
     if finding["grade"] == "A":
         words += "; with it the recordings are predicted as well as an intact turnout's"
     if finding["grade"] == "B":
-        words += "; some structure is left, its shape is not resolved"
+        words += "; with it the residual is still larger than at an intact turnout"
     if evidence.get("reason"):
         words += f"; {evidence['reason']}"
     stated = [evidence, *evidence["beside"]] if evidence.get("beside") else []
@@ -239,7 +251,7 @@ def check(finding: Mapping[str, Any]) -> str:
     if finding["verdict"] == "none":
         return "Nothing to check."
     if finding["verdict"] == "numerics":
-        return "Nothing on site: refine mesh and step of the simulation."
+        return "Nothing on site: refine the mesh and the time step of the simulation."
     action = finding["next_measurement"] or "Inspect the track at this position; repeat the measurement"
     return action.rstrip(".") + "."
 

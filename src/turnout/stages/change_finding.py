@@ -74,7 +74,7 @@ def finding_of_change(
         if test.finding["term"] == names[0]:
             row["parameters_json"] = test.finding["parameters_json"]
     if names and answer.gain is not None and nats < threshold:
-        evidence = f"the likeliest has {nats:.1f} of {threshold:g} nats of evidence"
+        evidence = f"the most likely one has {nats:.1f} of the {threshold:g} nats (log odds) of evidence needed"
         words = f"no effect is named; {evidence}: {sentence_of(row, n_with_trains)}"
         return row | {"verdict": "none", "term": None, "rival_term": None, "component": None, "sentence": words}
     return row | {"sentence": sentence_of(row, n_with_trains)}

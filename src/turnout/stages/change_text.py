@@ -109,14 +109,13 @@ def _size_words(row: Mapping[str, Any], name: str) -> str:
 
 def _parameter_words(row: Mapping[str, Any]) -> str:
     """Size of the effect under trains with its 95 % interval, "" if they do not name it; a share by its meaning."""
-    from turnout.stages.mismatch_text import interval, number_in_words, parameter_in_words
+    from turnout.stages.parameter_text import parameter_estimate, parameter_in_words
 
     words = ""
     for p in json.loads(row.get("parameters_json") or "[]"):
-        low, high = interval(p["term"], p["name"], p["value"], p["se"])
-        value, low_end, high_end = (number_in_words(v, p["unit"]) for v in (p["value"], low, high))
+        value, limits = parameter_estimate(p["term"], p["name"], p["value"], p["se"], p["unit"])
         name = parameter_in_words(p["term"], p["name"]).rpartition(": ")[2] if p["unit"] == "-" else p["name"]
-        words += f", {name} {value} ({low_end} to {high_end}, 95 %)"
+        words += f", {name} {value}" + (f" ({limits}, 95 %)" if limits else "")
     return words
 
 

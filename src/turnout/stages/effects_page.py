@@ -10,7 +10,7 @@ from pathlib import Path
 
 from turnout import physics
 from turnout.physics.term import FRAMES
-from turnout.stages.mismatch_text import number_in_words
+from turnout.stages.parameter_text import number_in_words
 
 PAGE_HEAD = """# What a diagnosis can name
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from turnout import physics
 from turnout.stages.mismatch_text import UNFINISHED, whole_sentence
+from turnout.stages.parameter_text import parameter_estimate
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
@@ -48,13 +49,23 @@ def sentence(diagnosis: Diagnosis) -> str:
             return f"Something is there {where}, and these recordings cannot name it: {verdict.reason}."
         return f"Something is missing {location_text(diagnosis)}: {verdict.reason}."
     sentences = []
-    for term, term_verdict in zip(diagnosis.fit.terms, diagnosis.verdicts):
-        sentences.append(f"What the model left out: {term.sentence()}.")
+    for term, candidate, term_verdict in zip(diagnosis.fit.terms, diagnosis.fit.candidates, diagnosis.verdicts):
+        sentences.append(f"The simulation lacks an effect: {term.sentence()}{_sizes(diagnosis, candidate)}.")
         if term_verdict.answer == "a_or_b":
             sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot distinguish them.")
     return " ".join(
         [*sentences, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else sentences
     )
+
+
+def _sizes(diagnosis: Diagnosis, candidate: Candidate) -> str:
+    """The fitted parameters of an effect with their 95 % intervals, in brackets."""
+    part = diagnosis.fit.part(candidate)
+    texts = []
+    for p, value, se in zip(candidate.parameters, diagnosis.fit.psi[part], diagnosis.fit.psi_se[part]):
+        estimate, limits = parameter_estimate(candidate.family, p.name, float(value), float(se), p.unit)
+        texts.append(f"{p.name} {estimate}" + (f", 95 % interval {limits}" if limits else ""))
+    return f" ({'; '.join(texts)})" if texts else ""
 
 
 def location_text(diagnosis: Diagnosis) -> str:
@@ -74,7 +85,7 @@ def location_text(diagnosis: Diagnosis) -> str:
     frames = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY_RATE]
     if not frames:
         return "at no position, sensor or train in particular"
-    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, q = {f.q:.3f})" for f in frames[:2])
+    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, false discovery rate {f.q:.3f})" for f in frames[:2])
 
 
 def recommendation(diagnosis: Diagnosis) -> str:

@@ -22,7 +22,8 @@ from turnout.stages.mismatch_curves import (
     curve_rows,
     reach_of,
 )
-from turnout.stages.mismatch_text import headline, interval, requirements_in_words, surface_sentence
+from turnout.stages.mismatch_text import headline, requirements_in_words, surface_sentence
+from turnout.stages.parameter_text import interval
 from turnout.stages.possible_effect import agreement_sentence, scope_of_agreement, sentence_on_possible_effect
 from turnout.stages.values_off_file import sentences_on_values
 

@@ -1,149 +1,25 @@
 """Sentences that describe a finding to the person who inspects the track."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
+from string import Formatter
 from typing import Any
-
-import numpy as np
 
 from turnout import physics
 from turnout.constants import Z95_EXACT
 from turnout.mismatch.engine.thresholds import THRESHOLDS
+from turnout.stages.parameter_text import (
+    UNKNOWN_INTERVAL,
+    estimate_in_words,
+    interval,
+    number_in_words,
+    unit_in_words,
+)
 
 MIN_SURFACE_DEVIATION = 2.0  # prior standard deviations from the track file's value that are worth a sentence
 ONE_SUPPORT = 0.31  # m to either side; an interval of a position that is larger contains several supports
-MILLI_UNITS = {"m": "mm", "s": "ms"}
 UNFINISHED = "Whether something is missing is open"
 MAX_MEASUREMENTS, MAX_EFFECTS = 2, 2  # in the sentence on what was not examined; the page has all
-PERCENT_UNITS = {"1/K": "% per kelvin"}
-
-
-def number_in_words(value: float, unit: str, digits: int = 2) -> str:
-    """A value with its unit, small ones in mm or ms.
-
-    Parameters
-    ----------
-    value : float
-        The number.
-    unit : str
-        Its unit.
-    digits : int
-        Significant digits.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
-    ('1.1 mm', '1.3', '1.2 % per kelvin')
-    """
-    factor, suffix = _scale(value, unit)
-    is_rounded = factor != 1.0 or abs(value) < 100
-    return (f"{factor * value:.{digits}g}" if is_rounded else f"{value:.0f}") + suffix
-
-
-def _scale(value: float, unit: str) -> tuple[float, str]:
-    """Factor and unit, behind a space, in which a value is written."""
-    if unit in PERCENT_UNITS:
-        return 100.0, f" {PERCENT_UNITS[unit]}"
-    if unit in MILLI_UNITS and abs(value) < 0.1:
-        return 1e3, f" {MILLI_UNITS[unit]}"
-    return 1.0, "" if unit in ("-", "") else f" {unit}"
-
-
-def estimate_in_words(value: float, low: float, high: float, unit: str) -> tuple[str, str]:
-    """An estimate and its interval, both to the last digit that half the interval leaves significant.
-
-    Parameters
-    ----------
-    value, low, high : float
-        Estimate and limits.
-    unit : str
-        Their unit.
-
-    Returns
-    -------
-    (str, str)
-        Value, and interval with its unit.
-
-    Examples
-    --------
-    >>> estimate_in_words(0.00253, 0.0, 0.00842, "m"), estimate_in_words(27.041, 27.013, 27.079, "m")
-    (('3 mm', '0 to 8 mm'), ('27.04 m', '27.01 to 27.08 m'))
-    >>> estimate_in_words(5.1e7, 4.06e7, 6.2e7, "N/m"), estimate_in_words(0.5, 0.5, 0.5, "-")
-    (('5.1e+07 N/m', '4.1e+07 to 6.2e+07 N/m'), ('0.5', '–'))
-    """
-    if not high > low:
-        return number_in_words(value, unit, 3), "–"
-    factor, suffix = _scale(value, unit)
-    half, numbers = 0.5 * factor * (high - low), [factor * v for v in (value, low, high)]
-    exponent = math.floor(math.log10(half))
-    last = exponent - (half < 2.0 * 10.0**exponent)
-    if max(map(abs, numbers)) < 1e4:
-        texts = [f"{v:.{max(0, -last)}f}" for v in numbers]
-    else:
-        texts = [f"{v:.{max(0, math.floor(math.log10(abs(v) or 1.0)) - last)}e}" for v in numbers]
-    return texts[0] + suffix, f"{texts[1]} to {texts[2]}{suffix}"
-
-
-def interval(term: str, name: str, value: float, se: float) -> tuple[float, float]:
-    """95 % interval of a term's parameter; not below 0 if the parameter cannot be negative.
-
-    Parameters
-    ----------
-    term : str
-        Name of the effect.
-    name : str
-        Name of the parameter.
-    value : float
-        Estimate.
-    se : float
-        Its standard error.
-
-    Returns
-    -------
-    (float or None, float or None)
-        Both limits in the unit of the parameter.
-
-    Examples
-    --------
-    >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
-    [0.0, -0.096]
-    """
-    parameters = _parameters_of(term)
-    lower_limit = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in parameters) else -np.inf
-    return float(max(value - Z95_EXACT * se, min(lower_limit, value))), float(value + Z95_EXACT * se)
-
-
-def parameter_in_words(term: str, name: str) -> str:
-    """Name and meaning of a term's parameter; the name only for a term outside the library.
-
-    Parameters
-    ----------
-    term : str
-        Name of the effect.
-    name : str
-        Name of the parameter.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> parameter_in_words("hanging_sleeper", "gap"), parameter_in_words("kink", "depth")
-    ('gap: clearance when unloaded', 'depth')
-    """
-    return ": ".join([name, *(p.meaning for p in _parameters_of(term) if p.name == name)])
-
-
-def _parameters_of(term: str) -> tuple[physics.Parameter, ...]:
-    """Parameters of an effect by its name, () for one outside the library."""
-    effect = physics.effects_by_name().get(term)
-    return effect.parameters if effect else ()
 
 
 PARAMETER_NAMES = {
@@ -344,8 +220,8 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     train, axle = _train_and_axle(finding) if finding["train"] else of_term
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
-    words = {name: number_in_words(p["value"], p["unit"]) for name, p in term["parameters"].items()}
-    words |= {f"{name}_size": number_in_words(abs(p["value"]), p["unit"]) for name, p in term["parameters"].items()}
+    words = {name: _estimate(term, name)[0] for name in term["parameters"]}
+    words |= {f"{name}_size": _estimate(term, name, of_size=True)[0] for name in term["parameters"]}
     words |= {
         "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
@@ -353,9 +229,42 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
         "wheel": _wheel_text(train, axle),
     }
     try:
-        return _sentence_template(term).format(**words)
+        template = _sentence_template(term)
+        return template.format(**words) + _intervals(term, template)
     except KeyError:  # an effect outside the library, or one with other parameters when it was reported
         return f"{term['term'].replace('_', ' ').capitalize()} at {words['place']}"
+
+
+def _estimate(term: Mapping[str, Any], name: str, of_size: bool = False) -> tuple[str, str]:
+    """A parameter of an effect and its 95 % interval in words, or those of its absolute value."""
+    p = term["parameters"][name]
+    low, high = interval(term["term"], name, p["value"], p["se"])
+    values = (-p["value"], -high, -low) if of_size and p["value"] < 0.0 else (p["value"], low, high)
+    return estimate_in_words(*values, unit_in_words(term["term"], name, p["unit"]))
+
+
+def _intervals(term: Mapping[str, Any], template: str) -> str:
+    """The 95 % intervals of the parameters in a sentence; of the size with its meaning where the sentence has none.
+
+    "" where the sentence says that the size has no upper limit.
+    """
+    effect = physics.effects_by_name()[term["term"]]
+    if template == effect.message_unbounded:
+        return ""
+    fields = {field for _, field, _, _ in Formatter().parse(template) if field}
+    stated = [n for n in term["parameters"] if {n, f"{n}_size"} & fields]
+    if not stated and effect.parameters[0].name not in term["parameters"]:
+        return ""
+    if not stated:
+        size = effect.parameters[0]
+        value, limits = _estimate(term, size.name)
+        return f" ({size.meaning}: {value}" + (f", 95 % interval {limits})" if limits != UNKNOWN_INTERVAL else ")")
+    limits_of = {n: _estimate(term, n, f"{n}_size" in fields)[1] for n in stated}
+    limits_of = {n: limits for n, limits in limits_of.items() if limits != UNKNOWN_INTERVAL}
+    if not limits_of:
+        return ""
+    names = "; ".join(limits if len(limits_of) == 1 else f"{n} {limits}" for n, limits in limits_of.items())
+    return f" (95 % interval{'s' * (len(limits_of) > 1)}: {names})"
 
 
 def _sentence_template(term: Mapping[str, Any]) -> str:

@@ -44,7 +44,7 @@ def sentence_on_possible_effect(verdict: Verdict, case: TrackCase, finding: Mapp
         return ""
     sizes, errors = score.estimates
     term = describe_term(score.candidate.term(sizes), score.candidate, errors, case.predictor.track())
-    evidence = f"{np.floor(10.0 * score.gain) / 10.0:.1f} of the {threshold:.0f} nats of evidence"
+    evidence = f"{np.floor(10.0 * score.gain) / 10.0:.1f} of the {threshold:.0f} nats (log odds) of evidence"
     return f"Possible, with {evidence} that a name needs: “{effect_in_words(term, finding)}.”"
 
 

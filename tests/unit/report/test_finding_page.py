@@ -29,6 +29,7 @@ GAP = {
     "fixed": {"sleeper": 24.6},
     "parameters": {"gap": {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}},
 }
+BALLAST = "ballast (95 % interval: 1.02 to 1.22 mm)"  # the end of the sentence on GAP
 EVIDENCE = {
     "reason": "",
     "frames": [{"frame": "place", "level": "24.6", "effect_db": 6.1, "q": 0.002, "n": 80}],
@@ -127,10 +128,15 @@ def test_every_answer_makes_a_sound_page(verdict):
 
 def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     text = page(named())
-    assert "<h1>The sleeper at 24.6 m hangs 1.1 mm above its ballast.</h1>" in text.replace("\n", "")
+    assert f"<h1>The sleeper at 24.6 m hangs 1.12 mm above its {BALLAST}.</h1>" in text.replace("\n", "")
     # 1.12 mm and 0.05 mm of standard error: 1.959964 * 0.05 = 0.098
     assert "1.02 to 1.22 mm" in text
-    for words in ("21 to 88 Hz", "a wheel is within 0.9 m", "ic3 120 km/h (+80 nats)", "Look under this sleeper."):
+    for words in (
+        "21 to 88 Hz",
+        "a wheel is within 0.9 m",
+        "120 km/h (80 nats, odds above 1,000,000 to 1)",
+        "Look under this sleeper.",
+    ):
         assert words in text
     for fit in ("41 %", "78 %", "50 %", "43 %"):
         assert f">{fit}</text>" in text
@@ -152,10 +158,10 @@ def test_the_words_of_the_answers_are_those_of_the_documentation(repository):
 def test_what_shows_beside_a_name_stands_in_its_sentence():
     reason = "a second effect without a name remains in channel A8: the residual is larger than in the intact state"
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
-    said = "hangs 1.1 mm above its ballast. A second effect without a name remains in channel A8: the residual"
-    assert said in headline(row) and "above its ballast." in headline(named())
+    said = f"{BALLAST}. A second effect without a name remains in channel A8: the residual"
+    assert said in headline(row) and headline(named()).endswith(f"above its {BALLAST}.")
     heading = page(row).split("<h1>")[1].split("</h1>")[0]
-    assert heading.endswith("above its ballast.")  # the rest stands under "How sure"
+    assert heading.endswith("1.22 mm).")  # the rest stands under "How sure"
     assert reason in dict(facts(row))["How sure"]
 
 
@@ -170,8 +176,8 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
         "term_json": json.dumps([PAD, gap]), "evidence_json": json.dumps(EVIDENCE | first | {"beside": [second]})
     }  # fmt: skip
     said = headline(row)
-    assert "at 8.4 m is 0.3 times as stiff" in said
-    torn = "above its ballast, or the effect is “local ballast”: these recordings cannot distinguish the two."
+    assert "at 8.4 m is 0.30 times as stiff as its neighbours' (95 % interval: 0.26 to 0.34)" in said
+    torn = f"{BALLAST}, or the effect is “local ballast”: these recordings cannot distinguish the two."
     assert said.endswith(torn)
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
@@ -179,7 +185,13 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
         _check_acceptable(row, "t1", False)
 
 
-@pytest.mark.parametrize(("delay", "said"), [(9.3e-4, "A2 lags by 0.93 ms"), (-9.3e-4, "A2 is early by 0.93 ms")])
+@pytest.mark.parametrize(
+    ("delay", "said"),
+    [
+        (9.3e-4, "A2 lags by 0.930 ms (95 % interval: 0.910 to 0.950 ms)"),
+        (-9.3e-4, "A2 is early by 0.930 ms (95 % interval: 0.910 to 0.950 ms)"),
+    ],
+)
 def test_a_channel_lags_or_is_early(delay, said):
     number = {"value": delay, "se": 1e-5, "unit": "s"}
     lag = {"term": "time_offset", "fixed": {"channel_name": "A2"}, "parameters": {"delay": number}}
@@ -201,7 +213,7 @@ def test_one_of_two_says_which_measurement_would_tell():
 def test_unknown_is_located_and_offers_nothing_to_accept():
     text = page(ROWS["unknown"])
     assert "Something is missing about 24.6 m, and no known effect explains it." in text
-    assert "place 24.6 (+6.1 dB, q = 0.002, n = 80)" in text and "--accept" not in text
+    assert "position 24.6 m (+6.1 dB, false discovery rate 0.002, n = 80)" in text and "--accept" not in text
 
 
 def test_an_unfinished_search_does_not_say_that_something_is_missing():
@@ -285,17 +297,20 @@ def test_every_effect_of_the_catalogue_has_its_sentence():
             for p in term.parameters
         }
         row = named() | {"term_json": json.dumps([{"term": term.name, "fixed": {"sleeper": 24.6}, "parameters": made}])}
-        assert "{" not in headline(row) and headline(row).endswith(".")
+        assert not {"{", "–"} & set(headline(row)) and headline(row).endswith(".")
 
 
-@pytest.mark.parametrize("error, said", [(1e-4, "hangs 1.1 mm above"), (2e-3, "no train here closes the gap")])
+@pytest.mark.parametrize(
+    "error, said",
+    [(1e-4, "1.12 mm above its ballast (95 % interval: 0.92 to 1.32 mm)"), (2e-3, "no train here closes the gap")],
+)
 def test_a_gap_that_is_only_known_from_below_has_no_size(error, said):
     gap = {**GAP, "parameters": {**GAP["parameters"], "gap": {**GAP["parameters"]["gap"], "se": error}}}
     assert said in headline(named() | {"term_json": json.dumps([gap])})
 
 
 @pytest.mark.parametrize(
-    "gain, said", [(1.3, "A2 reads 1.3 times"), (-1.0, "A2 has the wrong polarity: it reads -1 times")]
+    "gain, said", [(1.3, "A2 reads 1.30 times"), (-1.0, "A2 has the wrong polarity: it reads -1.00 times")]
 )
 def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
     term = {
@@ -343,3 +358,13 @@ def test_a_second_effect_on_a_wheel_has_its_own_axle_in_the_sentence():
     flat = {"term": "wheel_flat", "fixed": {"wheel": 3, "train": "loaded"}, "parameters": length}
     text = headline(finding(term="hanging_sleeper", position_m=24.6, term_json=json.dumps([GAP, flat])))
     assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text
+
+
+def test_an_effect_without_a_size_in_its_sentence_has_it_behind_the_sentence():
+    """0.3 ± 0.05: 0.3 ± 1.96 * 0.05 = 0.20 to 0.40."""
+    hardening = {"hardening": {"value": 0.3, "se": 0.05, "unit": "-"}}
+    term = {"term": "ballast_hardening", "fixed": {"first": 24.0, "last": 25.2}, "parameters": hardening}
+    assert headline(named() | {"term_json": json.dumps([term])}) == (
+        "The ballast about 24.6 m stiffens under load (share of stiffness added at 1 mm: 0.30, "
+        "95 % interval 0.20 to 0.40)."
+    )

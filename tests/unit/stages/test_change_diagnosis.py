@@ -290,7 +290,7 @@ def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdi
     assert row["verdict"] == verdict and row["gain_nats"] == 8.0 + nats
     is_name = verdict == "named"
     assert (row["term"] == "local_ballast") == is_name
-    assert row["sentence"].startswith("no effect is named; the likeliest has") != is_name
+    assert row["sentence"].startswith("no effect is named; the most likely one has") != is_name
     assert "softer ballast at 18.0 m" in row["sentence"]
 
 

@@ -33,16 +33,16 @@ def test_the_likeliest_effect_is_stated_with_its_evidence_and_size(case):
     gain, pad = score_of(case, "sensor_gain", 9.23, 1.2, 0.03), score_of(case, "local_pad", 7.0, 0.5, 0.1)
     channel = gain.candidate.where["sensor"]
     assert sentence_of(case, gain, pad) == (
-        f"Possible, with 9.2 of the 12 nats of evidence that a name needs: “Sensor {channel} reads 1.2 times the true "
-        "value.”"
+        f"Possible, with 9.2 of the 12 nats (log odds) of evidence that a name needs: “Sensor {channel} reads "
+        "1.20 times the true value (95 % interval: 1.14 to 1.26).”"
     )
     place = pad.candidate.where["place"]
-    assert f"at {place:.1f} m is 0.5 times as stiff" in sentence_of(case, pad)
+    assert f"at {place:.1f} m is 0.50 times as stiff" in sentence_of(case, pad)
 
 
 def test_an_effect_of_a_train_has_the_name_of_the_train(case):
     mass = score_of(case, "unsprung_mass", 6.1, 1.4, 0.05)
-    assert f"The wheelsets of {mass.candidate.where['train']} are 1.4 times as heavy" in sentence_of(case, mass)
+    assert f"The wheelsets of {mass.candidate.where['train']} are 1.40 times as heavy" in sentence_of(case, mass)
 
 
 @pytest.mark.parametrize(("gain", "is_stated"), [(5.9, False), (6.0, True), (12.0, True), (12.1, False)])
@@ -55,7 +55,7 @@ def test_what_is_too_small_to_act_on_or_contradicted_is_not_stated(case):
     too_small = score_of(case, "sensor_gain", 9.0, 1.0005, 1e-4)
     assert sentence_of(case, too_small) == "" == sentence_of(case)
     other = score_of(case, "local_pad", 7.0, 0.5, 0.1)
-    assert "0.5 times as stiff" in sentence_of(case, too_small, other)
+    assert "0.50 times as stiff" in sentence_of(case, too_small, other)
     contradicted = score_of(case, "sensor_gain", 14.7, 1.2, 0.03, worst_gain=-9.0)
     assert sentence_of(case, contradicted) == ""
 
