@@ -58,13 +58,14 @@ def evidence_in_words(nats: float) -> str:
     Examples
     --------
     >>> evidence_in_words(12.0), evidence_in_words(4.0), evidence_in_words(80.0)
-    ('12 nats, odds of 160,000 to 1', '4 nats, odds of 55 to 1', '80 nats, odds above 1,000,000 to 1')
-    >>> evidence_in_words(-3.0), evidence_in_words(float("inf"))
-    ('-3 nats, odds of 1 to 20', 'infinite nats, odds above 1,000,000 to 1')
+    ('12 nats, odds of 160,000 to 1', '4.0 nats, odds of 55 to 1', '80 nats, odds above 1,000,000 to 1')
+    >>> evidence_in_words(-3.0), evidence_in_words(0.24), evidence_in_words(float("inf"))
+    ('-3.0 nats, odds of 1 to 20', '0.2 nats, odds of 1.3 to 1', 'infinite nats, odds above 1,000,000 to 1')
     """
-    number = f"{nats:.0f}" if math.isfinite(nats) else "infinite"
+    number = f"{nats:.{int(abs(nats) < 10.0)}f}" if math.isfinite(nats) else "infinite"
     if abs(nats) > math.log(LARGEST_ODDS):
         size = f"above {LARGEST_ODDS:,} to 1" if nats > 0.0 else f"below 1 to {LARGEST_ODDS:,}"
         return f"{number} nats, odds {size}"
-    odds = int(float(f"{math.exp(abs(nats)):.2g}"))
-    return f"{number} nats, odds of {f'{odds:,} to 1' if nats >= 0.0 else f'1 to {odds:,}'}"
+    ratio = math.exp(abs(nats))
+    odds = f"{ratio:.2g}" if ratio < 10.0 else f"{float(f'{ratio:.2g}'):,.0f}"
+    return f"{number} nats, odds of {f'{odds} to 1' if nats >= 0.0 else f'1 to {odds}'}"

@@ -33,6 +33,7 @@ __all__ = [
     "unmet_requirements",
 ]
 FRAMES = {"place": "position", "condition": "recordings at"}  # others are called as in the glossary
+MIN_STATED_EVIDENCE = 1.0  # nats
 ANSWERS = {  # verdict: its word, as in docs/mismatch.md, and what it means
     "named": ("named", "the effect that the simulation lacks"),
     "a_or_b": ("a or b", "two effects explain the recordings equally well"),
@@ -187,7 +188,7 @@ def _owner(finding: Mapping[str, Any]) -> str:
 
 def _conditions(evidence: Mapping[str, Any]) -> str:
     gains = sorted(((v or 0.0, k) for k, v in evidence.get("by_condition", {}).items()), reverse=True)
-    return "; ".join(f"{k} ({evidence_in_words(v)})" for v, k in gains[:3] if v > 0.0)
+    return "; ".join(f"{k} ({evidence_in_words(v)})" for v, k in gains[:3] if v >= MIN_STATED_EVIDENCE)
 
 
 def _amount(finding: Mapping[str, Any]) -> str:

@@ -117,7 +117,7 @@ def test_the_reason_holds_the_figures_of_the_case():
     verdict = judge([score(worst=-9.0)], 2.0, MismatchSettings())
     assert verdict.reason == (
         "with soft at 3.0 m, recordings of one condition are predicted worse than without it "
-        "(evidence against it: 9 nats, odds of 8,100 to 1)"
+        "(evidence against it: 9.0 nats, odds of 8,100 to 1)"
     )
 
 
