@@ -18,9 +18,11 @@ from turnout.mismatch.engine.component_evidence import (
 from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.diagnose import diagnose, grade_names
 from turnout.mismatch.engine.findings import Findings
+from turnout.mismatch.engine.localization import locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -173,6 +175,45 @@ def test_a_component_unlike_its_kind_is_located_without_any_name(deviations, ans
     assert ("component_unlike_its_kind" in diagnosis.verdict.trail) is (answer == "unknown")
     if answer == "unknown":
         assert diagnosis.where.frame == "place" and diagnosis.where.place == pytest.approx(1.2)
+
+
+class AlsoDisturbed(Supports):
+    """The train also has a disturbance that forces at 3.6 to 4.2 m would explain, stronger than any change."""
+
+    def __init__(self, changes, deviations=0.0, at_train=False):
+        super().__init__(changes, deviations=deviations)
+        self.basis = np.linalg.qr(np.random.default_rng(11).normal(size=(60, 6)))[0]
+        self.level = ("train", "railcar") if at_train else ("place", (3.6, 4.2))
+        disturbance = self.basis @ np.array([9.0, -7.0, 8.0, 6.0, -8.0, 7.0])
+        self.observations = tuple(
+            replace(o, data=o.data + disturbance * (o.name == "train")) for o in self.observations
+        )
+        self.control_level = {"hammer": 1.0, "train": 1.0}
+
+    def residual_spaces(self, fit):
+        yield ResidualSpace(("train",), np.eye(60), {self.level: self.basis})
+
+
+@pytest.mark.parametrize(
+    "changes, deviations, place",
+    [(0.0, 0.0, 3.9), (1.2, 0.0, 1.2), (0.0, 1.2, 1.2), (0.0, -1.2, 1.2), (0.1, 0.0, 3.9)],
+)
+def test_an_unusual_component_is_the_position_where_there_is_enough_evidence_for_one(changes, deviations, place):
+    case = AlsoDisturbed(in_one(changes), np.array(in_one(deviations)))
+    found = locate(case, fit_jointly(case))
+    assert found.frame == "place" and found.place == pytest.approx(place)
+
+
+def test_an_unusual_component_does_not_stand_for_a_train():
+    """What a train has alone moves values of supports, too."""
+    case = AlsoDisturbed(in_one(1.2), at_train=True)
+    assert locate(case, fit_jointly(case)).train == "railcar"
+
+
+def test_beside_an_effect_its_error_of_shape_may_look_like_an_unusual_component():
+    case = AlsoDisturbed(in_one(1.2))
+    fit = fit_jointly(case, case.candidates, np.array([0.01]))
+    assert locate(case, fit).place == pytest.approx(3.9)
 
 
 @pytest.mark.parametrize("deviations", [[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.counts import count_of
-from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes, local_deviations
+from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
     COMPONENT_UNUSUAL,
@@ -287,10 +287,10 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
     search = findings.search
     if AMBIGUOUS in verdict.trail:
         return location_of_ambiguity(search.case)
-    for rule, gains in ((COMPONENT_DIFFERS, local_changes), (COMPONENT_UNUSUAL, local_deviations)):
-        if rule in verdict.trail:
-            return locate_component(search.case, gains(search.case, findings.base))
-    leader = next((s for s in verdict.scores[:1] if s.gain > search.settings.threshold), None)
+    threshold = search.settings.threshold
+    if {COMPONENT_DIFFERS, COMPONENT_UNUSUAL} & set(verdict.trail):
+        return locate_component(search.case, findings.base, threshold)
+    leader = next((s for s in verdict.scores[:1] if s.gain > threshold), None)
     leader = None if {"strained_value_remains", "local_change_remains"} & set(verdict.trail) else leader
-    absorbed = strained_value(search.case, findings.base, search.settings.threshold)
-    return locate(search.case, findings.base, leader, verdict.cause, absorbed)
+    absorbed = strained_value(search.case, findings.base, threshold)
+    return locate(search.case, findings.base, leader, verdict.cause, absorbed, threshold)

@@ -4,6 +4,9 @@ A cause that is fixed to a position acts by a force there. Whatever the force is
 subspace of the track's transfer functions from that position. A cause of some length acts at neighbouring positions. A
 fault of a channel lies in the channel, a disturbance of one recording in all its channels at once. The evidence for
 each is in ``space_evidence``.
+
+A force at a position is nearly one at the position beside it, and errors of the model resemble such forces. A single
+component with an unusual value has a sharper position (``component_evidence``), where there is enough evidence for one.
 """
 
 from __future__ import annotations
@@ -12,15 +15,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
-from turnout.mismatch.engine.component_evidence import evidence_by_position
+from turnout.mismatch.engine.component_evidence import (
+    evidence_by_position,
+    evidence_of_any_component,
+    local_changes,
+    local_deviations,
+)
 from turnout.mismatch.engine.space_evidence import SpaceEvidence, weigh_spaces
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
-    from turnout.mismatch.engine.nuisance import Nuisance
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.strained_values import StrainedValue
 
@@ -68,7 +76,12 @@ class Location:
 
 
 def locate(
-    case: Case, fit: Fit, leader: Score | None = None, cause: str = "", absorbed: StrainedValue | None = None
+    case: Case,
+    fit: Fit,
+    leader: Score | None = None,
+    cause: str = "",
+    absorbed: StrainedValue | None = None,
+    threshold: float = MismatchSettings.threshold,
 ) -> Location | None:
     """Location of the residual of a fit.
 
@@ -87,6 +100,9 @@ def locate(
         residual is above the control level and has more evidence for one location over all others than the value has
         paid. A value that is fixed to nothing may stand for a cause anywhere, and the residual may be that of intact
         recordings: its own level is then the least noise, where it is below theirs.
+    threshold : float
+        Evidence from which an unusual component of a fit without effects gives the position instead of the residual.
+        [nats]
 
     Returns
     -------
@@ -115,7 +131,12 @@ def locate(
         and (not witnesses or leader.gain > witnesses[0].nats)
     ):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
-    return replace(_location_of_evidence(witnesses), measured_range=case.measured_range) if witnesses else None
+    if not witnesses:
+        return None
+    component = None
+    if witnesses[0].frame == "place" and not fit.candidates:
+        component = locate_component(case, fit, threshold)
+    return component or replace(_location_of_evidence(witnesses), measured_range=case.measured_range)
 
 
 def location_of_ambiguity(case: Case) -> Location | None:
@@ -139,20 +160,25 @@ def location_of_ambiguity(case: Case) -> Location | None:
     return Location(u.frame, u.level, u.nats, 0.5 * (u.low + u.high), u.low, u.high)
 
 
-def locate_component(case: Case, gains: Sequence[tuple[Nuisance, float]]) -> Location | None:
-    """Location of a component that differs from what it should be, by a generic law of single components.
+def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
+    """Location of a component whose value is unusual: between trains and impacts, or among those of its kind.
 
     Parameters
     ----------
     case : Case
-    gains : sequence of (Nuisance, float)
-        Gain of each component, of ``local_changes`` or ``local_deviations``. [nats]
+    fit : Fit
+        With its Jacobian, without effects.
+    threshold : float
+        Least evidence that any component is unusual. [nats]
 
     Returns
     -------
     Location or None
-        None if no position of such a component is known.
+        By the one of both questions with more evidence. None if neither has enough, or no position is known.
     """
+    gains = max((local_changes(case, fit), local_deviations(case, fit)), key=evidence_of_any_component)
+    if evidence_of_any_component(gains) <= threshold:
+        return None
     positions = evidence_by_position(gains)
     return replace(_location_of_evidence(positions), measured_range=case.measured_range) if positions else None
 
