@@ -101,8 +101,8 @@ def locate(
         paid. A value that is fixed to nothing may stand for a cause anywhere, and the residual may be that of intact
         recordings: its own level is then the least noise, where it is below theirs.
     threshold : float
-        Evidence from which an unusual component of a fit without effects gives the position instead of the residual.
-        [nats]
+        Evidence from which an unusual component of a fit without effects gives the position instead of the residual,
+        beyond what the cause may leave in the values of other components. [nats]
 
     Returns
     -------
@@ -135,7 +135,8 @@ def locate(
         return None
     component = None
     if witnesses[0].frame == "place" and not fit.candidates:
-        component = locate_component(case, fit, threshold)
+        errors_of_shape = THRESHOLDS.shape_error_share * witnesses[0].nats
+        component = locate_component(case, fit, threshold + errors_of_shape)
     return component or replace(_location_of_evidence(witnesses), measured_range=case.measured_range)
 
 
