@@ -53,9 +53,7 @@ class MismatchSettings:
     )
     temperature: float = setting(4.0, "-", "divisor of scores before they become probabilities; chosen by hand", 0.1)
     softmax_share: float = setting(0.2, "-", "weight of the scores in the probability of an answer", 0.0, 1.0)
-    certainty_none: float = setting(
-        0.88, "-", "share of 'none' that is right, from 60 of 67 opened cases", 0.01, 0.99
-    )
+    certainty_none: float = setting(0.88, "-", "share of 'none' that is right, from 60 of 67 opened cases", 0.01, 0.99)
     certainty_named: float = setting(
         0.93, "-", "share of names that are right, judged from few opened cases", 0.01, 0.99
     )
