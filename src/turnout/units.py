@@ -21,6 +21,7 @@ UNITS = {
         "MN": (1e6, 0.0),
         "kgf": (STANDARD_GRAVITY, 0.0),
         "lbf": (4.4482216152605, 0.0),
+        "kip": (4448.2216152605, 0.0),
     },
     "acceleration": {
         "m/s²": (1.0, 0.0),
@@ -90,13 +91,14 @@ SPELLINGS = {
     "kN": "Kilonewton kilonewton",
     "kgf": "kp",
     "lbf": "lb_f lbs",
+    "kip": "kips klbf",
     "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 ms^-2 ms⁻² m*s^-2 m*s-2 m·s⁻² m·s-2 m·s^-2 m.s-2 m.s^-2 m.s⁻² m/sec² "
     "m/sec^2 m/sec2 MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
     "mm/s²": "mm/s^2 mm/s2",
     "cm/s²": "cm/s^2 cm/s2 Gal gal",
     "ft/s²": "ft/s^2 ft/s2",
     "in/s²": "in/s^2 in/s2",
-    "g": "gn g_n G gravity",
+    "g": "gn g_n G gravity g's G's",
     "m/s": "MeterPerSecond MetersPerSecond",
     "km/h": "kph KilometerPerHour",
     "m": "meter Meter metre",

@@ -1,5 +1,6 @@
 """Metadata of named variables: entries of a group and of its parents."""
 
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -28,6 +29,8 @@ from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.texts import decode_text
 
+WORD_START = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")  # in "ChannelNames"
+
 
 class Alphabetical(dict):
     """Variables of a file that sorts them alphabetically: their order carries no information."""
@@ -50,7 +53,9 @@ class Metadata:
 
     def __init__(self, variables: Mapping, source: Source, parent: "Metadata | None" = None, place: str = ""):
         self.lower = {plain_name(k): v for k, v in variables.items()}
-        self.underscored = {underscored_name(k): v for k, v in reversed(self.lower.items())} | self.lower
+        of_parts = {underscored_name(plain_name(WORD_START.sub("_", k))): v for k, v in reversed([*variables.items()])}
+        of_names = {underscored_name(k): v for k, v in reversed(self.lower.items())}
+        self.underscored = {**of_parts, **of_names, **self.lower}
         self.variables, self.parent, self.source, self.place = variables, parent, source, place
 
     @cached_property

@@ -65,7 +65,8 @@ class ChannelStatistics:
 
     ``n_bad`` is the number of samples that are not finite or mark missing ones, ``first_bad`` the index of the first of
     them, ``value`` the first sample, ``constant`` whether all samples equal it. ``lowest`` and ``highest`` are the
-    extremes. ``hold`` is the number of samples of which all changes of the value are multiples apart.
+    extremes. ``hold`` is the number of samples of which all changes of the value are multiples apart; of a square wave,
+    which ``has_two_levels``, that is its period.
     """
 
     n_bad: np.ndarray
@@ -76,6 +77,7 @@ class ChannelStatistics:
     highest: np.ndarray
     hold: np.ndarray
     n_change: np.ndarray
+    has_two_levels: np.ndarray
 
     @classmethod
     def from_record(cls, block_reader: BlockReader, n_sample: int) -> ChannelStatistics:
@@ -125,12 +127,13 @@ class ChannelStatistics:
     def _empty(cls, n: int) -> ChannelStatistics:
         return cls(
             np.zeros(n, int), np.full(n, -1), np.zeros(n), np.ones(n, bool), np.full(n, np.inf), np.full(n, -np.inf),
-            np.zeros(n, int), np.zeros(n, int),
+            np.zeros(n, int), np.zeros(n, int), np.ones(n, bool),
         )  # fmt: skip
 
     def by_channel(self) -> list[tuple[int, int, float, bool, int]]:
         """(n_bad, first_bad, value, constant, hold) of each channel; ``hold`` is 1 for few changes."""
-        hold = np.where(self.n_change >= MIN_CHANGES, np.maximum(self.hold, 1), 1)
+        is_known = (self.n_change >= MIN_CHANGES) & ~self.has_two_levels
+        hold = np.where(is_known, np.maximum(self.hold, 1), 1)
         return list(zip(self.n_bad, self.first_bad, self.value, self.constant, hold))
 
     def _add(self, samples: np.ndarray, start: int) -> None:
@@ -144,6 +147,7 @@ class ChannelStatistics:
                 if self.hold[i] != 1 and len(changes := np.flatnonzero(part[1:] != part[:-1])):
                     self.hold[i] = np.gcd.reduce([self.hold[i], *np.diff(changes)])
                     self.n_change[i] += len(changes)
+                    self.has_two_levels[i] &= bool(((part == self.lowest[i]) | (part == self.highest[i])).all())
             with np.errstate(over="ignore", invalid="ignore"):
                 suspect = not abs(row.sum()) < LARGEST_NUMBER
             if suspect and not (finite := np.abs(row) < LARGEST_NUMBER).all():

@@ -164,7 +164,7 @@ def _records(
         i: np.asarray(column[:]).astype(float) * 1e-9 for i, column in enumerate(columns) if column.dtype.kind == "m"
     }
     selected = [i for i, name in enumerate(names) if name != numbering and i != time and columns[i].dtype.kind in "fiu"]
-    selected = [i for i in selected if names[i] or len(selected) == 1 or not _is_empty(columns[i])]
+    selected = [i for i in selected if names[i] or len(selected) == 1 or not _says_nothing(columns[i])]
     seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
@@ -226,5 +226,9 @@ def _counts_rows(column: Column) -> bool:
     return len(column) > 1 and bool(np.all(np.diff(np.asarray(column[:])) != 0.0))
 
 
-def _is_empty(column: Column) -> bool:
-    return all(np.isnan(column[a : a + BLOCK_SIZE]).all() for a in range(0, len(column), BLOCK_SIZE))
+def _says_nothing(column: Column) -> bool:
+    """Whether a column has no numbers, or counts the rows, as the index that pandas writes without a name."""
+    blocks = [(a, np.asarray(column[a : a + BLOCK_SIZE])) for a in range(0, len(column), BLOCK_SIZE)]
+    first = blocks[0][1][0]
+    is_index = first in (0.0, 1.0) and all((block == first + a + np.arange(len(block))).all() for a, block in blocks)
+    return is_index or all(np.isnan(block).all() for _, block in blocks)

@@ -40,6 +40,7 @@ from turnout.readers.scale_words import is_of_drawing, is_scale_name, scale_mean
 from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
+from turnout.readers.stated_sensitivities import is_sensitivity_name
 from turnout.readers.stated_units import is_unit_name
 from turnout.readers.time_texts import is_day, looks_dated
 
@@ -142,9 +143,13 @@ def _complete_head(
         for a, b, *rest in (t for t in texts if len(t) > 1)
         if b and not any(rest) and a not in names and is_scale_name(a)
     }
+    stated = [i for i, name in enumerate(names) if STATEMENT.fullmatch(name) and not cells[i]]
     lines_of_entries = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
     separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
     entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
+    for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
+        entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
+    names = ["" if i in stated else name for i, name in enumerate(names)]
     return Head({**notes, **scales}, names, units, offset, separator, entries)
 
 
@@ -177,6 +182,7 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
 
 
+STATEMENT = re.compile(r"[^\d\W][^=]*=\s*[+-]?\d.*")  # in place of a name, above cells that are empty
 NAMES_REMEDY = "Export the file again with one cell in each row for each name"
 NO_TEXT_REMEDY = (
     f"{COPY_AGAIN}; if the logger writes binary numbers, export them as text or in another format that is read"
@@ -330,6 +336,8 @@ def entries_of_lines(
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
+        elif len(cells) > 2 and _has_value_for_each(cells, names):
+            entries = [Entry(place, cells[0], [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
         elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
             entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
@@ -360,6 +368,16 @@ def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
     return (
         len(texts) in (len(names), len(names) - 1) and is_description_name(cells[0]) and not any(map(is_number, texts))
     )
+
+
+DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d)")
+
+
+def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line has a sensitivity or a scale for each column, or for each but the first: all begin alike."""
+    begin_with_number = {re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if text}
+    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0])
+    return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1
 
 
 def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:

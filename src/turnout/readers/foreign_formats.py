@@ -80,6 +80,12 @@ FOREIGN_FORMATS = (
         "Save every channel under its name with numpy.savez",
         (b"\x93NUMPY",),
     ),
+    ForeignFormat(
+        "a matrix of Matrix Market, without names of channels",
+        "Write its columns as text, with a line of names above them",
+        (b"%%matrixmarket",),
+        is_text=True,
+    ),
     ForeignFormat("a database of SQLite", EXPORT, (b"SQLite format 3\x00",)),
     ForeignFormat("a PDF document", EXPORT, (b"%PDF-",), is_text=True),
     ForeignFormat(

@@ -18,7 +18,9 @@ import scipy.sparse
 from pymatreader.pymatreader import _parse_scipy_mat_dict as parse_loaded_variables
 from scipy.io.matlab import matfile_version
 
+from turnout.counts import first_texts
 from turnout.readers.array_metadata import Alphabetical
+from turnout.readers.channel_descriptions import quantity_of_sensor
 from turnout.readers.entries import UnreadObject
 from turnout.readers.lazy import LazyColumn, LazyMatrix, is_large, lazy_array
 from turnout.readers.mat_elements import HEADER_SIZE, unpacked_file
@@ -38,6 +40,7 @@ from turnout.readers.stated_units import is_unit_name
 SPARSE_MATRIX = UnreadObject(
     "sparse matrix", "Store it with all its zeros in MATLAB before saving, x = full(x)", is_matlab=False
 )
+MAX_LISTED = 6  # lengths that a message names
 VERSION_5, VERSION_73 = 1, 2  # as scipy numbers them
 
 
@@ -117,7 +120,7 @@ def _cells_of_channels(variables: dict[str, Any]) -> dict[str, Any] | None:
 
     The channels of one record are equally long, so the vectors of such a cell are no channels of one record where their
     lengths differ and those of the other channels differ alike. Cells whose names differ in numbers alone are records
-    themselves.
+    themselves. A cell with the name of a sensor holds none: if its lengths fit no other cell, it cannot be read.
     """
     cells = {n: v for n, v in variables.items() if isinstance(v, list) and v and all(map(_is_list_of_numbers, v))}
     is_uneven = any(len(set(map(len, vectors))) > 1 for vectors in cells.values())
@@ -125,12 +128,20 @@ def _cells_of_channels(variables: dict[str, Any]) -> dict[str, Any] | None:
     vectors_by_record = zip_longest(*cells.values())
     are_alike = all(len({len(v) for v in vectors if v is not None}) == 1 for vectors in vectors_by_record)
     if not is_uneven or not are_alike or len(cells) < 2 or len(words) < len(cells):
-        return None
+        is_of_sensor = is_uneven and any(map(quantity_of_sensor, cells))  # its vectors are no channels of one record
+        return variables | {name: _uneven_cell(vectors) for name, vectors in cells.items()} if is_of_sensor else None
     n_record = max(map(len, cells.values()))
     records = {
         f"record_{i:03d}": {n: np.asarray(v[i]) for n, v in cells.items() if i < len(v)} for i in range(n_record)
     }
     return {n: v for n, v in variables.items() if n not in cells} | records
+
+
+def _uneven_cell(vectors: list[Any]) -> UnreadObject:
+    """Stands for a cell of vectors that are no channels of one record, because their lengths differ."""
+    lengths = first_texts([str(len(v)) for v in vectors], MAX_LISTED)
+    advice = "Store each record as a structure with its channels, as x(k).force, or all with as many samples each"
+    return UnreadObject(f"cell with vectors of {lengths} samples", advice, is_matlab=False)
 
 
 def _is_list_of_numbers(value: Any) -> bool:

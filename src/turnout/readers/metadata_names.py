@@ -17,7 +17,9 @@ SAMPLE_COUNT_NAMES = (
     "antal_datapunkter",
 )  # fmt: skip
 TIME_NAMES = ("time", "t", "time_s")
-CHANNEL_NAMES = ("channels", "channel_names", "names", "labels")
+CHANNEL_NAMES = (
+    "channels", "channel_names", "names", "labels", "channel_labels", "signal_names", "sensor_names", "column_names",
+)  # fmt: skip
 UNIT_NAMES = ("units", "unit", "channel_units")
 ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes
 RECORD_COUNT_NAMES = ("n_records", "n_record")

@@ -14,7 +14,8 @@ What is recognised (names in any case, except ``t``):
      (``turnout.readers.channel_groups``);
   3. one array: (record, channel, sample), (channel, sample) or (sample, channel). The channel axis is the one with
      the number of channels, the longer axis is that of the samples;
-  4. vectors of equal length, each a channel with the name of its variable.
+  4. a matrix for each channel, with a row for each record (``turnout.readers.channel_matrices``);
+  5. vectors of equal length, each a channel with the name of its variable.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,6 +36,7 @@ from turnout.readers.array_names import (
 )
 from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
 from turnout.readers.channel_maps import kind_of
+from turnout.readers.channel_matrices import with_records_of_channels
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.entries import MAX_ENTRIES, UnreadObject
 from turnout.readers.lazy import ARRAYS, Array, Column
@@ -78,7 +80,7 @@ def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None)
         If the variables do not say which arrays are the samples.
     """
     variables = with_channel_groups(with_signal_structures(_with_fields(variables), source))
-    variables = _with_vectors(_with_durations(variables, source))
+    variables = with_records_of_channels(_with_vectors(_with_durations(variables, source)))
     facts = Metadata(variables, source, parent)
     expected = facts.count(RECORD_COUNT_NAMES)
     numbered = numbered_names(variables)
@@ -120,7 +122,11 @@ MAX_LISTED = 6  # variables that a message names
 def _problem_without_samples(variables: Mapping[str, Any]) -> str:
     """What a file without samples holds."""
     listed = [
-        f"{name!r} ({value.dtype} of shape {value.shape})" if isinstance(value, ARRAYS) else repr(name)
+        f"{name!r} ({value.dtype} of shape {value.shape})"
+        if isinstance(value, ARRAYS)
+        else f"{name!r} ({value})"
+        if isinstance(value, UnreadObject)
+        else repr(name)
         for name, value in variables.items()
         if not isinstance(value, Attributes)
     ]

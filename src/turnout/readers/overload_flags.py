@@ -29,6 +29,10 @@ DENYING_WORDS = frozenset(
     "no not non none nein nicht kein keine ohne without sans aucun free never ok ingen off aus false disabled inactive "
     "deactivated deaktiviert inaktiv unused uniform rectangular".split()
 )
+COUNT = re.compile(
+    r"(?i)[\[(]?(?<![\d.,])[1-9]\d* ?(?:samples?|points?|times?|values?|events?|werte?|abtastwerte?|punkte|mal|x)\b"
+    r"[\])]?"
+)
 MAX_WORDS = 5  # of a clause that states an overload: a longer one may speak of it for another reason
 
 
@@ -118,7 +122,7 @@ def _without_channels(clause: str, names: Collection[str]) -> str:
     """A clause without the numbers of channels and their names, of which one may be a number and says nothing."""
     words = [name for name in sorted(names, key=len, reverse=True) if re.search(r"[^\W\d]", name)]
     of_names = "|".join(map(re.escape, words))
-    clause = CHANNEL.sub(" ", clause)
+    clause = CHANNEL.sub(" ", COUNT.sub(" ", clause))
     return re.sub(rf"(?i)(?<![^\W_])(?:{of_names})(?![^\W_])", " ", clause) if of_names else clause
 
 

@@ -196,7 +196,7 @@ def name_meaning(name: str) -> NameMeaning:
         if not unit.is_step or unit.is_sampling:
             is_sampled = unit.is_sampling or bool(SAMPLING.search(spaced))
             certainty, is_step = (CERTAIN if is_sampled else POSSIBLY), unit.is_step
-        elif unit.scale <= 1 and not DURATION.search(spaced) and not is_time_name(name):
+        elif unit.scale <= 1 and not DURATION.search(spaced) and not BEGIN.search(name) and not is_time_name(name):
             certainty, is_step = POSSIBLY, True
     if unit is not None and certainty == NOT and unit.is_step and unit.scale <= SHORT_UNIT and SHORT.search(spaced):
         certainty, is_step = POSSIBLY, True  # whatever else the name says
@@ -205,6 +205,7 @@ def name_meaning(name: str) -> NameMeaning:
     return NameMeaning(certainty, is_step, unit, "" if unit else unit_text)
 
 
+BEGIN = re.compile(r"(?:^|[\W_])t[ _]?0(?:$|[\W_])", re.IGNORECASE)  # the time of the first sample
 SHORT = re.compile(f"{STEP.pattern}|{SAMPLING.pattern}")
 SHORT_UNIT = Fraction(1, 10**6)  # s: an interval in such a unit may be that of the samples under any name
 PATH_SYMBOLS = ("fs", "sr", "dt", "delta", "dx", "rate")  # last part of a path of names

@@ -34,8 +34,8 @@ def check_groups(names: Sequence[str], channels: Iterable[str], source: Source) 
     Raises
     ------
     ReadError
-        If two names differ only in words for versions, or the groups have names of different sensors and the channels
-        have not.
+        If two names differ only in words for versions, if one of them is that of a calibration or of noise, or if the
+        groups have names of different sensors and the channels have not.
     """
     channels = list(channels)
     are_of_sensors = len(set(map(quantity_of_sensor, names))) > 1
@@ -53,3 +53,15 @@ def check_groups(names: Sequence[str], channels: Iterable[str], source: Source) 
             listed = " and ".join(map(repr, versions[:3]))
             problem = f"{listed} have the same channels, and their names say that they are versions of one recording"
             raise source.error("the groups", problem, "Export one of them to a file of its own")
+    beside = [name for name in names if any(BESIDE_TEST.fullmatch(word) for word in words_of(name))]
+    if beside and len(beside) < len(names):
+        measured = next(name for name in names if name not in beside)
+        problem = f"{beside[0]!r} has the same channels as {measured!r}, and its name is that of no part of a test"
+        raise source.error("the groups", problem, "Export the records of the test to a file of their own")
+
+
+# What is recorded beside a test or a passage.
+BESIDE_TEST = re.compile(
+    r"ambient|noise|background|silence|idle|calib(?:ration)?|kalib(?:rierung)?|tare|zero|warm(?:up)?|dummy"
+    r"|selftest|rauschen|grundrauschen|umgebung|hintergrund|ruhe|leerlauf|nullabgleich|bruit|fond|etalonnage|baggrund|st[oø]j"
+)

@@ -69,6 +69,7 @@ DRAWN = re.compile(
     r"|tegning|disegno|dibujo|sketch|images?|bild|photo|foto|display|anzeige|plots?|charts?|diagramm?"
     r"|screen|print\w*|zoom"
 )
+SCREEN_SCALE = {"vertical", "scale"}  # of the screen of an oscilloscope, per division; its exports are in volts
 SWITCHED_OFF = re.compile(
     r"off|none|disabled|deactivated|inactive|aus|ausgeschaltet|abgeschaltet|deaktiviert|keine[rs]?|slukket|ingen|arret"
     r"|auto|automati\w*|agc|desactivee?|aucune?|spento|disattivat[oa]|nessuna?|apagad[oa]|desactivad[oa]|ningun[oa]?"
@@ -174,7 +175,7 @@ def scale_meaning(name: str) -> str:
         return "" if any(OTHER_GAIN.search(word) for word in words) else POSSIBLY_FACTOR
     if any(OTHER_SCALE.search(word) for word in words) or is_of_drawing(name) or subject_of(name) == STRONG:
         return ""
-    if any(word in ("file", "name") for word in words):
+    if any(word in ("file", "name") for word in words) or (SCREEN_SCALE <= set(words) or "horizontal" in words):
         return ""
     for pattern, meaning in ((INVERSION, INVERSIONS), (PREFIX, PREFIXES), (EXPONENT, EXPONENTS)):
         if any(pattern.fullmatch(w) for w in (*words, "".join(words))):

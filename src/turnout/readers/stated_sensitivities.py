@@ -46,8 +46,24 @@ def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:
     tuple of Entry
         Without those about a trigger, a frequency, a tolerance, a temperature or a date.
     """
-    words = ((entry, plain_word(entry.name)) for entry in entries)
-    return tuple(e for e, word in words if SENSITIVITY.search(word) and not BESIDE_SENSITIVITY.search(word))
+    return tuple(entry for entry in entries if is_sensitivity_name(entry.name))
+
+
+def is_sensitivity_name(name: str) -> bool:
+    """Whether an entry of this name may state the sensitivity of a sensor.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry of the metadata.
+
+    Returns
+    -------
+    bool
+        False for that of a trigger, or for the frequency at which it was measured.
+    """
+    word = plain_word(name)
+    return bool(SENSITIVITY.search(word)) and not BESIDE_SENSITIVITY.search(word)
 
 
 def with_named_sensitivities(record: RawRecord) -> RawRecord:
@@ -112,6 +128,8 @@ def sensitivity_problem(
     compared: list[Entry] = []
     for entry in sensitivity_entries(entries):
         owners = owners_of(entry, entries, names)
+        if isinstance(entry.value, list) and len(entry.value) == len(names) > 1:  # one for each channel
+            entry, owners = replace(entry, value=entry.value[index]), frozenset((index,))
         if owners and index not in owners:
             continue
         for number, own_unit in _sensitivities(entry):

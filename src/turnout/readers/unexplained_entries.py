@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.directions import opposite_directions
 from turnout.readers.entries import MAX_ENTRIES, Entry, UnreadObject
 from turnout.readers.entry_candidates import (
@@ -33,7 +34,7 @@ from turnout.readers.entry_candidates import (
     Candidate,
     candidates,
 )
-from turnout.readers.entry_owners import container_of
+from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, window_entries
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
@@ -142,13 +143,18 @@ def unexplained_entries(
     ['Mode']
     """
     for entry in entries:
-        if entry.is_defined or entry.is_piece:
+        if entry.is_defined or entry.is_piece or _is_of_delay(entry, facts.names):
             continue
         group = container_of(entry).rpartition("/")[2] if "/" in entry.place else ""
         texts = tuple(text[:MAX_TEXT] for text in _texts(entry.value, facts.n_sample))
         texts = tuple(text for text in texts if text not in facts.names)  # ``stated_units`` compares these
         if candidate := _unexplained_candidate(entry.name, group, texts, facts, are_units_certain):
             yield entry, candidate
+
+
+def _is_of_delay(entry: Entry, names: Sequence[str]) -> bool:
+    """Whether an entry states the delay of a channel, which ``channel_delays`` compares with those of the others."""
+    return is_delay_name(entry.name) and bool(owners_of(entry, (entry,), names))
 
 
 @lru_cache(maxsize=4096)

@@ -1,0 +1,51 @@
+"""Matrices that hold one channel each, with all records of it: ``force`` (record, sample) beside ``rail``."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from turnout.readers.array_metadata import Alphabetical
+from turnout.readers.array_names import numbered_names
+from turnout.readers.channel_descriptions import quantity_of_sensor
+from turnout.readers.metadata_names import CHANNEL_NAMES, UNIT_NAMES
+from turnout.readers.sample_variables import matrices, underscored_name, vectors
+
+
+def with_records_of_channels(variables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The variables, with a group for each record in place of matrices of equal shape that hold a channel each.
+
+    Their names or units have to say that they are channels: two impacts of two channels each have the same shapes. The
+    longer axis is that of the samples.
+
+    Parameters
+    ----------
+    variables : mapping of str to any
+        Name -> value.
+
+    Returns
+    -------
+    mapping of str to any
+        The same object if there are no such matrices.
+    """
+    blocks = matrices(variables)
+    shapes = {block.shape for block in blocks.values()}
+    if len(blocks) < 2 or len(shapes) > 1 or vectors(variables) or numbered_names(blocks):
+        return variables
+    shape = shapes.pop()
+    if len(shape) != 2 or min(shape) < 2 or shape[0] == shape[1] or not _are_channels(blocks, variables):
+        return variables
+    rows = {name: list(block if shape[0] < shape[1] else block.T) for name, block in blocks.items()}
+    records = {f"record_{k:03d}": {name: rows[name][k] for name in blocks} for k in range(min(shape))}
+    merged = {name: value for name, value in variables.items() if name not in blocks} | records
+    return Alphabetical(merged) if isinstance(variables, Alphabetical) else merged
+
+
+def _are_channels(blocks: Mapping[str, Any], variables: Mapping[str, Any]) -> bool:
+    """Whether matrices are named as sensors, or have a unit each, and no list names the channels of a matrix."""
+    entries = {underscored_name(name.lower()): value for name, value in variables.items()}
+    if any(name in entries for name in CHANNEL_NAMES):
+        return False
+    words = {re.sub(r"\d+", "", name) for name in blocks}
+    units = [value for name in UNIT_NAMES if isinstance(value := entries.get(name), Mapping)]
+    has_units = bool(units) and set(blocks) <= set(units[0])
+    return len(words) == len(blocks) and (has_units or any(map(quantity_of_sensor, blocks)))

@@ -1,0 +1,214 @@
+"""Files of loggers and of colleagues' scripts: each stands for a class that was misread or rejected."""
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE = 20000.0
+RNG = np.random.default_rng(20261129)
+FORCE, RAIL = RNG.normal(size=(2, 3, 400))
+BY_NAME = RawDescription(
+    (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="m/s²")),
+    rate=RATE,
+)
+BY_NUMBER = RawDescription(
+    (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²")), rate=RATE
+)
+
+
+def table(tmp_path, head, columns=(FORCE[0], RAIL[0]), end=""):
+    rows = "".join(";".join(f"{x:.5f}" for x in row) + f"{end}\n" for row in zip(*columns))
+    (tmp_path / "a.csv").write_text(f"{head}\n{rows}")
+    return "a.csv"
+
+
+def outcome(name, tmp_path, layout=BY_NAME):
+    """(force, rail) of each record, and the errors."""
+    try:
+        result = read(name, tmp_path, layout)
+    except ReadError as error:
+        return [], (error,)
+    return [recording.samples for recording in result.recordings], result.errors
+
+
+def cell(*vectors):
+    array = np.empty((1, len(vectors)), dtype=object)
+    for k, vector in enumerate(vectors):
+        array[0, k] = vector
+    return array
+
+
+# Text
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_an_index_without_a_name_is_no_channel(first, tmp_path):
+    name = table(tmp_path, ";force;rail", (first + np.arange(400), FORCE[0], RAIL[0]))
+    records, errors = outcome(name, tmp_path)
+    assert len(records) == 1 and errors == ()
+    np.testing.assert_allclose(records[0], [FORCE[0], RAIL[0]], atol=1e-5)
+
+
+def test_a_column_without_a_name_that_counts_otherwise_is_a_channel(tmp_path):
+    records, (error,) = outcome(table(tmp_path, ";force;rail", (RNG.integers(0, 99, 400), FORCE[0], RAIL[0])), tmp_path)
+    assert records == [] and error.reason == "channel_unknown"
+
+
+@pytest.mark.parametrize(("step", "is_right"), [("5.0e-05", True), ("4.0e-05", False)])
+def test_statements_beside_the_names_are_no_columns(step, is_right, tmp_path):
+    """As an oscilloscope writes them: their cells are empty in every row."""
+    name = table(tmp_path, f"force;rail;t0 = -1.0e-02;tInc = {step}", end=";;")
+    records, errors = outcome(name, tmp_path)
+    assert len(records) == is_right and [e.reason for e in errors] == ([] if is_right else ["wrong_rate"])
+
+
+def test_equal_delays_are_compared_and_state_no_rate(tmp_path):
+    head = "force_t0 [ms];{}\nrail_t0 [ms];2.5\nforce;rail"
+    assert outcome(table(tmp_path, head.format("2.5")), tmp_path)[1] == ()
+    assert outcome(table(tmp_path, head.format("0")), tmp_path)[1][0].reason == "clock_drift"
+
+
+@pytest.mark.parametrize("label", ["CH", "Time"])
+@pytest.mark.parametrize(
+    ("values", "is_right"),
+    [
+        ("0.23 mV/N;10.2 mV/g", True), ("0.23 mV/N;100 mV/g", False), ("0,23 mV/N;10,2 mV/g", True),
+        ("10.2 mV/g;0.23 mV/N", False),
+    ],
+)  # fmt: skip
+def test_a_line_has_a_sensitivity_for_each_column(values, is_right, label, tmp_path):
+    layout = RawDescription(
+        (
+            RawChannel("force", "a", "force", unit="mV", sensitivity=0.23, sensitivity_unit="mV/N"),
+            RawChannel("rail", "b", "acceleration", unit="mV", sensitivity=10.2, sensitivity_unit="mV/g"),
+        ),
+        rate=RATE,
+    )
+    columns = (np.arange(400) / RATE, FORCE[0], RAIL[0]) if label == "Time" else (FORCE[0], RAIL[0])
+    names = "Time;a;b" if label == "Time" else "a;b"
+    records, errors = outcome(table(tmp_path, f"Sensitivity;{values}\n{names}", columns), tmp_path, layout)
+    assert len(records) == is_right and [e.reason for e in errors] == ([] if is_right else ["scale_unknown"])
+
+
+def test_a_line_has_a_polarity_for_each_column(tmp_path):
+    records, (error,) = outcome(table(tmp_path, "Polarity;normal;inverted\nforce;rail"), tmp_path)
+    assert records == [] and error.reason == "scale_unknown" and "'rail'" in error.where
+    assert "Polarity = 'inverted'" in error.problem
+
+
+@pytest.mark.parametrize("head", ["Overrange: rail (3 samples)", "Overload;rail 12 x", "Clipping: 3 samples"])
+def test_an_overload_of_a_number_of_samples_is_reported(head, tmp_path):
+    _, (error,) = outcome(table(tmp_path, f"{head}\nforce;rail"), tmp_path)
+    assert error.reason == "entry_unknown" and "left its range" in error.problem
+
+
+def test_an_overload_of_no_sample_is_none(tmp_path):
+    assert outcome(table(tmp_path, "Overrange: rail (0 samples)\nforce;rail"), tmp_path)[1] == ()
+
+
+def test_a_square_wave_is_no_channel_of_a_lower_rate(tmp_path):
+    square = np.tile(np.repeat([0.0, 100.0], 5), 40)
+    assert outcome(table(tmp_path, "force;rail", (square, RAIL[0])), tmp_path)[1] == ()
+    steps = np.repeat(RNG.normal(size=80), 5)
+    assert outcome(table(tmp_path, "force;rail", (steps, RAIL[0])), tmp_path)[1][0].reason == "wrong_rate"
+
+
+@pytest.mark.parametrize(("unit", "si"), [("kip", 4448.2216152605), ("klbf", 4448.2216152605)])
+def test_units_of_american_loggers(unit, si, tmp_path):
+    channels = RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")
+    layout = RawDescription(channels, rate=RATE)
+    records, errors = outcome(table(tmp_path, f"force [{unit}];rail (g's)"), tmp_path, layout)
+    assert errors == ()
+    np.testing.assert_allclose(records[0], [FORCE[0] * si, RAIL[0] * 9.80665], atol=0.05)
+
+
+def test_a_matrix_of_matrix_market_is_named(tmp_path):
+    scipy.io.mmwrite(str(tmp_path / "a.mtx"), np.column_stack([FORCE[0], RAIL[0]]))
+    (tmp_path / "a.mtx").rename(tmp_path / "a.txt")
+    _, (error,) = outcome("a.txt", tmp_path)
+    assert "Matrix Market" in error.problem
+
+
+# Arrays
+
+
+@pytest.mark.parametrize("is_transposed", [False, True])
+@pytest.mark.parametrize("format", ["npz", "mat", "h5"])
+def test_a_matrix_for_each_channel_holds_a_record_in_each_row(format, is_transposed, tmp_path):
+    force, rail = (FORCE.T, RAIL.T) if is_transposed else (FORCE, RAIL)
+    path = tmp_path / f"a.{format}"
+    if format == "npz":
+        np.savez(path, force=force, rail=rail, fs=RATE)
+    elif format == "mat":
+        scipy.io.savemat(path, {"force": force, "rail": rail, "fs": RATE})
+    else:
+        with h5py.File(path, "w") as file:
+            file.attrs["fs"] = RATE
+            for name, array, unit in (("force", force, "N"), ("rail", rail, "m/s²")):
+                file.create_dataset(name, data=array).attrs["unit"] = unit
+    records, errors = outcome(path.name, tmp_path)
+    assert errors == ()
+    np.testing.assert_array_equal(records, np.stack([FORCE, RAIL], axis=1))
+
+
+def test_two_matrices_that_no_name_calls_channels_stay_undecided(tmp_path):
+    np.savez(tmp_path / "a.npz", before=FORCE[:2], after=RAIL[:2], fs=RATE)
+    _, (error,) = outcome("a.npz", tmp_path, BY_NUMBER)
+    assert "several arrays could be the samples" in error.problem
+
+
+@pytest.mark.parametrize("layout", [BY_NAME, BY_NUMBER])
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"force": cell(FORCE[0], FORCE[1], FORCE[2][:30]), "rail": cell(*RAIL)},
+        {"force": cell(FORCE[0], FORCE[1], FORCE[2][:30])},
+    ],
+)
+def test_a_cell_of_a_sensor_whose_vectors_differ_in_length_is_no_record(variables, layout, tmp_path):
+    """Before, the short vector was left out, and two impacts of the force were force and response."""
+    scipy.io.savemat(tmp_path / "a.mat", {**variables, "fs": RATE})
+    records, (error,) = outcome("a.mat", tmp_path, layout)
+    assert records == [] and "cell with vectors of 400, 400, 30 samples" in error.problem
+
+
+def test_a_list_of_names_counts_in_every_notation(tmp_path):
+    """Before, "ChannelNames" was no such list, so that a layout by numbers could exchange two channels."""
+    for name in ("ChannelNames", "channel names", "SignalNames", "ColumnNames"):
+        np.savez(tmp_path / "a.npz", x=np.stack([RAIL[0], FORCE[0]]), fs=RATE, **{name: np.array(["rail", "force"])})
+        records, errors = outcome("a.npz", tmp_path)
+        assert errors == (), name
+        np.testing.assert_array_equal(records[0], [FORCE[0], RAIL[0]])
+
+
+def with_groups(tmp_path, names):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k, name in enumerate(names):
+            group = file.create_group(name)
+            group.attrs["fs"] = RATE
+            group.create_dataset("force", data=FORCE[k])
+            group.create_dataset("rail", data=RAIL[k])
+    return outcome("a.h5", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("ambient", "hammer test"), ("calibration", "measurement"), ("noise floor", "impacts"), ("background 1", "A7")],
+)
+def test_noise_and_calibrations_are_no_records_of_a_test(names, tmp_path):
+    records, (error,) = with_groups(tmp_path, names)
+    assert records == [] and all(repr(name) in error.problem for name in names) and "file of their own" in error.remedy
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("impact 1", "impact 2"), ("left", "right"), ("run A", "run B"), ("noise 1", "noise 2"), ("3fa85f64", "9eb1f0aa")],
+)
+def test_groups_that_are_told_apart_otherwise_are_records(names, tmp_path):
+    records, errors = with_groups(tmp_path, names)
+    assert len(records) == 2 and errors == ()
