@@ -136,6 +136,8 @@ def format_number(value: float, step: float | None = None) -> str:
     --------
     >>> format_number(0.2), format_number(1500.0), format_number(1e-9), format_number(0.0)
     ('0.2', '1500', '10⁻⁹', '0')
+    >>> format_number(-1.5e-4), format_number(1.5e-5), format_number(2e4), format_number(2e5)
+    ('-0.00015', '1.5·10⁻⁵', '20000', '2·10⁵')
     >>> format_number(530.00002, step=1e-5)
     '530.00002'
     """

@@ -302,6 +302,15 @@ def test_three_waves_around_a_wheel_repeat_every_third_of_a_turn():
     assert np.allclose(cosine(x + 2.0 * np.pi * 0.43 / 3.0, 0), cosine(x, 0), atol=1e-12)
 
 
+def test_a_dip_that_is_shifted_is_deepest_there():
+    """A positive shift is towards larger x; smooth and kinked part add to the depth at its lowest point only."""
+    x = np.linspace(11.0, 13.0, 2001)
+    parts = physics.SurfaceDip(12.0, 1e-3, 0.6, sharpness=0.4, shift=0.25).paths(TRACK, None)
+    dip = sum(part(x) for part in parts)
+    assert x[np.argmax(dip)] == pytest.approx(12.25) and np.max(dip) == pytest.approx(1e-3)
+    assert np.allclose(dip[np.abs(x - 12.25) > 0.3], 0.0, atol=1e-12)
+
+
 def test_corrugation_is_asked_for_under_all_sensors_and_beside_them():
     hypotheses = list(physics.RailCorrugation.hypotheses(ContactSite((10.0, 12.1, 14.0))))
     assert hypotheses

@@ -60,6 +60,17 @@ def outcome(tmp_path, name):
     return result.errors[0] if result.errors else np.stack([result.recordings[0].signal(c.name) for c in CHANNELS], 1)
 
 
+def test_an_lvm_file_with_a_time_column_per_channel_has_a_header_cell_per_channel(tmp_path):
+    """Between the cells of the channels LabVIEW leaves one empty, as each channel has two columns."""
+    lines = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tMulti"]
+    lines += ["***End_of_Header***", ""]
+    lines += ["Channels\t2", "Samples\t400\t\t400", "Y_Unit_Label\tkN\t\tg", "X0\t0.0\t\t0.0", "Delta_X\t5E-5\t\t5E-5"]
+    lines += ["***End_of_Header***", "X_Value\tforce\tX_Value\trail\tComment"]
+    lines += [f"{i / RATE:.6f}\t{f:.6f}\t{i / RATE:.6f}\t{a:.6f}" for i, (f, a) in enumerate(SAMPLES)]
+    (tmp_path / "a.lvm").write_text("\n".join(lines) + "\n")
+    np.testing.assert_allclose(outcome(tmp_path, "a.lvm"), SAMPLES * [1000.0, 9.80665])
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "latin-1"])
 def test_the_unit_of_an_lvm_file_is_read_in_the_encoding_of_the_program(encoding, tmp_path):
     lvm(tmp_path / "a.lvm", encoding)
