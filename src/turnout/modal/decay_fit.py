@@ -13,6 +13,8 @@ from turnout.records import ModalModel
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+RANDOM_MODES_SEED = 20171001
+
 
 def fit_percent(measured: np.ndarray, residual: np.ndarray) -> np.ndarray:
     r"""Fit of each decay, :math:`100 (1 - \|a - \hat a\| / \|a - \bar a\|)`.
@@ -90,9 +92,7 @@ def validation_fit(model: ModalModel, decays: Sequence[np.ndarray]) -> np.ndarra
     return fit_percent(records, linearise(modes, records, model.rate, drift_columns(n, -1)).residual)
 
 
-def random_mode_fits(
-    decays: np.ndarray, rate: float, bands: Sequence[tuple[float, float]], draws: int, seed: int = 20171001
-) -> np.ndarray:
+def random_mode_fits(decays: np.ndarray, rate: float, bands: Sequence[tuple[float, float]], draws: int) -> np.ndarray:
     """Median fit over the decays for random mode sets, one mode in each band.
 
     Frequencies are uniform in the logarithm within the bands, damping ratios uniform from 0.02 to 0.3. Amplitudes are
@@ -108,15 +108,13 @@ def random_mode_fits(
         Lowest and highest frequency of each band. [Hz]
     draws : int
         Number of mode sets.
-    seed : int
-        Seed of the draws.
 
     Returns
     -------
     (draws,) array of float
         Median fit of each draw. [%]
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(RANDOM_MODES_SEED)
     low, high = np.log(np.array(bands, dtype=float)).T
     log_frequency = rng.uniform(low, high, (draws, len(bands)))
     theta = np.stack([log_frequency, rng.uniform(0.02, 0.3, log_frequency.shape)], axis=-1)

@@ -160,8 +160,10 @@ def iterate_common(
         Degrees of freedom of the residual.
     omitted_power : float
         Sum of squares that is not in the decays.
-    iterations, tolerance
-        As in ``fit_common``.
+    iterations : int
+        Largest number of iterations.
+    tolerance : float
+        Step in standard errors at which the fit has converged.
     limits : (float, float, float, float)
         Largest steps of ln f and zeta, smallest and largest damping ratio.
 

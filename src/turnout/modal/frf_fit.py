@@ -6,6 +6,7 @@ import numpy as np
 
 from turnout.modal.poles import continuous_pole
 
+MAX_ITERATIONS = 25  # of a fit
 POLYNOMIAL_TERMS = 3  # coefficients of the polynomial in frequency that stands for modes outside the band
 MAX_DAMPING = 0.95  # damping ratio at which a step of the fit ends: at 1 there is no oscillation
 MIN_SINGLE_CONTRAST = 30.0  # dB over the residual from which on one mode is enough for a peak
@@ -91,7 +92,7 @@ def linearise_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, noi
     return FrfFit(theta, information, score, coefficient[:n_mode] * scale[:, None], residual.T, noise)
 
 
-def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iterations: int = 25) -> FrfFit:
+def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray) -> FrfFit:
     """Gauss-Newton from ``theta`` with halved steps, each response weighted by its own residual.
 
     Parameters
@@ -102,8 +103,6 @@ def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iteration
         Lines of the band. [Hz]
     frf : (n_frf, n_line) array of complex
         Responses in the band.
-    iterations : int
-        Largest number of iterations.
 
     Returns
     -------
@@ -112,7 +111,7 @@ def fit_frf(theta: np.ndarray, frequency: np.ndarray, frf: np.ndarray, iteration
     """
     noise = np.full(len(frf), np.sqrt(np.mean(np.abs(frf) ** 2)))
     fit = linearise_frf(np.asarray(theta, float), frequency, frf, noise)
-    for _ in range(iterations):
+    for _ in range(MAX_ITERATIONS):
         freedom = max(1, 2 * len(frequency) - 2 * (len(fit.theta) + POLYNOMIAL_TERMS))
         noise = np.sqrt(np.sum(np.abs(fit.residual) ** 2, axis=1) / freedom)
         fit = linearise_frf(fit.theta, frequency, frf, np.maximum(noise, 1e-12 * np.abs(frf).max()))

@@ -7,6 +7,8 @@ import numpy as np
 from turnout.modal.least_squares import Linearisation, contiguous, group_decays, linearisation_of, power_sums
 
 MAX_STEP = (0.2, 0.15)  # of ln f and of zeta in one iteration
+MAX_COMMON_STEPS = 12  # iterations of a fit with common modes
+COMMON_TOLERANCE = 1e-3  # standard errors; a smaller step is the last one of such a fit
 MAX_PRINCIPAL = 8  # combinations of the decays that hold the signal
 MIN_DAMPING, MAX_DAMPING = 1e-5, 0.95  # damping ratios during the fit
 LIMITS = (*MAX_STEP, MIN_DAMPING, MAX_DAMPING)
@@ -98,9 +100,7 @@ def between_variance(value: np.ndarray, variance: np.ndarray) -> np.ndarray:
     return np.maximum(0.0, (q - (n - 1)) / (total - (weight**2).sum(axis=0) / total))
 
 
-def fit_common(
-    start: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndarray, iterations: int = 12, tolerance: float = 1e-3
-) -> tuple[np.ndarray, bool]:
+def fit_common(start: np.ndarray, decays: np.ndarray, rate: float, drift: np.ndarray) -> tuple[np.ndarray, bool]:
     """Shared modes by Gauss-Newton with reduced steps.
 
     All sums over decays are invariant to a rotation of the decays. So the decays are replaced by their principal
@@ -116,10 +116,6 @@ def fit_common(
         Sampling rate. [Hz]
     drift : (n_drift, n) array of float
         Further columns of the model.
-    iterations : int
-        Largest number of iterations.
-    tolerance : float
-        Step in standard errors at which the fit has converged.
 
     Returns
     -------
@@ -134,7 +130,7 @@ def fit_common(
     theta, group = group_decays(np.asarray(start, dtype=float)[None], decays)
     terms = power_sums(group.shape[-1])
     mean, _, converged = iterate_common(
-        theta[0], rate, group, contiguous(drift), terms, dof, omitted_power, iterations, tolerance, LIMITS
+        theta[0], rate, group, contiguous(drift), terms, dof, omitted_power, MAX_COMMON_STEPS, COMMON_TOLERANCE, LIMITS
     )
     return mean, converged
 

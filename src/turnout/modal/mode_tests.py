@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.identify import IdentifySettings
 
+IMPACT_SIGNIFICANCE = 0.01  # significance level of a mode in one impact
+
 
 def mode_chi_squared(linearisation: Linearisation, sigma2: float) -> np.ndarray:
     r"""Squared amplitude of each mode in each impact over its covariance: chi-squared(2) if the mode is absent.
@@ -88,22 +90,20 @@ def common_probability(statistic: np.ndarray) -> np.ndarray:
     return chdtrc(2 * len(statistic), statistic.sum(axis=0))
 
 
-def share_of_impacts(statistic: np.ndarray, probability: float = 0.01) -> np.ndarray:
+def share_of_impacts(statistic: np.ndarray) -> np.ndarray:
     """Share of impacts in which the mode alone is significant.
 
     Parameters
     ----------
     statistic : (n_decay, n_mode) array of float
         Values of ``mode_chi_squared``.
-    probability : float
-        Level of significance.
 
     Returns
     -------
     (n_mode,) array of float
         Share for each mode, 0 to 1.
     """
-    return (statistic > chdtri(2, probability)).mean(axis=0)
+    return (statistic > chdtri(2, IMPACT_SIGNIFICANCE)).mean(axis=0)
 
 
 # Distance of the single impacts' mean from the common mode, over the half-power half-width of the mode. One linear step

@@ -77,6 +77,7 @@ COARSE_ERROR = 0.5  # m, error of the first search over the length of the row
 MAX_ENVELOPE_MARGIN = 75.0  # m, most that is audible before the first and behind the last axle together
 BEND_STEP = 0.15  # m, step of the middle against the ends between accelerations; also its limit in m/s²
 MAX_EXCESS_LENGTH = 2.0  # m by which a row may exceed the audible length
+MAX_PASSES = 3  # of the refinement of a row
 N_REFINED = 3  # rows of a type that are refined
 
 
@@ -216,7 +217,7 @@ def likeliest_rows(
     return likeliest_by_type
 
 
-def refine_row(envelopes: SensorEnvelopes, fitted: FittedRow, passes: int = 3) -> FittedRow:
+def refine_row(envelopes: SensorEnvelopes, fitted: FittedRow) -> FittedRow:
     """The row with refined speed and, where the pattern allows a choice, refined vehicles, in turn.
 
     Parameters
@@ -225,8 +226,6 @@ def refine_row(envelopes: SensorEnvelopes, fitted: FittedRow, passes: int = 3) -
         Envelopes of the sensors.
     fitted : FittedRow
         The row of vehicles.
-    passes : int
-        Largest number of passes.
 
     Returns
     -------
@@ -234,7 +233,7 @@ def refine_row(envelopes: SensorEnvelopes, fitted: FittedRow, passes: int = 3) -
         With at least the evidence of ``fitted``.
     """
     fitted = refine_motion(envelopes, fitted, 0.006)
-    for _ in range(passes):
+    for _ in range(MAX_PASSES):
         better = _refine_vehicles(envelopes, fitted)
         better = refine_motion(envelopes, better, 0.004) if better is not fitted else fitted
         if better.evidence <= fitted.evidence:

@@ -88,7 +88,7 @@ def _edges(frequency: np.ndarray, low: float, high: float, width: float = 0.2) -
     return np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
 
 
-def levels(samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[float, float]] = BANDS) -> Levels:
+def levels(samples: np.ndarray, rate: float, step: float) -> Levels:
     """Levels of all channels; the quiet level of a band is the median of the quietest fifth of 50 ms blocks.
 
     A bin is the whole number of samples next to ``step``; the ``step`` of the result is its exact length.
@@ -101,8 +101,6 @@ def levels(samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[
         Sampling rate. [Hz]
     step : float
         Wanted length of a bin. [s]
-    bands : sequence of (float, float)
-        Edges of the bands. [Hz]
 
     Returns
     -------
@@ -110,7 +108,7 @@ def levels(samples: np.ndarray, rate: float, step: float, bands: Sequence[tuple[
         One row per channel.
     """
     step = max(round(step * rate), 1) / rate
-    powers = band_powers(samples, rate, step, bands)
+    powers = band_powers(samples, rate, step, BANDS)
     quiet_power = quiet_level(powers, max(round(0.05 / step), 1))[..., None]
     values = np.log1p(powers / quiet_power).mean(axis=1)
     quiet = values < np.quantile(values, 0.2, axis=1, keepdims=True)

@@ -69,7 +69,11 @@ def feature_profiles(envelopes: SensorEnvelopes, motion: Motion) -> tuple[dict, 
     return features, start
 
 
-def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0, passes: int = 3) -> Motion:
+MAX_PASSES = 3  # of the alignment of the sensors
+MAX_COUNTS = 3  # counts of axles by templates, those of the largest contrast
+
+
+def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0) -> Motion:
     """The motion with its speed corrected until all sensors' features coincide along the train.
 
     Each sensor's shift against the mean of the others [m], up to ``reach``, is regressed on its position.
@@ -82,8 +86,6 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
         First estimate.
     reach : float
         Largest shift of a sensor in the first pass. [m]
-    passes : int
-        Largest number of passes.
 
     Returns
     -------
@@ -94,7 +96,7 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
     travel = travel - travel.mean()
     if np.ptp(travel) < 0.3:
         return motion
-    for _ in range(passes):
+    for _ in range(MAX_PASSES):
         shifts = _sensor_shifts(envelopes, motion, reach)
         # the slope is v/v' - 1: a train faster than assumed arrives early at later sensors
         slope = np.sum(travel * shifts) / np.sum(travel**2)
@@ -142,9 +144,7 @@ def _train_extent(envelopes: SensorEnvelopes, motion: Motion) -> tuple[float, fl
     return min(extent) - 12.0, max(extent) + 12.0
 
 
-def template_counts(
-    envelopes: SensorEnvelopes, motion: Motion, patterns: Sequence[Pattern], n: int = 3
-) -> list[AxleFinding]:
+def template_counts(envelopes: SensorEnvelopes, motion: Motion, patterns: Sequence[Pattern]) -> list[AxleFinding]:
     """The axle counts of the rows of vehicles that collect most along the train, the best first.
 
     Parameters
@@ -155,8 +155,6 @@ def template_counts(
         Motion of the train.
     patterns : sequence of Pattern
         Axle patterns of known trains.
-    n : int
-        Largest number of counts.
 
     Returns
     -------
@@ -171,7 +169,7 @@ def template_counts(
     for feature, (profile, noise) in features.items():
         if noise < 0.5:
             candidates += [decode_profile(profile, start, p, audible_length, feature) for p in patterns]
-    return sorted((o for o in candidates if o is not None), key=lambda o: -o.contrast)[:n]
+    return sorted((o for o in candidates if o is not None), key=lambda o: -o.contrast)[:MAX_COUNTS]
 
 
 def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings: PassageSettings) -> list[AxleFinding]:

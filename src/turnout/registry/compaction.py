@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import duckdb
 
 
-def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) -> dict[str, tuple[int, int]]:
+def compact(registry_dir: PathLike, at_least: int = 2) -> dict[str, tuple[int, int]]:
     """Merge the files of every table and year that has many.
 
     Readers may continue meanwhile: the old files stay for another day. A damaged file is not merged: it is
@@ -41,8 +41,6 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
         Folder of the registry.
     at_least : int
         Number of files from which they are merged, 2 or more.
-    patience : float
-        How long to wait for another run that holds the lock. [s]
 
     Returns
     -------
@@ -55,13 +53,13 @@ def compact(registry_dir: PathLike, at_least: int = 2, patience: float = 600.0) 
         When the disk is full or the registry is locked; then nothing is changed.
     """
     root = Path(registry_dir)
-    with registry_lock(root, patience):
+    with registry_lock(root):
         before = take_off_damage(root, load(root))
         groups = {g: files for g, files in _groups(before).items() if _is_worth_merging(files, max(2, at_least))}
         return _rewrite(root, before, groups, lambda table, files: read_list(root, table, [f.path for f in files]))
 
 
-def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[int, int]]:
+def rebuild(registry_dir: PathLike) -> dict[str, tuple[int, int]]:
     """Rewrite all files with the present ``columns.csv``: values are cast, new columns NULL, old columns removed.
 
     A damaged file is logged and taken off the list.
@@ -70,8 +68,6 @@ def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[
     ----------
     registry_dir : PathLike
         Folder of the registry.
-    patience : float
-        How long to wait for another run that holds the lock. [s]
 
     Returns
     -------
@@ -84,7 +80,7 @@ def rebuild(registry_dir: PathLike, patience: float = 600.0) -> dict[str, tuple[
         When a value cannot be cast; then nothing is changed.
     """
     root = Path(registry_dir)
-    with registry_lock(root, patience):
+    with registry_lock(root):
         before = take_off_damage(root, load(root))
         groups = {g: files for g, files in _groups(before).items() if g[0] in tables()}
         merged = _rewrite(root, before, groups, lambda table, files: _cast(root, before, table, files))

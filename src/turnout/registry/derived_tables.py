@@ -36,7 +36,6 @@ TABLES_BY_YEAR = ("charts",)
 def publish(
     registry_dir: PathLike,
     frames: Mapping[str, pd.DataFrame | pa.Table | Sequence[Mapping[str, Any]]],
-    patience: float = 600.0,
     keep: Mapping[str, Collection[int]] | None = None,
 ) -> Generation:
     """Replace derived tables (charts, baselines, chart_status, alarms) by the rows of ``frames``, in one step.
@@ -50,8 +49,6 @@ def publish(
         An existing registry, or a folder to make one in.
     frames : mapping of table to DataFrame, Arrow table or sequence of mappings
         All rows of each table, except the years in ``keep``. Few rows may be mappings, which take no further package.
-    patience : float
-        How long to wait for another run that holds the lock. [s]
     keep : mapping of table to years, optional
         Years of a table stored by year whose live files stay as they are.
 
@@ -62,7 +59,7 @@ def publish(
         the registry is locked or the disk is full. Then nothing was changed.
     """
     root = Path(registry_dir)
-    with registry_lock(root, patience):
+    with registry_lock(root):
         before, con = load(root), connect(temp_directory=str(root / ".spill"))
         number = before.number + 1
         files = list(before.files)

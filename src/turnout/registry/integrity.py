@@ -56,15 +56,13 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
     return problems
 
 
-def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
+def vacuum(registry_dir: PathLike) -> list[str]:
     """Delete files on no list, which killed runs leave.
 
     Parameters
     ----------
     registry_dir : PathLike
         Folder of the registry.
-    patience : float
-        How long to wait for another run that holds the lock. [s]
 
     Returns
     -------
@@ -77,7 +75,7 @@ def vacuum(registry_dir: PathLike, patience: float = 600.0) -> list[str]:
         When the registry is locked.
     """
     root = Path(registry_dir)
-    with registry_lock(root, patience):
+    with registry_lock(root):
         lost = orphans(root, load(root))
         for path in lost:
             (root / path).unlink(missing_ok=True)

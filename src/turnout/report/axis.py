@@ -81,7 +81,10 @@ def log_ticks(low: float, high: float) -> list[float]:
     return [m * 10.0**k for k in exponents for m in (1, 2, 5) if low <= m * 10.0**k <= high]
 
 
-def time_ticks(low: float, high: float, n_target: int = 6) -> list[float]:
+N_TIME_TICKS = 6  # number of ticks that is aimed at
+
+
+def time_ticks(low: float, high: float) -> list[float]:
     """Starts of months or years between two POSIX times.
 
     Parameters
@@ -90,8 +93,6 @@ def time_ticks(low: float, high: float, n_target: int = 6) -> list[float]:
         Earliest time. [s]
     high : float
         Latest time. [s]
-    n_target : int
-        Number of ticks that is aimed at.
 
     Returns
     -------
@@ -106,7 +107,7 @@ def time_ticks(low: float, high: float, n_target: int = 6) -> list[float]:
     ['Jul 2024', 'Jan 2025', 'Jul 2025', 'Jan 2026', 'Jul 2026', 'Jan 2027']
     """
     months = (high - low) / (30.44 * 86400)
-    step = next((s for s in (1, 2, 3, 6, 12, 24, 60, 120) if months / s <= n_target + 1), 120)
+    step = next((s for s in (1, 2, 3, 6, 12, 24, 60, 120) if months / s <= N_TIME_TICKS + 1), 120)
     epoch = datetime(1970, 1, 1)
     day = (epoch + timedelta(seconds=low)).replace(day=1, hour=0, minute=0, second=0, microsecond=0)
     ticks = []

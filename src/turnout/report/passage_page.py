@@ -96,15 +96,13 @@ def _fit_chart(sensor: SensorPassage, time: np.ndarray, low: float, high: float,
     return chart.svg()
 
 
-def spectrogram_panel(sensor: SensorPassage, width: int = 462) -> str:
+def spectrogram_panel(sensor: SensorPassage) -> str:
     """Power of a sensor over time and frequency, with a line per axle.
 
     Parameters
     ----------
     sensor : SensorPassage
         What the sensor recorded.
-    width : int
-        Width. [px]
 
     Returns
     -------
@@ -118,7 +116,6 @@ def spectrogram_panel(sensor: SensorPassage, width: int = 462) -> str:
         Axis(float(time[0]) - step_t / 2, float(time[-1]) + step_t / 2, "time [s]"),
         Axis(0.0, float(frequency[-1]) + step_f / 2, "frequency [Hz]"),
         f"{sensor.name}: spectrogram, {DECIBELS_PER_SHADE:g} dB per shade; lines: axles",
-        width=width,
     )
     shade = len(SHADES) - 1 - ((top - level) // DECIBELS_PER_SHADE).astype(int)
     for k, colour in enumerate(SHADES):

@@ -78,7 +78,7 @@ class PassageCase:
     options: dict[str, Any]
 
 
-def numerical_error(case: PassageCase, bands: Sequence[tuple[float, float]] = BANDS) -> NumericalError:
+def numerical_error(case: PassageCase) -> NumericalError:
     """``NumericalError`` of a ``PassageCase``: three runs, the last two with dt/2 and with twice the elements.
 
     Each run prepares its track again. The finer runs have the same sampling rate: two steps are averaged per sample.
@@ -87,8 +87,6 @@ def numerical_error(case: PassageCase, bands: Sequence[tuple[float, float]] = BA
     ----------
     case : PassageCase
         The passage.
-    bands : sequence of (float, float)
-        Lowest and highest frequency of each band. [Hz]
 
     Returns
     -------
@@ -106,13 +104,13 @@ def numerical_error(case: PassageCase, bands: Sequence[tuple[float, float]] = BA
     base, finer_step = samples(case.track, substeps), samples(case.track, 2 * substeps)
     elements = 2 * _base_track(case.track).elements_per_bay
     finer_mesh = samples(_with_elements(case.track, elements), substeps)
-    step, level_step = compare_recordings(base, finer_step, rate, bands)
-    mesh, level_mesh = compare_recordings(base, finer_mesh, rate, bands)
+    step, level_step = compare_recordings(base, finer_step, rate, BANDS)
+    mesh, level_mesh = compare_recordings(base, finer_mesh, rate, BANDS)
     step, mesh = (
         _extrapolate_error(step, STEP_ORDER[options.get("scheme", "radau")]),
         _extrapolate_error(mesh, MESH_ORDER),
     )
-    return NumericalError(tuple(bands), tuple(s.name for s in sensors), step, mesh, level_step, level_mesh)
+    return NumericalError(tuple(BANDS), tuple(s.name for s in sensors), step, mesh, level_step, level_mesh)
 
 
 def _extrapolate_error(difference: np.ndarray, order: int) -> np.ndarray:
@@ -154,7 +152,7 @@ def compare_recordings(
     return waveform, level
 
 
-def end_error(case: PassageCase, extra: float = 30.0, bands: Sequence[tuple[float, float]] = BANDS) -> np.ndarray:
+def end_error(case: PassageCase, extra: float = 30.0) -> np.ndarray:
     """Relative waveform difference to the same track, longer by ``extra`` [m] of its last supports at both ends.
 
     Parameters
@@ -163,8 +161,6 @@ def end_error(case: PassageCase, extra: float = 30.0, bands: Sequence[tuple[floa
         The passage.
     extra : float
         Length added at each end. [m]
-    bands : sequence of (float, float)
-        Lowest and highest frequency of each band. [Hz]
 
     Returns
     -------
@@ -179,7 +175,7 @@ def end_error(case: PassageCase, extra: float = 30.0, bands: Sequence[tuple[floa
     shifted_options = options | {"terms": tuple(shift_supports(term, count) for term in options.get("terms", ()))}
     base = simulate_passage(smooth, case.vehicle, case.speed, sensors, **options)
     longer = simulate_passage(_lengthen(smooth, extra), case.vehicle, case.speed, sensors, **shifted_options)
-    return compare_recordings(base.samples, longer.samples, rate, bands)[0]
+    return compare_recordings(base.samples, longer.samples, rate, BANDS)[0]
 
 
 def _without_prepared(options: Mapping[str, Any]) -> dict[str, Any]:

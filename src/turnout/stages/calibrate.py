@@ -70,7 +70,6 @@ def calibrate_to_files(
     files: Iterable[str | Path],
     turnout_id: str | None = None,
     config: str | Path = "config",
-    seed: int = 0,
 ) -> Calibration:
     r"""Calibrate a section of a track to hammer tests.
 
@@ -89,8 +88,6 @@ def calibrate_to_files(
         Turnout whose configuration applies, if any.
     config : str or Path
         Folder of the configuration.
-    seed : int
-        Seed of the scatter of the track's support values.
 
     Returns
     -------
@@ -106,7 +103,7 @@ def calibrate_to_files(
     ConfigError
         The turnout has no hammer tests in its layout, or no such section, or the name of a file states another one.
     """
-    track = load_track(str(track_name), seed=seed)
+    track = load_track(str(track_name))
     position, _ = resolve_location(track, section)
     paths = [Path(file) for file in files]
     description, force, responses, settings = _channels(section, turnout_id, config, paths)
@@ -147,8 +144,6 @@ def calibrate_to_modes(
     track_name: str | Path,
     section: str,
     wanted: Mapping[str, tuple[float, float]],
-    seed: int = 0,
-    evaluations: int = 14,
 ) -> ModeFit:
     """Calibrate a section of a track to natural frequencies and dampings.
 
@@ -160,17 +155,13 @@ def calibrate_to_modes(
         Label of the section.
     wanted : mapping of str to tuple of (float, float)
         Natural frequency [Hz] and damping ratio by band.
-    seed : int
-        Seed of the scatter of the track's support values.
-    evaluations : int
-        Largest number of simulated tests.
 
     Returns
     -------
     ModeFit
         Parameters of the section, and the modes reached with them.
     """
-    return fit_modes(load_track(str(track_name), seed=seed), section, wanted, identified_modes, evaluations=evaluations)
+    return fit_modes(load_track(str(track_name)), section, wanted, identified_modes)
 
 
 def identified_modes(

@@ -32,15 +32,13 @@ class Distinguishability:
     loss: np.ndarray
     detectability: np.ndarray
 
-    def confused_with(self, name: str, min_evidence: float = THRESHOLDS.min_evidence) -> list[str]:
+    def confused_with(self, name: str) -> list[str]:
         """Effects that cannot be distinguished from one of them.
 
         Parameters
         ----------
         name : str
             The effect.
-        min_evidence : float
-            Evidence from which two effects are distinguished. [nats]
 
         Returns
         -------
@@ -53,8 +51,10 @@ class Distinguishability:
             If the effect is not among ``names``.
         """
         row = self.names.index(name)
-        confused_names = [] if self.detectability[row] >= min_evidence else ["none"]
-        return confused_names + [n for k, n in enumerate(self.names) if k != row and self.loss[row, k] < min_evidence]
+        confused_names = [] if self.detectability[row] >= THRESHOLDS.min_evidence else ["none"]
+        return confused_names + [
+            n for k, n in enumerate(self.names) if k != row and self.loss[row, k] < THRESHOLDS.min_evidence
+        ]
 
     def __str__(self) -> str:
         width = max(len(n) for n in self.names)
@@ -131,7 +131,6 @@ def _one_per_family(candidates: Iterable[Candidate], strengths: Mapping[str, Arr
 def cheapest_addition(
     base: Distinguishability,
     additions: Mapping[str, tuple[float, Distinguishability]],
-    min_evidence: float = THRESHOLDS.min_evidence,
 ) -> tuple[str, int, float]:
     """The addition to a plan that resolves most pairs of effects, the cheapest among equals.
 
@@ -141,8 +140,6 @@ def cheapest_addition(
         Of the plan as it is.
     additions : mapping
         Name -> (cost, Distinguishability of the plan with it).
-    min_evidence : float
-        Evidence from which two effects are distinguished. [nats]
 
     Returns
     -------
@@ -162,10 +159,10 @@ def cheapest_addition(
                     continue
                 before = base.loss[base.names.index(a), base.names.index(b)]
                 after = extended.loss[extended.names.index(a), extended.names.index(b)]
-                resolved += before < min_evidence <= after
+                resolved += before < THRESHOLDS.min_evidence <= after
                 gained += max(0.0, min(after, most) - min(before, most))
             before, after = base.detectability[base.names.index(a)], extended.detectability[extended.names.index(a)]
-            resolved += before < min_evidence <= after
+            resolved += before < THRESHOLDS.min_evidence <= after
         ranked.append((-resolved, cost, name, gained))
     resolved, _, name, gained = min(ranked)
     return name, int(-resolved), float(gained)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.observation import Observation
 
 
-def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.ndarray], centre: bool = True) -> float:
+def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.ndarray]) -> float:
     r"""Share of the recordings that is predicted, in units of sigma.
 
     .. math:: 100 (1 - \|y - \hat y\| / \|y - \bar y\|)
@@ -23,8 +23,6 @@ def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.nd
     ----------
     observations : sequence of Observation
     predictions : sequence of (n,) array of float
-    centre : bool
-        Whether the mean of each recording is subtracted from it.
 
     Returns
     -------
@@ -40,7 +38,7 @@ def fit_percent(observations: Sequence[Observation], predictions: Sequence[np.nd
     """
     missed = total = 0.0
     for o, p in zip(observations, predictions):
-        mean = float(np.mean(o.data)) if centre else 0.0
+        mean = float(np.mean(o.data))
         missed += o.effective * float(np.sum(((o.data - p) / o.sigma) ** 2))
         total += o.effective * float(np.sum(((o.data - mean) / o.sigma) ** 2))
     return round(100.0 * (1.0 - float(np.sqrt(missed / total))), 4)

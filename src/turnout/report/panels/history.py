@@ -55,7 +55,6 @@ def history_panel(
     modes: Sequence[Mapping[str, Any]],
     charts: Sequence[Mapping[str, Any]],
     events: Sequence[Mapping[str, Any]],
-    width: int = 462,
     quantity: Quantity = FREQUENCY,
     recursive: Sequence[Mapping[str, Any]] = (),
 ) -> str:
@@ -71,8 +70,6 @@ def history_panel(
         Rows of its control chart, may be empty.
     events : sequence of mapping
         Rows of ``events`` that affect the section.
-    width : int
-        Width. [px]
     quantity : Quantity
         ``FREQUENCY`` or ``DAMPING``.
     recursive : sequence of mapping
@@ -98,7 +95,6 @@ def history_panel(
         Axis(*_limits(low, high, lows, highs), f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
         f"{band}{quantity.name}: {with_half_width(value[-1], intervals[-1].half_width, quantity.decimals)}"
         f"{quantity.unit} (95 %), n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
-        width=width,
     )
     if expected:
         when = [seconds(c["measured_at_utc"]) for c in expected]

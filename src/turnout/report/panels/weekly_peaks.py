@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SERIES = {"point": "week", "alarm": "week in an open alarm"}
 
 
-def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: int = 462) -> str:
+def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]]) -> str:
     """Weekly peak acceleration over time, at the usual speed.
 
     Parameters
@@ -29,8 +29,6 @@ def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: in
         Label of the section.
     weeks : sequence of mapping
         ``week_utc``, ``peak_ms2``, ``peak_se_ms2`` and ``state`` of its chart, in order of time.
-    width : int
-        Width. [px]
 
     Returns
     -------
@@ -51,7 +49,6 @@ def weekly_peaks_panel(label: str, weeks: Sequence[Mapping[str, Any]], width: in
         Axis(time.min() - margin, time.max() + margin, "", "time"),
         Axis(0.0, 1.08 * float(high.max()), "peak acceleration [m/s²]"),
         f"{label}: {with_half_width(peak[-1], last, 0)} m/s² (95 %), {state}; {count_of(len(weeks), 'week')}",
-        width=width,
     )
     labels = [f"week of {w['week_utc']:%Y-%m-%d}: {p:.1f} m/s² ± {h:.1f} (95 %)" for w, p, h in zip(weeks, peak, half)]
     for style, chosen in (("point", ~is_alarm), ("alarm", is_alarm)):
