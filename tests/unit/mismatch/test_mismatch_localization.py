@@ -372,3 +372,13 @@ def test_a_position_beyond_the_measured_range_is_not_stated_to_a_metre(place, te
 def test_a_position_at_several_possible_supports_is_stated_with_its_interval(error, text):
     fields = {"verdict": "unknown", "position_m": 8.4, "position_se_m": error, "place_low_m": 1.8, "place_high_m": 8.1}
     assert text in title({**fields, "term_json": None})
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_what_a_prediction_loses_does_not_depend_on_the_unit_of_a_recording(unit):
+    """One recording halves its residual, the other gains a tenth: in errors squared -0.75 and +0.21."""
+    e, y = np.random.default_rng(4).standard_normal((2, 400))
+    pair = [Observation("a", "a", y, 1.0), Observation("b", "b", unit * y, unit)]
+    before, after = [y - e, unit * (y - e)], [y - 0.5 * e, unit * (y - 1.1 * e)]
+    assert not is_significantly_worse(pair, before, after, -np.inf)
+    assert is_significantly_worse(pair[1:], before[1:], after[1:], -np.inf)

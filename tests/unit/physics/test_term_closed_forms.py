@@ -311,6 +311,11 @@ def test_a_dip_that_is_shifted_is_deepest_there():
     assert np.allclose(dip[np.abs(x - 12.25) > 0.3], 0.0, atol=1e-12)
 
 
+def test_sentences_count_wheels_from_one_and_add_the_amplitudes_of_both_phases():
+    sentence = physics.OutOfRound(2, 3e-4, 4e-4, 5).sentence()
+    assert sentence == "wheel 3 of every train has 5 waves around it with an amplitude of 5.00e-04 m"
+
+
 def test_corrugation_is_asked_for_under_all_sensors_and_beside_them():
     hypotheses = list(physics.RailCorrugation.hypotheses(ContactSite((10.0, 12.1, 14.0))))
     assert hypotheses
