@@ -212,7 +212,7 @@ def _import_message(module: str, error: BaseException) -> str:
 REASONS = {
     "unreadable": "the file is not of its format",
     "empty": "the file has no bytes or no records",
-    "no_file": "the name is that of a device, pipe or socket, not of a file with bytes",
+    "no_file": "the name is that of a folder, device, pipe or socket, not of a file with bytes",
     "claims_too_much": "the file claims more samples or channels than a file of its size can hold",
     "too_large": "the memory of the machine was too small for it in two runs",
     "read_fault": "the disk or the network failed when it was read, in two runs; every run tries it again",
@@ -221,6 +221,7 @@ REASONS = {
     "vanished": "the file was there when planned and is gone",
     "name_unknown": "the file's name follows no pattern of the layout",
     "nothing_found": "no file of the turnout matches a pattern of the layout",
+    "not_counted": "a row of events.csv or acknowledgements.csv that cannot be right",
     "outside_root": "the path leads outside the raw root",
     "wrong_rate": "the sampling rate is not the configured one",
     "channel_missing": "a configured channel is not in the file",

@@ -41,6 +41,12 @@ def test_a_second_run_does_nothing(fleet):
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
+def test_a_run_is_not_judged_again_since_a_later_job_published_something(fleet):
+    generation = fleet / "results/registry/_generation.json"
+    generation.write_text(generation.read_text() + "\n")
+    assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
+
+
 def test_the_list_and_the_pages_are_of_each_day(fleet):
     """Silences end, planned work begins and charts grow old without a new file: once a day, and nothing else."""
     whole = {"shards": SHARDS, "target": "results/pages/index.html"}

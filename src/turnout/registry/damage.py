@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
+from turnout.registry.database import DATABASE, has_database
 from turnout.registry.generation import DataFile, Generation, load
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def take_off_damage(root: Path, generation: Generation) -> Generation:
 
 
 def damage_stamp(registry_dir: str | os.PathLike) -> str:
-    """Text that changes when files are damaged: a parameter that makes the job run that restores them.
+    """Text that changes when files are damaged or the database is lost: with it the job runs that restores them.
 
     Parameters
     ----------
@@ -129,7 +130,8 @@ def damage_stamp(registry_dir: str | os.PathLike) -> str:
         damage = find_damage(root, generation.files)
     except (RegistryError, OSError):
         return ""
-    return " ".join([*damage, *generation.incomplete])
+    lost = [DATABASE] if generation.files and not has_database(root, generation) else []
+    return " ".join([*damage, *generation.incomplete, *lost])
 
 
 def _problem(path: Path, file: DataFile) -> str:

@@ -173,15 +173,37 @@ def is_behind(registry_dir: Path, generation: Generation) -> bool:
     bool
         Whether it must be built again.
     """
+    return not has_database(registry_dir, generation) or _registry_info(registry_dir)[2] != view_texts.views_version()
+
+
+def has_database(registry_dir: Path, generation: Generation) -> bool:
+    """Whether readers find a ``registry.duckdb`` of this generation and folder.
+
+    Parameters
+    ----------
+    registry_dir : Path
+        Folder of the registry.
+    generation : Generation
+        List of the live files.
+
+    Returns
+    -------
+    bool
+        False if the file is missing or no database, and after the folder was copied or moved.
+    """
+    return _registry_info(registry_dir)[:2] == (generation.number, str(Path(registry_dir).resolve()))
+
+
+def _registry_info(registry_dir: Path) -> tuple:
+    """Generation, folder and version of the views in ``registry.duckdb``; empty without such a database."""
     file = Path(registry_dir) / DATABASE
     if not file.exists():
-        return True
+        return ()
     try:
         with duckdb.connect(str(file), read_only=True, config=OFFLINE_CONFIG) as con:
-            row = con.execute("select generation, folder, views_version from registry_info").fetchall()[0]
+            return con.execute("select generation, folder, views_version from registry_info").fetchall()[0]
     except duckdb.Error:
-        return True
-    return row != (generation.number, str(Path(registry_dir).resolve()), view_texts.views_version())
+        return ()
 
 
 def rebuild_database(registry_dir: Path) -> Generation:

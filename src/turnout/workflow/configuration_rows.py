@@ -38,7 +38,10 @@ def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iter
         "sections": [_section(t, s) for t in turnouts for s in t.sections],
         "events": list({row["event_id"]: row for row in map(_event, configuration.events)}.values()),
         "campaigns": [r for t in turnouts for r in _campaigns(with_raw(t, raw_root), measured.get(t.id, set()))],
-        "quarantine": [row for plan in plans for row in _excluded_files(plan)],
+        "quarantine": [
+            *(row for plan in plans for row in _excluded_files(plan)),
+            *_uncounted_rows(configuration),
+        ],
     }
 
 
@@ -122,8 +125,30 @@ def _excluded_files(plan: Path) -> list[dict]:
     return rows
 
 
+def _uncounted_rows(configuration: Configuration) -> list[dict]:
+    """Quarantine rows of lines of the configuration that do not count, such as an event of an unknown turnout.
+
+    ``turnout_id`` is that unknown turnout: if it has results, it was taken out of the table, and nobody is told.
+    """
+    unknown = {event.turnout for event in configuration.events} - set(configuration.ids)
+    return [
+        {
+            "quarantine_id": content_id("quarantine", str(warning), "configuration"),
+            "turnout_id": next((t for t in sorted(unknown) if f"turnout {t!r} has" in warning.problem), None),
+            "kind": "configuration",
+            "path": warning.path,
+            "stage": "plan",
+            "reason_code": "not_counted",
+            "place": warning.place,
+            "found": warning.problem,
+            "remedy": warning.remedy,
+        }
+        for warning in configuration.warnings
+    ]
+
+
 def fleet_hash(configuration: Configuration) -> str:
-    """Hash of all turnouts, their configurations and events.
+    """Hash of all turnouts, their configurations and events, and of the rows that do not count.
 
     Parameters
     ----------
@@ -138,4 +163,5 @@ def fleet_hash(configuration: Configuration) -> str:
     hashes = [
         [t, configuration.hash_of(t), json.dumps(configuration.rows[t].values)] for t in sorted(configuration.ids)
     ]
-    return content_id(hashes, [_event(e)["event_id"] for e in configuration.events])
+    warnings = map(str, configuration.warnings)
+    return content_id(hashes, [_event(e)["event_id"] for e in configuration.events], *warnings)

@@ -155,14 +155,17 @@ def touch_after_publication(
     done : iterable of path-like
         Marks of the results.
     outputs : iterable of path-like
-        Outputs of jobs that read the generation before; those that are missing stay so.
+        Outputs of jobs that read the generation before, named as their rules; those that are missing stay so.
     """
     before, marks = changed_at(Path(generation)), [Path(path) for path in done]
     yield
     if any(changed_at(mark) > changed_at(Path(generation)) for mark in marks):
         os.utime(generation)
     if changed_at(Path(generation)) != before:
-        for path in (*map(Path, outputs), *marks):
+        read_before = [Path(path) for path in outputs]
+        # Snakemake takes the time of a job's benchmark for that of an output
+        benchmarks = [Path("logs/benchmarks") / f"{path.stem}.tsv" for path in read_before]
+        for path in (*read_before, *benchmarks, *marks):
             if path.exists():
                 os.utime(path)
 

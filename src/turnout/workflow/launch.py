@@ -15,7 +15,7 @@ from turnout.config.consistency import ToSi
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, TurnoutError
 from turnout.files import write_text
-from turnout.registry.generation import require_usable_folder
+from turnout.registry.generation import load
 from turnout.workflow.configuration_rows import fleet_hash
 from turnout.workflow.plan import shard_names, write_plans
 from turnout.workflow.retries import request_rerun
@@ -105,7 +105,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     ConfigErrors
         If the configuration has errors.
     RegistryError
-        If DuckDB can make no database in this folder.
+        If DuckDB can make no database in this folder, or the list of its files cannot be read.
     ConfigError
         If an option is invalid, or so many files are missing that a disk is probably not mounted.
     TurnoutError
@@ -125,7 +125,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         "strict": _flag(options, "strict"),
     }
     if scan:
-        require_usable_folder(REGISTRY)  # before anything is computed for it
+        load(REGISTRY)  # before anything is computed for it: a list that cannot be read stops the run with its remedy
         _keep_other_runs_out()  # Snakemake's own lock comes too late: a refused run would have replaced the plans
         started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")

@@ -83,6 +83,10 @@ def shard_names(shards: int, turnouts: Iterable[str] | None = None) -> list[str]
 
 
 PLAN_END = "\n]}\n"
+ALLOW_ONCE = (
+    "if they are meant to be gone, run once: turnout nightly -- --config accept_vanished=true, or "
+    "snakemake --config accept_vanished=true"
+)
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,8 @@ def write_plans(
     Raises
     ------
     ConfigError
-        If there is no raw root, or so many known files are missing that a disk is probably not mounted.
+        If there is no raw root, or so many known files are missing that a disk is probably not mounted, or the table
+        of turnouts has lost all of its rows.
     """
     texts, missing = _scan_turnouts(configuration, raw_root, folder, shards, turnouts)
     if not accept_vanished and (error := missing.error(configuration.settings["fleet"], raw_root)):
@@ -137,6 +142,10 @@ def write_plans(
     if not accept_vanished and configuration.ids and not raw_root.is_dir():
         remedy = "Mount the disk, or make the folder, with one for each turnout in it"
         raise ConfigError(str(raw_root), "raw root", "there is no such folder", remedy)
+    if not accept_vanished and not configuration.ids and (known := _known_turnouts(Path(folder))):
+        problem = f"no row is left of the {len(known)} turnouts of the last run, first {min(known)}"
+        remedy = f"Nothing was changed. Put the rows back; {ALLOW_ONCE}"
+        raise ConfigError("turnouts.tsv", "the table", problem, remedy)
     for path, text in texts.items():
         write_if_changed(path, text)
     names = set(shard_names(shards))
@@ -144,6 +153,12 @@ def write_plans(
         if path.stem not in names:
             path.unlink(missing_ok=True)
     return [path.stem for path in texts]
+
+
+def _known_turnouts(folder: Path) -> set[str]:
+    """Turnouts in the plans of the last run."""
+    plans = [json.loads(path.read_text(encoding="utf-8")) for path in folder.glob("*of*.json") if not is_cut_plan(path)]
+    return {entry["turnout"] for plan in plans for entry in plan["turnouts"]}
 
 
 @dataclass(frozen=True)
@@ -172,10 +187,7 @@ class MissingFiles:
         is_one_absent_disk = bool(self.files) and not _holds_anything(raw_root)
         if len(self.files) <= limit and not is_one_absent_disk:
             return None
-        remedy = (
-            "Nothing was changed. Mount the disk again, or allow reading it; if they are meant to be gone, run once: "
-            "turnout nightly -- --config accept_vanished=true, or snakemake --config accept_vanished=true"
-        )
+        remedy = f"Nothing was changed. Mount the disk again, or allow reading it; {ALLOW_ONCE}"
         return ConfigError(str(raw_root), "raw root", f"{self}, first {self.files[0]}", remedy)
 
     def __str__(self) -> str:

@@ -85,7 +85,7 @@ group by turnout_id order by turnout_id"""
 # Entries of the raw root that belong to no unit: tables beside the recordings, which many recordings need, come first.
 EXCLUDED_SQL = """
 select path || coalesce(', ' || place, '') || ': ' || found from quarantine_open
-where kind = 'configuration' and not is_remark and not list_contains(?, turnout_id)
+where kind = 'configuration' and not is_remark and not coalesce(list_contains(?, turnout_id), false)
 order by path not like '%.csv' or reason_code = 'name_unknown', path, place"""
 
 

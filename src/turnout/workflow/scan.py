@@ -33,6 +33,8 @@ _name = attrgetter("name")
 class RawFolder:
     """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries.
 
+    ``folders`` are the paths of the folders below it.
+
     Parameters
     ----------
     raw_root : Path
@@ -44,6 +46,7 @@ class RawFolder:
     def __init__(self, raw_root: Path, raw: str) -> None:
         self.root, self.raw, self._below = os.path.realpath(raw_root), raw, f"{raw}/"
         self.files: list[tuple[str, os.DirEntry]] = []
+        self.folders: list[str] = []
         self.problems: list[ReadError] = []
         top = os.path.join(raw_root, raw)
         self._collect(top, "", (os.path.realpath(top),))
@@ -127,6 +130,7 @@ class RawFolder:
         elif target and any(_within(ancestor, target) for ancestor in ancestors):
             self._leave_out(inside, "link", "leads back to a folder that it lies in", "Remove it")
         else:
+            self.folders.append(inside)
             self._collect(entry.path, f"{inside}/", (*ancestors, target or os.path.join(ancestors[-1], entry.name)))
 
     def _note_unreadable(self, inside: str, where: str, error: OSError) -> None:
@@ -195,6 +199,10 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
         entries = tuple(sorted(e for e in [folder.stat(*file) for file in files] if e))
         if entries:
             result.units.append(Unit(turnout.id, kind, label, entries, turnout.hashes[kind], section, campaign))
+    for inside in folder.folders:
+        if any(expression.fullmatch(inside) for _, expression in names):
+            finding = "is a folder with the name of a recording", "Put the file itself there, or rename the folder"
+            result.problems.append(ReadError(f"{turnout.raw}/{inside}", "folder", *finding, "no_file"))
     result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched)]
     return result
 

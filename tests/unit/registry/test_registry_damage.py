@@ -164,3 +164,21 @@ def test_single_bit_flips_change_no_answer_silently_after_the_next_night(made, t
 def test_an_older_generation_file_without_the_new_list_is_read(spoiled):
     assert "incomplete" not in (spoiled.registry / "_generation.json").read_text()
     assert load(spoiled.registry).incomplete == []
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no database" * 500])
+def test_a_lost_or_damaged_database_is_made_again_by_the_next_night(made, spoiled, content):
+    """Its readers are told that a night makes it, so the job must run although no data file is damaged."""
+    database = spoiled.registry / "registry.duckdb"
+    assert damage_stamp(spoiled.registry) == ""
+    database.unlink()
+    if content is not None:
+        database.write_bytes(content)
+    assert damage_stamp(spoiled.registry) == "registry.duckdb"
+    night(spoiled)
+    assert damage_stamp(spoiled.registry) == "" and answers(spoiled) == answers(made)
+
+
+def test_a_registry_that_is_not_there_yet_has_no_damage(tmp_path):
+    """Else its job would run again in the second night."""
+    assert damage_stamp(tmp_path / "registry") == ""

@@ -5,6 +5,7 @@ import json
 import pytest
 from length_fleet import CALLS
 
+from turnout.errors import RegistryError
 from turnout.stages.trend import trend_job
 from turnout.workflow.launch import launch
 from turnout.workflow.nightly import _report
@@ -70,6 +71,22 @@ def test_the_job_of_a_cut_state_is_asked_for_though_no_plan_has_changed(fleet, m
     fleet.run()
     launch({}, scan=True)
     assert read_postponed(fleet.state) == (1, {})
+
+
+@pytest.mark.parametrize("content", ["", '{"generation": 7, "fil', '{"a": 1}'])
+def test_a_list_of_the_registry_that_cannot_be_read_stops_the_run_before_any_job(fleet, monkeypatch, content):
+    """Its message is the reason in the last line of the night; a job that fails would only name its log."""
+    fleet.run()
+    monkeypatch.chdir(fleet.folder)
+    generation = fleet.folder / "results/registry/_generation.json"
+    generation.parent.mkdir(parents=True, exist_ok=True)
+    generation.write_text(content)
+    fleet.put("t1/2024-07-13/A_1.txt", "new")
+    before = fleet.plan.read_bytes()
+    with pytest.raises(RegistryError, match=r"_generation\.json: (not a generation file|written by another version)"):
+        launch({}, scan=True)
+    assert fleet.plan.read_bytes() == before
+    launch({}, scan=False)  # one job of a run
 
 
 @pytest.mark.parametrize("share", PARTS)

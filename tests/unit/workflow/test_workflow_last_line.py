@@ -68,8 +68,9 @@ def model(turnout, status):
     return UnitResult(f"{turnout}/hammer/A/2026-01-05", turnout, "hammer", "k", "1", "ok", {"models": [row]})
 
 
-def registry(folder, quarantine=(), **status):
-    tables = {"turnouts": [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in [*status, "never"]]}
+def registry(folder, quarantine=(), taken_out="", **status):
+    listed = [t for t in [*status, "never"] if t != taken_out]
+    tables = {"turnouts": [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in listed]}
     tables |= {"quarantine": list(quarantine)} if quarantine else {}
     batch = write_batch(folder / "batches", [model(t, s) for t, s in status.items()])
     register([batch], folder / "results/registry", read=read_results, tables=tables)
@@ -106,6 +107,21 @@ def test_a_table_that_cannot_be_read_is_quoted_before_a_file_with_an_unknown_nam
     line = night(folder, known, known)
     assert "; in no unit: t1/campaigns.csv, line 1, column 25: unknown column 'temperature' and 1 more, see" in line
     assert "nothing could be used yet of t2;" in line and "t2/campaigns.csv" not in line
+
+
+@pytest.mark.parametrize("turnout", [None, "t9"])
+def test_a_row_of_the_configuration_that_does_not_count_is_quoted(folder, turnout):
+    found = f"turnout {turnout!r} has no row in turnouts.tsv"
+    row = excluded("t1", "x", "not_counted", "line 2, column 1", found)
+    registry(folder, ({**row, "turnout_id": turnout, "path": "config/events.csv"},), t1="accepted")
+    line = night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
+    assert f"; in no unit: config/events.csv, line 2, column 1: {found}, see" in line
+
+
+def test_an_event_of_a_turnout_that_was_taken_out_is_no_fault(folder):
+    row = excluded("t2", "x", "not_counted", "line 2, column 1", "turnout 't2' has no row in turnouts.tsv")
+    registry(folder, (row,), "t2", t1="accepted", t2="accepted")
+    assert "in no unit" not in night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
 
 
 @pytest.mark.parametrize("quiet", [False, True])

@@ -56,6 +56,18 @@ def test_a_link_that_leads_nowhere_or_in_a_circle_is_a_problem(fleet, link, targ
     assert planned(fleet) == (["t1", "t2"], [(f"t1/{link}", place, found)])
 
 
+@pytest.mark.parametrize("content", [(), ("x",)])
+def test_a_folder_with_the_name_of_a_recording_is_a_problem(fleet, content):
+    folder = fleet / "raw/t1" / DAY / "A_2.uff"
+    folder.mkdir()
+    for name in content:
+        (folder / name).touch()
+    turnouts, problems = planned(fleet)
+    assert turnouts == ["t1", "t2"]
+    assert problems[0] == (f"t1/{DAY}/A_2.uff", "folder", "is a folder with the name of a recording")
+    assert len(problems) == 1 + len(content)
+
+
 def test_two_links_to_each_others_folder_are_followed_once(fleet):
     for name, other in (("a", "b"), ("b", "a")):
         (fleet / "raw/t1" / name).mkdir()

@@ -264,6 +264,34 @@ def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
     assert {p.unit.turnout for p in read_plan(fleet / "work/plan/00of01.json")} == {"t1"}
 
 
+def test_a_table_that_has_lost_all_rows_stops_the_run(fleet):
+    """A file that was cut off after its header: an empty worklist would look as if nothing needed attention."""
+    plans(fleet, shards=2)
+    texts = {path: path.read_text() for path in (fleet / "work/plan").iterdir()}
+    (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\n")
+    with pytest.raises(ConfigError, match=r"no row is left of the 2 turnouts of the last run, first t1\. Nothing was"):
+        plans(fleet, shards=2)
+    assert texts == {path: path.read_text() for path in (fleet / "work/plan").iterdir()}
+    plans(fleet, shards=2, accept_vanished=True)
+    plans(fleet, shards=2)
+
+
+def test_a_row_of_the_configuration_that_does_not_count_is_in_quarantine(fleet):
+    """The night would call itself sound, and judge an alarm without the maintenance that explains it."""
+    before = fleet_hash(load_configuration(fleet / "config"))
+    (fleet / "config/events.csv").write_text(
+        "turnout,section,date,kind\nt1,,2024-05-01,tamping\nt3,,2024-05-01,tamping\n"
+    )
+    configuration = load_configuration(fleet / "config")
+    rows = configuration_rows(configuration, fleet / "raw", [])
+    (row,) = rows["quarantine"]
+    assert (row["kind"], row["reason_code"]) == ("configuration", "not_counted")
+    assert row["path"].endswith("events.csv") and row["place"] == "line 3, column 1" and "'t3'" in row["found"]
+    assert row["turnout_id"] == "t3"
+    (fleet / "config/events.csv").write_text("turnout,section,date,kind\nt1,,2024-05-01,tamping\n")
+    assert len({before, fleet_hash(configuration), fleet_hash(load_configuration(fleet / "config"))}) == 3
+
+
 def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys, monkeypatch):
     from turnout.cli.main import main
 

@@ -1,12 +1,14 @@
 """What is new is judged once there is enough of it; what was found wrong is said until it is fixed or outlived."""
 
 import json
+import os
 import shutil
 
 import pytest
 from length_fleet import Fleet
 
 from turnout.errors import TurnoutError
+from turnout.workflow.jobs import touch_after_publication
 from turnout.workflow.quality_gate import check_quality, judge
 
 
@@ -133,3 +135,21 @@ def test_a_fault_of_the_machine_excuses_no_bad_unit(nights):
     assert "1 units wait" in nights.night("damaged", "damaged", "damaged", "bad sector")
     nights.put("t0/2024-06-04/A_1.txt", "readable")
     assert "3 of 9 new units" in nights.night(*["good"] * 5)
+
+
+def test_no_output_is_older_than_a_generation_that_was_published_after_it(tmp_path, monkeypatch):
+    """Nor is its benchmark, whose time counts for Snakemake: the next night would make all charts and pages again."""
+    monkeypatch.chdir(tmp_path)
+    names = ("work/change/00of01.done", "work/trend.json", "logs/benchmarks/trend.tsv", "_generation.json")
+    generation, paths = tmp_path / names[-1], [tmp_path / name for name in names]
+    for k, path in enumerate(paths):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (k, k))
+    with touch_after_publication(generation, [names[0]], ["work/trend.json", "work/missing.json"]):
+        pass
+    assert [path.stat().st_mtime for path in paths] == [0, 1, 2, 3]
+    with touch_after_publication(generation, [names[0]], ["work/trend.json", "work/missing.json"]):
+        generation.touch()
+    assert all(path.stat().st_mtime_ns >= generation.stat().st_mtime_ns for path in paths)
+    assert not (tmp_path / "work/missing.json").exists()

@@ -5,7 +5,9 @@ create or replace view quarantine_open as
 select q.*, r.meaning as reason, coalesce(r.is_remark, false) as is_remark
 from quarantine q anti join superseded s on q.quarantine_id = s.old_id
     left join reasons r using (reason_code)
-where coalesce(in_service(q.turnout_id), true);
+where coalesce(in_service(q.turnout_id), true)
+    -- a row about a turnout that never had a result is a typing error
+    or q.reason_code = 'not_counted' and q.turnout_id not in (select turnout_id from results);
 
 -- columns of quarantine_open
 -- quarantine_id | varchar | | content id: path, record, stage, reason, file

@@ -90,7 +90,7 @@ select
         || case when count(distinct path) = 1 then ' entry' else ' entries' end
         || ' in quarantine (' || mode(reason_code order by reason_code) || ')' as why
 from quarantine_open
-where kind = 'configuration' and turnout_id not in (select turnout_id from tried)
+where kind = 'configuration' and reason_code <> 'not_counted' and turnout_id not in (select turnout_id from tried)
     and coalesce("asof" >= newest_measurement(), true)
 group by turnout_id;
 
