@@ -89,6 +89,19 @@ def test_a_force_is_distinguished_from_a_channel(mix, frame, level):
     assert found.sensor == (level if frame == "sensor" else None)
 
 
+@pytest.mark.parametrize("mix, frame", [([0.2, 0.5, 1.0], "place"), ([0, 1, 0], "sensor")])
+def test_no_position_is_stated_for_what_intact_turnouts_leave_as_well(mix, frame):
+    """The bound is that of positions: a channel with as much evidence is stated."""
+    rng = np.random.default_rng(8)
+    case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(mix, rng.normal(size=40)))
+    fit = fit_jointly(case)
+    nats = locate(case, fit).nats
+    case.place_level = 0.9 * nats
+    assert locate(case, fit).frame == frame
+    case.place_level = 1.1 * nats
+    assert (locate(case, fit) is None) is (frame == "place")
+
+
 @pytest.mark.parametrize("position", [0, 1, 2])
 def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_recordings(position):
     """The whole residual is 0.3 of the control level: were that level the noise, no place would have any evidence."""

@@ -27,6 +27,12 @@ class MismatchSettings:
     cell_control: float = setting(
         2.0, "-", "the same of one channel of one passage: the largest of 55 controls was 1.9, others 1.2", 0.1, 100.0
     )
+    place_control: float = setting(
+        80.0,
+        "nats",
+        "evidence for a position that the residuals of intact turnouts reach: the largest of 46 controls was 78",
+        0.0,
+    )
     threshold: float = setting(
         12.0,
         "nats",

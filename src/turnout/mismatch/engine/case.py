@@ -49,6 +49,8 @@ class Case:
         Data type -> weighted mean square that controls, cases without an effect, reach. Else that of the settings.
     cell_level : mapping
         Data type -> the same for one channel of one recording.
+    place_level : float
+        Evidence that residuals of cases without an effect reach for a position. [nats]
     disturbed_recordings : tuple
         Recordings that are not used, since a source other than the known inputs shows in them.
     mismatched_trains : tuple of str
@@ -72,6 +74,7 @@ class Case:
     start_values: Values = {}
     control_level: Mapping[str, float] = {}
     cell_level: Mapping[str, float] = {}
+    place_level: float = 0.0
     disturbed_recordings: tuple = ()
     mismatched_trains: tuple = ()
     no_train_matches: bool = False

@@ -107,7 +107,8 @@ def locate(
     Returns
     -------
     Location or None
-        None if the case has no residual spaces, or none of them exceeds the least noise.
+        None if the case has no residual spaces, or none of them exceeds the least noise, or the evidence for a
+        position is what intact turnouts leave as well.
     """
     if cause == "clock":
         names = ", ".join(d.name for d in case.disturbed_recordings)
@@ -133,11 +134,14 @@ def locate(
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
     if not witnesses:
         return None
-    component = None
-    if witnesses[0].frame == "place" and not fit.candidates:
-        errors_of_shape = THRESHOLDS.shape_error_share * witnesses[0].nats
-        component = locate_component(case, fit, threshold + errors_of_shape)
-    return component or replace(_location_of_evidence(witnesses), measured_range=case.measured_range)
+    strongest = witnesses[0]
+    if strongest.frame == "place" and not fit.candidates:
+        component = locate_component(case, fit, threshold + THRESHOLDS.shape_error_share * strongest.nats)
+        if component is not None:
+            return component
+    if strongest.frame == "place" and absorbed is None and strongest.nats < case.place_level:
+        return None
+    return replace(_location_of_evidence(witnesses), measured_range=case.measured_range)
 
 
 def location_of_ambiguity(case: Case) -> Location | None:

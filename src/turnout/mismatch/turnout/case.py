@@ -101,6 +101,7 @@ class TrackCase(PredictedCase):
         self.measured_range = data.measured_range
         self.control_level = {"hammer": data.settings.hammer_control, "passage": data.settings.passage_control}
         self.cell_level = {"passage": data.settings.cell_control}
+        self.place_level = data.settings.place_control
         self.log_mass_ratios: Mapping[str, float] = {}
 
     @property
