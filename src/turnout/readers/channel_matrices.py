@@ -41,11 +41,15 @@ def with_records_of_channels(variables: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _are_channels(blocks: Mapping[str, Any], variables: Mapping[str, Any]) -> bool:
-    """Whether matrices are named as sensors, or have a unit each, and no list names the channels of a matrix."""
+    """Whether the names or units of matrices differ as those of channels, and no list names the channels of a matrix.
+
+    "force" and "rail" do, and N and m/s²; "hammer A7" and "hammer B3" may be two tests of all channels each.
+    """
     entries = {underscored_name(name.lower()): value for name, value in variables.items()}
     if any(name in entries for name in CHANNEL_NAMES):
         return False
     words = {re.sub(r"\d+", "", name) for name in blocks}
     units = [value for name in UNIT_NAMES if isinstance(value := entries.get(name), Mapping)]
-    has_units = bool(units) and set(blocks) <= set(units[0])
-    return len(words) == len(blocks) and (has_units or any(map(quantity_of_sensor, blocks)))
+    are_units_different = bool(units) and len({str(units[0].get(name, "")) for name in blocks}) > 1
+    are_sensors_different = len(set(map(quantity_of_sensor, blocks))) > 1
+    return len(words) == len(blocks) and (are_units_different or are_sensors_different)

@@ -327,11 +327,11 @@ def entries_of_lines(
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
-        if (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn:
+        if len(cells) == 1 and (dated := _dated_line(text)):
+            pairs.append(dated)
+        elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn:
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
-        elif len(cells) == 1 and (dated := _dated_line(text)):
-            pairs.append(dated)
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
@@ -354,6 +354,8 @@ def _dated_line(text: str) -> tuple[str, str] | None:
     words = text.split()
     for n in range(1, min(len(words), MAX_WORDS_OF_START + 1)):
         name, value = " ".join(words[:n]), " ".join(words[n:])
+        if re.search("[:=,;]", name):  # the mark itself
+            return None
         if may_state_start(name) and (looks_dated(value) or is_day(value) or CLOCK_ALONE.fullmatch(value)):
             return name, value
     return None
@@ -370,12 +372,15 @@ def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
     )
 
 
+NO_VALUE = re.compile(r"[-–—]*|n\.?/?a\.?|none|keine?", re.IGNORECASE)  # a cell of a channel without one
 DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d)")
 
 
 def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether a line has a sensitivity or a scale for each column, or for each but the first: all begin alike."""
-    begin_with_number = {re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if text}
+    begin_with_number = {
+        re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if not NO_VALUE.fullmatch(text)
+    }
     is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0])
     return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1
 

@@ -153,7 +153,8 @@ def _decode_json(text: str) -> Any:
         return text
 
 
-COLON = r"(?:(?<![ \t]\d)(?<![ \t]\d\d):|:(?!\d\d))"  # not that of a time of day, as in "start 10:20:30"
+# Not that of a time of day, which has seconds or follows a date: "start 10:20:30", but "gain 2:50" and "fs 1:51200".
+COLON = r"(?:(?<![ \t]\d)(?<![ \t]\d\d):|(?<!\d[ \tT]\d)(?<!\d[ \tT]\d\d):(?!\d\d:\d\d)|:(?!\d\d(?![\d.,])))"
 # "name: value" with a word, numbers without unit, or a ratio as its value.
 NAMED_PIECE = re.compile(
     r"(?:[^\d:=]*:)?\s*([^\W\d][^:=]{1,40}?)\s*(?:" + COLON + r"|=)\s*"

@@ -95,6 +95,23 @@ def test_a_line_has_a_sensitivity_for_each_column(values, is_right, label, tmp_p
     assert len(records) == is_right and [e.reason for e in errors] == ([] if is_right else ["scale_unknown"])
 
 
+@pytest.mark.parametrize("none", ["-", "n/a", ""])
+def test_a_channel_without_a_gain_has_no_number_in_the_line_of_gains(none, tmp_path):
+    """Before, the line was read as a list of pairs, and "-: 10" was an entry that says nothing."""
+    records, (error,) = outcome(table(tmp_path, f"Gain;{none};10\nforce;rail"), tmp_path)
+    assert records == [] and error.reason == "scale_unknown" and "Gain = 10" in error.problem
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [("Factor ch 2:50", "scale_unknown"), ("Gain 2:10.5", "scale_unknown"), ("fs 1:51200", "wrong_rate")],
+)
+def test_a_number_behind_that_of_a_channel_is_no_time_of_day(line, reason, tmp_path):
+    """Before, no colon between a blank, one or two digits and further digits stood behind a name."""
+    records, (error,) = outcome(table(tmp_path, f"{line}\nforce;rail"), tmp_path)
+    assert records == [] and error.reason == reason
+
+
 def test_a_line_has_a_polarity_for_each_column(tmp_path):
     records, (error,) = outcome(table(tmp_path, "Polarity;normal;inverted\nforce;rail"), tmp_path)
     assert records == [] and error.reason == "scale_unknown" and "'rail'" in error.where
@@ -156,9 +173,20 @@ def test_a_matrix_for_each_channel_holds_a_record_in_each_row(format, is_transpo
     np.testing.assert_array_equal(records, np.stack([FORCE, RAIL], axis=1))
 
 
-def test_two_matrices_that_no_name_calls_channels_stay_undecided(tmp_path):
-    np.savez(tmp_path / "a.npz", before=FORCE[:2], after=RAIL[:2], fs=RATE)
+@pytest.mark.parametrize("names", [("before", "after"), ("hammer_A7", "hammer_B3"), ("acc_rail", "acc_sleeper")])
+def test_two_matrices_that_no_name_calls_channels_stay_undecided(names, tmp_path):
+    """Before, one name of a sensor was enough: two tests of two channels exchanged their channels."""
+    np.savez(tmp_path / "a.npz", **dict(zip(names, (FORCE[:2], RAIL[:2]))), fs=RATE)
     _, (error,) = outcome("a.npz", tmp_path, BY_NUMBER)
+    assert "several arrays could be the samples" in error.problem
+
+
+def test_matrices_with_the_same_unit_stay_undecided(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["fs"] = RATE
+        for name, array in (("before", FORCE), ("after", RAIL)):
+            file.create_dataset(name, data=array[:2]).attrs["unit"] = "V"
+    _, (error,) = outcome("a.h5", tmp_path, BY_NUMBER)
     assert "several arrays could be the samples" in error.problem
 
 
