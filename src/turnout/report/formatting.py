@@ -105,7 +105,7 @@ def _share_within(theta: float, degrees: int) -> float:
 
 
 def with_interval(value: float | None, standard_error: float | None, n: int, digits: int = 1) -> str:
-    """A value with the half width of its 95 % t interval, which gets at least one significant digit.
+    """A value with the half width of its 95 % t interval, which gets one significant digit at least and two at most.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def with_interval(value: float | None, standard_error: float | None, n: int, dig
     n : int
         Number of values that the error comes from.
     digits : int
-        Least number of decimals.
+        Usual number of decimals.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def with_interval(value: float | None, standard_error: float | None, n: int, dig
 
 
 def with_half_width(value: float | None, half: float | None, digits: int = 1) -> str:
-    """A value with half of its interval, which gets at least one significant digit.
+    """A value with half of its interval, which gets one significant digit at least and two at most.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def with_half_width(value: float | None, half: float | None, digits: int = 1) ->
     half : float or None
         Half width of the interval, above 0.
     digits : int
-        Least number of decimals.
+        Usual number of decimals.
 
     Returns
     -------
@@ -159,14 +159,41 @@ def with_half_width(value: float | None, half: float | None, digits: int = 1) ->
     --------
     >>> with_half_width(154.55, 0.004), with_half_width(154.55, None)
     ('154.550 ± 0.004', '154.6 ± ?')
+    >>> with_half_width(0.41732, 0.0412, 4), with_half_width(154.55, 23.4)
+    ('0.417 ± 0.041', '155 ± 23')
     """
     if value is None:
         return "none"
+    n = supported_decimals(half, digits)
+    return f"{value:.{n}f} ± {'?' if half is None else f'{half:.{n}f}'}"
+
+
+def supported_decimals(half: float | None, digits: int) -> int:
+    """Decimals of a value that leave one or two significant digits of half its interval.
+
+    Parameters
+    ----------
+    half : float or None
+        Half width of the interval, above 0.
+    digits : int
+        Usual number of decimals, which holds within these limits and without an interval.
+
+    Returns
+    -------
+    int
+        Number of decimals.
+
+    Examples
+    --------
+    >>> [supported_decimals(half, 4) for half in (None, 0.00002, 0.0053, 0.0997, 0.13, 7.0)]
+    [4, 5, 4, 2, 2, 1]
+    """
     if half is None:
-        return f"{value:.{digits}f} ± ?"
+        return digits
     if 2.0 * half < 10.0**-digits:
-        digits = -math.floor(math.log10(half))
-    return f"{value:.{digits}f} ± {half:.{digits}f}"
+        return -math.floor(math.log10(half))
+    exponent = int(f"{half:.1e}".partition("e")[2])  # of the rounded width: 0.0997 is 0.10
+    return min(digits, max(0, 1 - exponent))
 
 
 def day(when: datetime | None) -> str:

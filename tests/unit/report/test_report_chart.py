@@ -9,7 +9,7 @@ import pytest
 
 from turnout.report.axis import Axis, linear_ticks, log_ticks, time_ticks
 from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance_panel
-from turnout.report.panels.history import history_panel
+from turnout.report.panels.history import DAMPING, history_panel
 from turnout.report.panels.phase import phase_panel
 from turnout.report.path_data import reduce_points
 from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Chart
@@ -226,16 +226,34 @@ def test_no_label_lies_on_another_one_or_across_a_line(edge):
 def test_one_campaign_without_an_error_has_short_numbers_at_its_axis():
     mode = {
         "measured_at_utc": datetime(2026, 5, 13), "frequency_hz": 102.13, "frequency_se_hz": None, "n_impacts": 1,
-        "damping_ratio": 0.05, "rail_temperature_c": None,
+        "damping_ratio": 0.05, "damping_se": None, "rail_temperature_c": None,
     }  # fmt: skip
     svg = history_panel("ballast", [mode], [], [])
     ticks = re.findall(r">([^<]*)</text>", svg[svg.index('class="tick y"') :].split("</g>")[0])
     assert len(ticks) >= 3 and max(map(len, ticks)) <= 5
 
 
+def test_values_of_a_history_have_the_digits_that_their_intervals_leave():
+    """Half widths are 2.306 errors: 0.0461 of the damping ratio and 11.5 Hz, of which two digits are stated."""
+    mode = {
+        "measured_at_utc": datetime(2026, 5, 13), "frequency_hz": 102.1326, "frequency_se_hz": 5.0, "n_impacts": 9,
+        "damping_ratio": 0.12345, "damping_se": 0.02, "rail_temperature_c": None,
+    }  # fmt: skip
+    svg = history_panel("ballast", [mode], [], [])
+    assert "ballast: 102 ± 12 Hz (95 %)" in svg and "102 Hz ± 12 (95 %), damping 0.123, n = 9" in svg
+    svg = history_panel("ballast", [mode], [], [], quantity=DAMPING)
+    assert "ballast damping: 0.123 ± 0.046 (95 %)" in svg and "102 Hz, damping 0.123 ± 0.046 (95 %), n = 9" in svg
+
+
 def test_one_uncertain_campaign_does_not_flatten_a_history():
     """Its expected range, -200 to 400 Hz, is cut off: the axis stays within one span of the campaigns, and above 0."""
-    mode = {"frequency_se_hz": 1.0, "damping_ratio": 0.1, "n_impacts": 9, "rail_temperature_c": 15.0}
+    mode = {
+        "frequency_se_hz": 1.0,
+        "damping_ratio": 0.1,
+        "damping_se": 0.01,
+        "n_impacts": 9,
+        "rail_temperature_c": 15.0,
+    }
     days = [datetime(2026, 1, 1 + 7 * k) for k in range(4)]
     modes = [mode | {"measured_at_utc": day, "frequency_hz": 100.0 + k} for k, day in enumerate(days)]
     ranges = [(95.0, 105.0)] * 3 + [(-200.0, 400.0)]

@@ -56,7 +56,7 @@ def test_a_mode_off_its_track_has_its_shape_where_there_is_a_second_response(mac
         "n_history": 9, "shape_mac": mac, "verdict": "departs", "frequency_se_hz": None, "damping_se": None,
     }  # fmt: skip
     text = page(models=[REJECTED], off_track=[mode])
-    assert f"(median of 9 campaigns before: 150.0 Hz, 0.0670{words})." in text
+    assert f"(median of 9 campaigns before: 150.0 Hz, 0.067{words})." in text
 
 
 def test_a_mode_with_a_useless_error_is_stated_as_uncertain():

@@ -256,9 +256,9 @@ def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
     """Modes with a ``verdict`` of ``modes_off_track``, the newest first, with standard errors where they are known."""
     entries = [
         f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1, ' Hz')}, "
-        f"damping {_with_error(m['damping_ratio'], m['damping_se'], 4)} "
+        f"damping {_with_error(m['damping_ratio'], m['damping_se'], 3)} "
         f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
-        f"{m['damping_track']:.4f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
+        f"{m['damping_track']:.3f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
         for m in modes
         if m["verdict"] == verdict
     ]

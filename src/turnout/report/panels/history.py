@@ -10,7 +10,7 @@ import numpy as np
 
 from turnout.counts import count_of
 from turnout.report.axis import Axis
-from turnout.report.formatting import seconds, student_quantile, with_half_width
+from turnout.report.formatting import seconds, student_quantile, supported_decimals, with_half_width
 from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
@@ -106,8 +106,8 @@ def history_panel(
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
-        f"{m['measured_at_utc']:%Y-%m-%d}: {m['frequency_hz']:.2f} Hz{_of(i, quantity is FREQUENCY)}, damping "
-        f"{m['damping_ratio']:.4f}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
+        f"{m['measured_at_utc']:%Y-%m-%d}: {_rounded(m, FREQUENCY, 2)} Hz{_of(i, quantity is FREQUENCY)}, damping "
+        f"{_rounded(m, DAMPING, 4)}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
         f"{_temperature(m['rail_temperature_c'])}"
         for m, i in zip(modes, intervals)
     ]
@@ -199,6 +199,11 @@ def interval(mode: Mapping[str, Any], quantity: Quantity) -> Interval:
     value, error, n = mode[quantity.value], mode[quantity.error], mode["n_impacts"]
     half = np.nan if not error or n < 2 else student_quantile(n) * error
     return Interval(value - half, value + half)
+
+
+def _rounded(mode: Mapping[str, Any], quantity: Quantity, decimals: int) -> str:
+    """A value to the decimals that its interval leaves; ``decimals`` without one."""
+    return f"{mode[quantity.value]:.{supported_decimals(interval(mode, quantity).half_width, decimals)}f}"
 
 
 def _of(of_campaign: Interval, is_shown: bool) -> str:
