@@ -159,9 +159,10 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
         parser.exit(NOT_FOLLOWED, f"{text}. 'turnout --help' lists the commands.\n")
     args, unknown = parser.parse_known_args(words)
     if unknown:
-        known = [option for action in args.parser._actions for option in action.option_strings]
-        similar = get_close_matches(unknown[0].partition("=")[0], known, n=1) if unknown[0].startswith("--") else []
-        hint = f" Did you mean {similar[0]}?" if similar else ""
+        # without the dashes, which are alike in all: --out is not similar to --quiet
+        known = [option[2:] for action in args.parser._actions for option in action.option_strings if len(option) > 2]
+        similar = get_close_matches(unknown[0].partition("=")[0][2:], known, n=1) if unknown[0].startswith("--") else []
+        hint = f" Did you mean --{similar[0]}?" if similar else ""
         args.parser.error(f"unknown: {' '.join(unknown)}.{hint} '{args.parser.prog} --help' lists the options")
     return args
 

@@ -96,11 +96,11 @@ def run(args: argparse.Namespace) -> int:
 def _print_gone(
     configuration: Configuration, raw: Path, plans: Path, shards: int, turnouts: Sequence[str] | None
 ) -> None:
-    """Print which files of the last run are missing, and the error of the next run, if any."""
-    from turnout.workflow.plan import missing_files
+    """Print which files of the last run are missing, and the error that stops the next run, if any."""
+    from turnout.workflow.plan import missing_files, stop_error
 
     gone = missing_files(configuration, raw, plans, shards, turnouts)
-    if error := gone.error(configuration.settings["fleet"], raw):
+    if error := stop_error(configuration, raw, plans, gone):
         print(f"the next run will stop: {error}")
     elif len(gone.files) == 1:
         print(f"{gone}, {gone.files[0]}: what it gave stays in the registry.")

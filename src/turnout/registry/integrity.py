@@ -52,7 +52,8 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
         problems.append(f"Damaged files of {names} were taken off the list: the next run restores their rows.")
     lost = orphans(root, generation)
     if lost:
-        problems.append(f"{len(lost)} files are on no list, the first {lost[0]}: run 'turnout registry vacuum'.")
+        number = "1 file is" if len(lost) == 1 else f"{len(lost)} files are"
+        problems.append(f"{number} on no list, the first {lost[0]}: run 'turnout registry vacuum'.")
     return problems
 
 

@@ -23,7 +23,7 @@ from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
 from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unused_turnouts
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import load_state, states_below
+from turnout.workflow.state import VANISHED, load_state, states_below
 
 JOB_NAMES = "turnouts"
 EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeout(1)
@@ -246,9 +246,9 @@ def _report(code: int, before: set, planned_before: set[str], reason: str, work:
     for path in states_below(work):
         for name, entry in load_state(path).units.items():
             units.add(name)
-            if (path, entry.batch) not in before:
+            if (path, entry.batch) not in before and entry.status != VANISHED:  # its files are gone: nothing to compute
                 processed.append(name)
-                quarantined += [name] if entry.status not in ("ok", "vanished") else []
+                quarantined += [name] if entry.status != "ok" else []
     newest = max(map(changed_at, states_below(work)), default=0)
     published = code == 0 or 0 < newest <= changed_at(GENERATION)
     tests = rejected_units(processed, GENERATION.parent)

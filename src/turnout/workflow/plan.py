@@ -3,6 +3,8 @@
 The shard of a turnout follows from a checksum of its id.
 """
 
+from __future__ import annotations
+
 import json
 import zlib
 from collections.abc import Iterable, Iterator
@@ -137,15 +139,8 @@ def write_plans(
         of turnouts has lost all of its rows.
     """
     texts, missing = _scan_turnouts(configuration, raw_root, folder, shards, turnouts)
-    if not accept_vanished and (error := missing.error(configuration.settings["fleet"], raw_root)):
+    if not accept_vanished and (error := stop_error(configuration, raw_root, folder, missing)):
         raise error
-    if not accept_vanished and configuration.ids and not raw_root.is_dir():
-        remedy = "Mount the disk, or make the folder, with one for each turnout in it"
-        raise ConfigError(str(raw_root), "raw root", "there is no such folder", remedy)
-    if not accept_vanished and not configuration.ids and (known := _known_turnouts(Path(folder))):
-        problem = f"no row is left of the {len(known)} turnouts of the last run, first {min(known)}"
-        remedy = f"Nothing was changed. Put the rows back; {ALLOW_ONCE}"
-        raise ConfigError("turnouts.tsv", "the table", problem, remedy)
     for path, text in texts.items():
         write_if_changed(path, text)
     names = set(shard_names(shards))
@@ -153,6 +148,38 @@ def write_plans(
         if path.stem not in names:
             path.unlink(missing_ok=True)
     return [path.stem for path in texts]
+
+
+def stop_error(configuration: Configuration, raw_root: Path, folder: Path, missing: MissingFiles) -> ConfigError | None:
+    """Error that stops a run before any change, unless the loss is accepted.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+    raw_root : Path
+        The raw root.
+    folder : Path
+        Folder of the plans.
+    missing : MissingFiles
+        Files of the plans that are missing now.
+
+    Returns
+    -------
+    ConfigError or None
+        The error; None if the run may go on.
+    """
+    if error := missing.error(configuration.settings["fleet"], raw_root):
+        return error
+    if configuration.ids and not Path(raw_root).is_dir():
+        remedy = "Mount the disk, or make the folder, with one for each turnout in it"
+        return ConfigError(str(raw_root), "raw root", "there is no such folder", remedy)
+    if not configuration.ids and (known := _known_turnouts(Path(folder))):
+        number, first = ("the only turnout", "") if len(known) == 1 else (f"the {len(known)} turnouts", "first ")
+        problem = f"no row is left of {number} of the last run, {first}{min(known)}"
+        remedy = f"Nothing was changed. Put the rows back; {ALLOW_ONCE}"
+        return ConfigError("turnouts.tsv", "the table", problem, remedy)
+    return None
 
 
 def _known_turnouts(folder: Path) -> set[str]:

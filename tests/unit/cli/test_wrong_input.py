@@ -100,6 +100,8 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
         ("--verison", "turnout: '--verison' before the command. Write options behind it: turnout COMMAND --verison"),
         ("--json worklist", "turnout: '--json' before the command. Write options behind it: turnout COMMAND --json"),
         ("worklist --as-of 2026-05-14", "unknown: --as-of 2026-05-14. Did you mean --asof? 'turnout worklist --help'"),
+        ("worklist --quite", "unknown: --quite. Did you mean --quiet? 'turnout worklist --help'"),
+        ("worklist --out x", "unknown: --out x. 'turnout worklist --help'"),
         ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
         (
             "simulate passage --speed -3",

@@ -142,6 +142,7 @@ def test_check_names_the_damaged_file(bench, hammer, damage, said):
 def test_vacuum_deletes_what_is_on_no_list_and_nothing_else(five_nights):
     folder = five_nights.registry / "modes" / "year=2026"
     (folder / "batch-feed-0000.parquet").write_bytes(b"left by a killed run")
+    assert check(five_nights.registry)[0].startswith("1 file is on no list, the first modes/year=2026/batch-feed")
     (folder / ".batch-feed.77.tmp").write_bytes(b"half")
     before = five_nights.ask(ALL_MODES)
     assert "2 files are on no list" in check(five_nights.registry)[0]

@@ -8,7 +8,7 @@ from length_fleet import CALLS
 from turnout.errors import RegistryError
 from turnout.stages.trend import trend_job
 from turnout.workflow.launch import launch
-from turnout.workflow.nightly import _report
+from turnout.workflow.nightly import _batches, _planned_units, _report
 from turnout.workflow.plan import read_plan, write_plans
 from turnout.workflow.quality_gate import check_quality
 from turnout.workflow.retries import attempt, attempts, read_postponed
@@ -105,6 +105,20 @@ def test_a_run_that_cannot_plan_says_what_it_did_though_a_plan_is_cut(fleet):
     fleet.run()
     cut(fleet.plan, 0.5)
     assert _report(1, set(), set(), "", fleet.folder / "work").units == 3
+
+
+def test_a_unit_that_only_vanished_is_not_processed(fleet, monkeypatch):
+    """Its files are gone: the night computed nothing for it."""
+    monkeypatch.chdir(fleet.folder)
+    path = fleet.put("t0/2024-07-13/A_1.txt", "soon gone") or fleet.raw / "t0/2024-07-13/A_1.txt"
+    fleet.run()
+    work = fleet.folder / "work"
+    before, planned = _batches(work), _planned_units(work)
+    fleet.put("t1/2024-07-13/A_1.txt", "new")
+    path.unlink()
+    fleet.run()
+    report = _report(0, before, planned, "", work)
+    assert (report.processed, report.vanished, report.quarantined) == (1, 1, 0)
 
 
 def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):

@@ -314,6 +314,14 @@ def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys
     assert "turnout nightly -- --config accept_vanished=true" in text
     plans(fleet, shards=2, accept_vanished=True)
     assert "gone" not in said()
+    (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\n")
+    assert "the next run will stop: turnouts.tsv, the table: no row is left of the 2 turnouts" in said()
+    plans(fleet, shards=2, accept_vanished=True)
+    assert "stop" not in said()
+    (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tmain\n")
+    (fleet / "raw").rename(fleet / "away")
+    assert main(["plan", "--shards", "2"]) == 1  # no input can be used
+    assert "the next run will stop: raw, raw root: there is no such folder. Mount" in capsys.readouterr().out
 
 
 def test_a_few_files_may_go(fleet):
