@@ -106,8 +106,8 @@ def history_panel(
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
-        f"{m['measured_at_utc']:%Y-%m-%d}: {_round_to_interval(m, FREQUENCY, 2)} Hz{_of(i, quantity is FREQUENCY)}, damping "
-        f"{_round_to_interval(m, DAMPING, 4)}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
+        f"{m['measured_at_utc']:%Y-%m-%d}: {_number(m, FREQUENCY, 2)} Hz{_of(i, quantity is FREQUENCY)}, damping "
+        f"{_number(m, DAMPING, 4)}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
         f"{_temperature(m['rail_temperature_c'])}"
         for m, i in zip(modes, intervals)
     ]
@@ -201,7 +201,7 @@ def interval(mode: Mapping[str, Any], quantity: Quantity) -> Interval:
     return Interval(value - half, value + half)
 
 
-def _round_to_interval(mode: Mapping[str, Any], quantity: Quantity, decimals: int) -> str:
+def _number(mode: Mapping[str, Any], quantity: Quantity, decimals: int) -> str:
     """A value to the decimals that its interval leaves; ``decimals`` without one."""
     return f"{mode[quantity.value]:.{supported_decimals(interval(mode, quantity).half_width, decimals)}f}"
 
