@@ -19,7 +19,7 @@ rule register:
         mem_mb=4000,
         runtime=60,
     params:
-        code=fingerprint("turnout.registry.job"),
+        code=fingerprint("turnout.registry.job", "turnout.reasons"),
         again=attempts("register"),
         # files that changed on the disk make the job run, which restores their rows
         damage=lambda wildcards: damage_stamp("results/registry"),

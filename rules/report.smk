@@ -19,7 +19,7 @@ rule report:
         mem_mb=4000,
         runtime=60,
     params:
-        code=fingerprint("turnout.report.job"),
+        code=fingerprint("turnout.report.job", "turnout.reasons"),
         again=attempts("report"),
         turnouts=RUN.job["only"],
         day=RUN.day,

@@ -6,6 +6,8 @@ import traceback
 from collections.abc import Iterable, Sequence
 from os import PathLike
 
+from turnout.reasons import REASONS
+
 
 class TurnoutError(Exception):
     """Base class of all exceptions that the program raises on purpose."""
@@ -25,7 +27,7 @@ class ReadError(TurnoutError):
     remedy : str
         What to do: a sentence without its full stop.
     reason : str
-        One of ``REASONS``: the code of the quarantine row.
+        One of ``turnout.reasons.REASONS``: the code of the quarantine row.
 
     Examples
     --------
@@ -38,7 +40,7 @@ class ReadError(TurnoutError):
     def __init__(self, path: PathLike | str, where: str, problem: str, remedy: str, reason: str = "unreadable"):
         super().__init__(f"{path}, {where}: {problem}. {remedy}.")
         if reason not in REASONS:
-            raise ValueError(f"reason {reason!r} is not in turnout.errors.REASONS")
+            raise ValueError(f"reason {reason!r} is not in turnout.reasons.REASONS")
         self.path, self.where, self.problem, self.remedy, self.reason = str(path), where, problem, remedy, reason
 
 
@@ -208,65 +210,6 @@ def _import_message(module: str, error: BaseException) -> str:
     return f"the installation, package {name}: it cannot be imported ({reason}). {remedy}, then run again."
 
 
-# All reasons of a quarantine row or of a rejected impact, with their meaning.
-REASONS = {
-    "unreadable": "the file is not of its format",
-    "empty": "the file has no bytes or no records",
-    "no_file": "the name is that of a folder, device, pipe or socket, not of a file with bytes",
-    "claims_too_much": "the file claims more samples or channels than a file of its size can hold",
-    "too_large": "the memory of the machine was too small for it in two runs",
-    "read_fault": "the disk or the network failed when it was read, in two runs; every run tries it again",
-    "truncated": "fewer samples or records than configured or declared",
-    "wrong_length": "more samples or records than configured",
-    "vanished": "the file was there when planned and is gone",
-    "name_unknown": "the file's name follows no pattern of the layout",
-    "nothing_found": "no file of the turnout matches a pattern of the layout",
-    "not_counted": "a row of events.csv or acknowledgements.csv that cannot be right",
-    "outside_root": "the path leads outside the raw root",
-    "wrong_rate": "the sampling rate is not the configured one",
-    "channel_missing": "a configured channel is not in the file",
-    "channel_unknown": "the file has a channel that the configuration does not name",
-    "unit_unknown": "a unit that cannot be converted to the configured one",
-    "scale_unknown": "the file states a scale, but not whether its numbers contain it",
-    "entry_unknown": "an entry of the file may state a rate, scale or unit, unexplained; its recordings are used",
-    "library_warning": "the library that reads the format warns about the file; its recordings are used",
-    "condition_lost": "names, or a condition such as a temperature, are damaged in the file; its recordings are used",
-    "not_finite": "missing samples: NaN, infinity, or a number that stands for them",
-    "dead_channel": "a channel is constant or below its noise floor",
-    "sign_reversed": "the force is negative at contact: the sign is reversed",
-    "clock_backwards": "the time stamps run backwards",
-    "duplicate": "the same bytes as another file, or the same impact as in another record",
-    "wrong_time": "the time of the recording contradicts its campaign, or a passage has none",
-    "start_unknown": "the start time in the file is unreadable, implausible or of another day; the recording is used",
-    "rate_ambiguous": "the file states a rate before a reduction that nothing confirms; its recordings are used",
-    "double_hit": "the hammer touched the rail twice",
-    "overload": "a channel left its range",
-    "out_of_scale": "a value that no such measurement has: the unit or the scale is wrong",
-    "weak": "the impact is much weaker than the others of its test",
-    "noisy": "the level before the impact is too high",
-    "late": "the impact is not at the trigger, began before the record, or leaves too little decay",
-    "not_simultaneous": "the response begins before the force or long after it",
-    "cut_off": "the record ends before the vibration has died away",
-    "not_selected": "the test has more impacts than wanted, and the others agree better",
-    "odd_one_out": "the response disagrees with all other impacts of the test",
-    "no_impact": "no impact found in the record",
-    "too_few_impacts": "too few accepted impacts for a coherence",
-    "low_coherence": "the lower confidence limit of the coherence fails the gate over a mode's band",
-    "not_identified": "no stable mode in the band",
-    "fit_below_history": "the fit of the model lies far below those of the section's earlier campaigns",
-    "no_accelerometer": "the layout of the passages names no accelerometer, so that no train can be found",
-    "no_train": "no axle found",
-    "train_cut_off": "the train is cut off at an end of the recording",
-    "two_trains": "two trains at the same time",
-    "axles_uncertain": "the number of axles is not certain",
-    "clipped": "a channel is clipped in the passage",
-    "channels_swapped": "channels arrive in the wrong order",
-    "clock_drift": "the loggers' clocks drift apart",
-    "sensor_lost": "a sensor stopped working during the recording",
-    "interference": "electrical pulses on all channels at the same moment; they were removed",
-    "simulation_failed": "the simulation could not be completed",
-    "internal_error": "a fault of this program, with its traceback",
-}
 # Remarks: the recordings are used all the same. No run fails and no turnout is overdue because of one.
 REMARK_REASONS = frozenset(("entry_unknown", "library_warning", "condition_lost", "start_unknown", "rate_ambiguous"))
 # Reasons that concern a channel of a recording: ``turnout.records.Rejection.channel`` names it.

@@ -12,8 +12,8 @@ from turnout.files import write_text
 
 PACKAGE = "turnout"
 ROOT = Path(__file__).parent
-# drawings for people, and where the program lies: no result of a stage depends on them
-WITHOUT_RESULTS = frozenset({"turnout.plots", "turnout.installation"})
+# drawings and words for people, and where the program lies: no result of a stage depends on them
+WITHOUT_RESULTS = frozenset({"turnout.plots", "turnout.installation", "turnout.reasons"})
 
 
 def fingerprint(*modules: str) -> str:
@@ -22,7 +22,7 @@ def fingerprint(*modules: str) -> str:
     Imports inside functions count. A package counts if it is itself imported from, and
     ``import_module(f"turnout.readers.{name}")`` counts as every module of ``turnout.readers``. Data files (CSV, SQL) in
     the folder of an imported module count by their bytes. A folder without modules (templates, SQL) counts for the
-    modules that name it in a string.
+    modules that name it in a string. Modules ``WITHOUT_RESULTS`` count only if they are named here.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def closure(*modules: str) -> frozenset[str]:
             raise ValueError(f"no module {name} in the package {PACKAGE}")
     while queue:
         name = queue.pop()
-        if name not in names and name not in WITHOUT_RESULTS and _module_path(name):
+        if name not in names and (name in modules or name not in WITHOUT_RESULTS) and _module_path(name):
             names.add(name)
             queue += _digest_and_imports(name)[1]
     return frozenset(names)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from turnout.errors import REASONS
+from turnout.reasons import REASONS
 from turnout.registry import documentation
 from turnout.registry.arrow_types import ARROW_TYPES
 from turnout.registry.database import open_registry

@@ -127,7 +127,7 @@ class Source:
         remedy : str
             What to do, a sentence without its full stop.
         reason : str
-            A key of ``turnout.errors.REASONS``.
+            A key of ``turnout.reasons.REASONS``.
 
         Returns
         -------
@@ -149,7 +149,7 @@ class Source:
         where : str
             Position in the file that the call reads.
         reason : str
-            A key of ``turnout.errors.REASONS`` for damaged bytes.
+            A key of ``turnout.reasons.REASONS`` for damaged bytes.
 
         Raises
         ------

@@ -30,7 +30,7 @@ class Rejection:
     Parameters
     ----------
     reason : str
-        Code of ``turnout.errors.REASONS``.
+        Code of ``turnout.reasons.REASONS``.
     value : float, optional
         Number that led to the rejection. [unit of the reason]
     limit : float, optional

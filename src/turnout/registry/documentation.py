@@ -9,8 +9,9 @@ import sys
 from functools import cache
 from pathlib import Path
 
-from turnout.errors import REASONS, RegistryError
+from turnout.errors import RegistryError
 from turnout.number_text import number_text
+from turnout.reasons import REASONS
 from turnout.registry.comments import row_meaning
 from turnout.registry.schema import Column, tables
 from turnout.registry.view_texts import view_columns, view_files

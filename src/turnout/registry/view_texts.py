@@ -8,7 +8,8 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from importlib.resources import files
 
-from turnout.errors import REASONS, REMARK_REASONS, RegistryError
+from turnout.errors import REMARK_REASONS, RegistryError
+from turnout.reasons import REASONS
 from turnout.registry.ids import content_id
 from turnout.registry.schema import literal, tables
 

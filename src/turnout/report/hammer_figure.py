@@ -7,7 +7,7 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from turnout.errors import REASONS
+from turnout.reasons import REASONS
 from turnout.report import panels
 from turnout.report.hammer_text import heading, resonances, verdict
 from turnout.report.panels.hammer import HammerTest, impacts_panel

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.errors import REASONS, REMARK_REASONS
+from turnout.errors import REMARK_REASONS
 from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
+from turnout.reasons import REASONS
 from turnout.report.formatting import with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
 

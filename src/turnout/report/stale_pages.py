@@ -58,7 +58,7 @@ def page_hashes(source: FleetSource) -> dict[str, str]:
             group by turnout_id"""
         for turnout, n, total in source.connection.execute(sql.replace(":today", source.day)).fetchall():
             totals.setdefault(turnout, []).append(f"{table} {n} {total}")
-    code = fingerprint("turnout.report.job")
+    code = fingerprint("turnout.report.job", "turnout.reasons")
     return {turnout: md5(f"{code}{','.join(texts)}".encode()).hexdigest() for turnout, texts in totals.items()}
 
 

@@ -36,14 +36,15 @@ def number_in_words(value: float, unit: str, digits: int = 2) -> str:
     --------
     >>> number_in_words(0.00112, "m"), number_in_words(1.31, "-"), number_in_words(0.012, "1/K")
     ('1.1 mm', '1.3', '1.2 % per kelvin')
-    >>> number_in_words(1.25e5, "N s/m"), number_in_words(0.054, SHARE), number_in_words(-0.5, "-")
-    ('120 kN s/m', '5.4 %', '-0.5')
+    >>> number_in_words(1.25e5, "N s/m"), number_in_words(0.054, SHARE), number_in_words(99.7, "Hz")
+    ('120 kN s/m', '5.4 %', '100 Hz')
     """
     factor, suffix = _scale(value, unit)
     number = factor * value
-    if abs(number) < 100:
+    rounded = float(f"{number:.{digits}g}")
+    if abs(rounded) < 100:
         return f"{number:.{digits}g}{suffix}"
-    return f"{float(f'{number:.{digits}g}') if factor != 1.0 else number:.0f}{suffix}"
+    return f"{rounded if factor != 1.0 else number:.0f}{suffix}"
 
 
 def _scale(value: float, unit: str) -> tuple[float, str]:

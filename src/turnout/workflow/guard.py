@@ -219,7 +219,7 @@ def quarantine_row(
     path : str
         File, relative to the raw root.
     reason : str
-        A key of ``turnout.errors.REASONS``.
+        A key of ``turnout.reasons.REASONS``.
     where : str
         Record, channel or line in the file.
     finding : str

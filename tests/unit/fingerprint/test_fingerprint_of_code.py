@@ -97,6 +97,15 @@ def test_it_stays(package, module, name, old, new):
     assert not moved(package, module, name, old, new)
 
 
+def test_the_meanings_of_reasons_count_only_where_they_are_shown():
+    """Before, a word in one of them made the next night compute every turnout again."""
+    assert "turnout.reasons" not in fp.closure("turnout.stages.hammer", "turnout.stages.mismatch")
+    assert fp.fingerprint("turnout.errors", "turnout.reasons") != fp.fingerprint("turnout.errors")
+    for rule in ("registry", "report"):
+        text = (fp.ROOT.parents[1] / f"rules/{rule}.smk").read_text(encoding="utf-8")
+        assert f'fingerprint("turnout.{rule}.job", "turnout.reasons")' in text
+
+
 def test_an_unknown_module_is_said(package):
     with pytest.raises(ValueError, match=r"no module turnout\.nothing"):
         fp.fingerprint("turnout.nothing")

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from turnout.errors import REASONS, ReadError, is_infrastructure
+from turnout.errors import ReadError, is_infrastructure
 from turnout.readers import read
 from turnout.readers.writing import WRITERS, write
+from turnout.reasons import REASONS
 
 CHECKSUMMED = ("hdf5", "mat", "mat73", "npz", "parquet")  # formats whose writers leave checksums
 EASY = settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))

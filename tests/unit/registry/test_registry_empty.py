@@ -7,7 +7,7 @@ import pytest
 from benchmarks import bench_registry
 
 from turnout.cli.main import main
-from turnout.errors import REASONS
+from turnout.reasons import REASONS
 from turnout.registry.database import open_registry
 from turnout.registry.documentation import views
 from turnout.registry.job import register

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from turnout.errors import REASONS
+from turnout.reasons import REASONS
 from turnout.registry.as_of import chart_in_words
 from turnout.report.formatting import badge, day, diagnoses_once
 from turnout.report.panels.diagram import HATCH
