@@ -81,7 +81,9 @@ def test_a_bay_or_a_wheel_of_twice_the_amplitude_stands_out(frame, level):
 
 
 def diagnosed(answer, candidates, frames):
-    fit = SimpleNamespace(candidates=candidates, psi=np.array([5e-3]), psi_se=np.array([1e-4]), terms=())
+    fit = SimpleNamespace(
+        candidates=candidates, psi=np.array([5e-3]), psi_se=np.array([1e-4]), terms=(), part=lambda _: slice(0, 1)
+    )
     verdict = SimpleNamespace(
         answer=answer, names=tuple(c.family for c in candidates), grade="", probability=0.9, reason="", is_finished=True
     )

@@ -97,8 +97,8 @@ def test_evidence_of_other_recordings_need_not_explain_the_residual_of_the_first
     candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
     said = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
     assert said.answer == answer
-    assert "explains 10%" in said.reason
-    assert ("does not show" in said.reason) == (answer == "named")
+    assert "10 % of the residual" in said.reason
+    assert ("the effect named first is not" in said.reason) == (answer == "named")
 
 
 class ImpactCampaigns(Days):

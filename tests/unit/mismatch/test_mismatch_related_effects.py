@@ -147,7 +147,7 @@ def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
     where = {"train": "railcar", "axle": 1}
     flat = candidate("wheel_flat", where, external_evidence=aside, n_scanned=scanned, evidence_suffices=sounding)
     verdict = answer(score(flat, gain, 0.08, 0.01, explained=explained))
-    assert verdict.answer == said and f"{explained:.0%}" in verdict.reason
+    assert verdict.answer == said and f"{100 * explained:.0f} %" in verdict.reason
 
 
 def test_a_candidate_that_explains_too_little_does_not_lead_against_other_data():

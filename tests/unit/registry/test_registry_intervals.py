@@ -105,7 +105,7 @@ def test_the_page_shows_the_interval_of_the_history_with_its_number_of_steps(ben
     text = page_of(bench, tmp_path)
     for k in (0, N - 1):
         half = 0.5 * (limits[k][1] - limits[k][0])
-        assert f"{np.exp(log_f[k]):.2f} Hz ± {half:.2g} (95 %, from {N - 1} differences)" in text
+        assert f"{np.exp(log_f[k]):.1f} Hz ± {half:.2g} (95 %, from {N - 1} differences)" in text
     assert f">{np.exp(log_f[-1]):.1f} ± {half:.1f}</td>" in text  # the table of the present resonances
 
 
@@ -113,7 +113,7 @@ def test_the_page_of_a_section_without_history_shows_the_interval_of_the_campaig
     results, log_f, _ = campaigns("A1", np.random.default_rng(9), frequency_se_hz=0.7)
     bench.register(*results[:7], tables=SECTION)
     text = page_of(bench, tmp_path)
-    assert f"{np.exp(log_f[0]):.2f} Hz ± {t.ppf(0.975, 29) * 0.7:.2g} (95 %)" in text
+    assert f"{np.exp(log_f[0]):.1f} Hz ± {t.ppf(0.975, 29) * 0.7:.2g} (95 %)" in text
     assert " differences)" not in text
 
 

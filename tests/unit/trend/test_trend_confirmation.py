@@ -170,7 +170,7 @@ def test_the_page_has_a_colour_of_its_own():
     section = {"section_id": "t/S0", "label": "S0", "position_m": 1.0, "track": "main", "panel": "open_track"}
     svg = diagram([section], {"t/S0": "confirm now"})
     assert "state-confirm" in svg and badge("confirm now") == "confirm"
-    mode = {"frequency_hz": 100.0, "frequency_se_hz": 1.0, "n_impacts": 9, "damping_ratio": 0.1}
+    mode = {"frequency_hz": 100.0, "frequency_se_hz": 1.0, "n_impacts": 9, "damping_ratio": 0.1, "damping_se": 0.01}
     when = pd.Timestamp("2025-09-08")
     modes_ = [mode | {"measured_at_utc": when, "rail_temperature_c": 20.0}]
     chart = {"measured_at_utc": when, "expected_low_hz": 150.0, "expected_high_hz": 156.0, "state": "ok"}

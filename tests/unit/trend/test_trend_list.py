@@ -335,7 +335,13 @@ def test_points_of_a_campaign_of_two_days_are_all_red():
     charts = [
         chart | {"measured_at_utc": day + timedelta(7 * n), "state": s} for n, s in enumerate(("ok", "alarm_down"))
     ]
-    mode = {"frequency_se_hz": 1.0, "damping_ratio": 0.1, "n_impacts": 5, "rail_temperature_c": 15.0}
+    mode = {
+        "frequency_se_hz": 1.0,
+        "damping_ratio": 0.1,
+        "damping_se": 0.01,
+        "n_impacts": 5,
+        "rail_temperature_c": 15.0,
+    }
     modes_ = [
         mode | {"measured_at_utc": day + timedelta(7 * n, hours=h), "frequency_hz": 150.0 + n}
         for n, h in ((0, 24), (1, 0), (1, 24))
