@@ -9,6 +9,6 @@ from turnout.workflow.retries import attempt
 logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 generation, params = "results/registry/_generation.json", snakemake.params
 with attempt("worklist", params.again):
-    with touch_after_publication(generation, [*snakemake.input.done], [snakemake.input.trend]):
+    with touch_after_publication(generation, [*snakemake.input.done], [snakemake.input.trend, "work/verdict.json"]):
         n = worklist_job(generation, snakemake.output[0], day=params.day)
     print(f"worklist: {n} diagnoses of alarms")

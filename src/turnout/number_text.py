@@ -27,9 +27,12 @@ def number_text(value: float) -> str:
     ('10,000,000', '250', '0.004', '0.000001', '-2,500,000')
     >>> number_text(1e15), number_text(-2e9), number_text(1e-12), number_text(0.0), number_text(float("inf"))
     ('10¹⁵', '-2·10⁹', '10⁻¹²', '0', 'inf')
+    >>> number_text(999_999.7), number_text(0.00009999999)
+    ('1,000,000', '0.0001')
     """
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}"
+    value = float(f"{value:.6g}")  # the digits of a limit; 999,999.7 is a million
     exponent = math.floor(math.log10(abs(value)) + 1e-12)
     if -4 <= exponent < 6:
         return f"{value:g}"

@@ -44,4 +44,5 @@ def test_page_and_table_say_them(beams, tmp_path):
     for row in rows:
         low, value, high = (float(row[c]) for c in ("frequency_low_hz", "frequency_hz", "frequency_high_hz"))
         assert low <= value <= high and int(row["n_responses"]) > 2
-        assert any(f"{value:.{decimals}f} ± " in text for decimals in range(4))  # as many as its interval leaves
+        digits = f"{0.5 * (high - low):.1e}"  # two of half the interval, and three decimals at most
+        assert f"{value:.{min(3, max(0, 1 - int(digits.partition('e')[2])))}f} ± " in text

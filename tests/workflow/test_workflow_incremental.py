@@ -3,11 +3,13 @@
 import os
 import re
 import time
+from pathlib import Path
 
 import pytest
 import toy_fleet as toy
 
 from turnout.registry.database import open_registry
+from turnout.workflow.jobs import touch_after_publication
 from turnout.workflow.plan import shard_of
 
 pytestmark = pytest.mark.slow
@@ -41,9 +43,12 @@ def test_a_second_run_does_nothing(fleet):
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 
-def test_a_run_is_not_judged_again_since_a_later_job_published_something(fleet):
-    generation = fleet / "results/registry/_generation.json"
-    generation.write_text(generation.read_text() + "\n")
+def test_a_run_is_not_judged_again_since_a_later_job_published_something(fleet, monkeypatch):
+    """As the worklist does, at the end of the night."""
+    monkeypatch.chdir(fleet)
+    generation = Path("results/registry/_generation.json")
+    with touch_after_publication(generation, [], ["work/verdict.json"]):
+        generation.write_text(generation.read_text() + "\n")
     assert "Nothing to be done" in toy.run(fleet, shards=SHARDS).stdout
 
 

@@ -33,7 +33,7 @@ __all__ = [
     "unmet_requirements",
 ]
 FRAMES = {"place": "position", "condition": "recordings at"}  # others are called as in the glossary
-MIN_STATED_EVIDENCE = 1.0  # nats
+MIN_STATED_EVIDENCE = 1.0  # nats: weaker evidence, odds below 3 to 1, singles out no condition (convention)
 ANSWERS = {  # verdict: its word, as in docs/mismatch.md, and what it means
     "named": ("named", "the effect that the simulation lacks"),
     "a_or_b": ("a or b", "two effects explain the recordings equally well"),

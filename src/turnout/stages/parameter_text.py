@@ -83,8 +83,10 @@ def estimate_in_words(value: float, low: float, high: float, unit: str) -> tuple
     (('51 MN/m', '41 to 62 MN/m'), ('0.5', '–'))
     >>> estimate_in_words(0.0076, 0.0, 0.054, SHARE), estimate_in_words(23456.0, 20100.0, 26900.0, "m/s²")
     (('1 %', '0 to 5 %'), ('23,000 m/s²', '20,000 to 27,000 m/s²'))
+    >>> estimate_in_words(0.5, 0.0, float("inf"), "-")
+    ('0.5', '–')
     """
-    if not high > low:
+    if not high > low or not math.isfinite(high - low):
         return number_in_words(value, unit, 3), UNKNOWN_INTERVAL
     factor, suffix = _scale(value, unit)
     half, numbers = 0.5 * factor * (high - low), [factor * v for v in (value, low, high)]

@@ -200,8 +200,8 @@ class AlsoDisturbed(Supports):
 )
 def test_an_unusual_component_is_the_position_where_there_is_enough_evidence_for_one(changes, deviations, place):
     case = AlsoDisturbed(in_one(changes), np.array(in_one(deviations)))
-    found = locate(case, fit_jointly(case))
-    assert found.frame == "place" and found.place == pytest.approx(place)
+    location = locate(case, fit_jointly(case))
+    assert location.frame == "place" and location.place == pytest.approx(place)
 
 
 @pytest.mark.parametrize("force, place", [(1.0, 1.2), (3.0, 1.2), (10.0, 3.9)])

@@ -38,7 +38,7 @@ class Rule(Generic[Facts]):
     cause: str = ""
 
     def reason_for(self, evidence: Facts) -> str:
-        """Reason in words for the facts of one step.
+        """Reason in words for the facts of one step, with a space before each sign of per cent.
 
         Parameters
         ----------
