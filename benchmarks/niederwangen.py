@@ -220,7 +220,7 @@ changed* (0.93) and S2 *cannot tell* (0.37), the other grades were the same.
   small p value when one cell in twenty is what differs; the probability, which uses the size of the steps, is the
   sharper figure and rests on more assumptions: normal errors of the logarithm, one spread per band for all
   sections, a priori an even chance of a change and all dates alike. Bands are not counted as {n_quantities}
-  witnesses but as {independent}, the number of independent ones among the residuals.
+  figures but as {independent}, the number of independent ones among the residuals.
 - **Campaign and temperature are the same four numbers.** The slope per degree is the hot campaign against the
   others. With a free shift of every campaign in place of temperature, only differences between sections are left,
   and then "most sections rose" and "{reference} fell while everything else rose" cannot be distinguished except by

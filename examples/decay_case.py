@@ -178,7 +178,7 @@ class DecayCase(Case):
     ``reserved`` is a campaign for the verification only; ``priors`` {name: (mean, sd)} come from ``calibrate``.
     """
 
-    expensive = True
+    is_large = True
 
     def __init__(self, measured, reserved=None, priors=None, only=None):
         self.measured, campaigns = measured, only or measured.campaigns

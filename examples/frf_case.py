@@ -62,7 +62,7 @@ class FrfCase(Case):
     used by the verification only.
     """
 
-    expensive = True
+    is_large = True
 
     def __init__(
         self, frequency, h, band, peaks, reserved=(), rigid=0, beam=False, without=(), step=3, impact_places=None
@@ -148,7 +148,7 @@ class FrfCase(Case):
         near = (frequency > 2.0 * SUSPENSION_FREQUENCY) & (frequency < 3.0 * SUSPENSION_FREQUENCY)
         return self._shape(np.mean(h[:, :, near].real, axis=2), rank)
 
-    def is_cheap(self, observation):
+    def is_hammer_test(self, observation):
         """True for all observations: their derivatives are computed again at every step."""
         return True
 

@@ -1,4 +1,4 @@
-"""Trends: after every registration all charts again, then the list of the next morning."""
+"""Trends: after every registration all charts again, then the worklist."""
 
 from pathlib import Path
 

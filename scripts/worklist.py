@@ -1,4 +1,4 @@
-"""Rule worklist: charts, alarms and their diagnoses in; the list of the next morning out."""
+"""Rule worklist: charts, alarms and their diagnoses in; the worklist out."""
 
 import logging
 

@@ -108,7 +108,7 @@ class RegistryError(TurnoutError):
 
 
 class InstallationError(TurnoutError):
-    """A package that the program needs is missing or broken. No file is to blame, and the whole run stops."""
+    """A package that the program needs is missing or broken. No file is the cause, and the whole run stops."""
 
 
 # errno codes that damaged data or a name may cause (a seek to an impossible byte, a name that is no file, a link that

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def folder_lock(
-    folder: Path, content: str = "this folder", patience: float = 60.0, error_type: type[TurnoutError] = TurnoutError
+    folder: Path, content: str = "this folder", max_wait: float = 60.0, error_type: type[TurnoutError] = TurnoutError
 ) -> Iterator[None]:
     """Hold a folder for writing.
 
@@ -28,7 +28,7 @@ def folder_lock(
         The folder, created where it does not exist.
     content : str
         What the message calls it.
-    patience : float
+    max_wait : float
         How long to wait for another process that holds the lock. [s]
     error_type : type
         Exception to raise.
@@ -36,16 +36,16 @@ def folder_lock(
     Raises
     ------
     TurnoutError
-        If another process still holds it after ``patience``, or without permission to write; of type ``error_type``.
+        If another process still holds it after ``max_wait``, or without permission to write; of type ``error_type``.
     """
     path = Path(folder) / ".lock"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path, timeout=patience)
+        lock = FileLock(path, timeout=max_wait)
         lock.acquire()
     except Timeout:
         raise error_type(
-            f"{folder}: another run has locked {content} for more than {patience:g} s. "
+            f"{folder}: another run has locked {content} for more than {max_wait:g} s. "
             f"Nothing was changed: wait for it to end, then run again."
         ) from None
     except OSError as error:

@@ -144,7 +144,7 @@ def _blade(switch: Switch) -> list[str]:
 
 
 def _tops(switch: Switch) -> list[str]:
-    """Both surfaces of the route, with priors as wide as an estimate deserves."""
+    """Both surfaces of the route, with priors as wide as the error of an estimate."""
     fall_start = _value(switch.fall_start, "m", round(0.05 / abs(switch.fall_start), 4))
     fall = f"depth: {_value(1e3 * switch.fall, 'mm', 0.12)}, length: {_value(switch.fall_length, 'm')}"
     top = f"start: {_value(switch.toe, 'm')}, depth: {_value(1e3 * switch.depth, 'mm', 0.12)}"
@@ -156,7 +156,7 @@ def _tops(switch: Switch) -> list[str]:
 
 
 def _nose(c: Crossing) -> str:
-    """The nose of the crossing, with priors as wide as an estimate deserves."""
+    """The nose of the crossing, with priors as wide as the error of an estimate."""
     position, share = _value(c.nose, "m", round(0.05 / c.nose, 4)), _value(c.share, "-", 0.2)
     depth, length = _value(1e3 * c.depth, "mm", 0.4), _value(c.length, "m", 0.2)
     return f"{{kind: kink, place: {position}, depth: {depth}, length: {length}, share: {share}}}"

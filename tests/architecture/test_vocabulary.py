@@ -40,6 +40,9 @@ DIALECT = {
     "blows": "impacts",
     "ceiling": "limit",
     "ceilings": "limits",
+    "cheap": "small or hammer",
+    "cheapest": "of least effort",
+    "expensive": "large",
     "foretell": "predict",
     "foretells": "predicts",
     "foretold": "predicted",
@@ -56,6 +59,8 @@ DIALECT = {
     "unforetold": "unpredicted",
     "vouch": "confirm",
     "whereabouts": "localization",
+    "witness": "source",
+    "witnesses": "sources",
 }
 
 # At most 20 names may break a rule, each with its reason.

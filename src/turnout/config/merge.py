@@ -56,7 +56,7 @@ def hashes(values: dict) -> dict[str, str]:
         The hash of all of it under "", and of what each kind of unit uses.
     """
     branches = {k: v for k, v in values.items() if k not in ("description", "settings")}
-    # neither the division of a run into shards nor who is told changes a result
+    # neither the division of a run into shards nor who gets a message changes a result
     filled_settings = {n: asdict(s) for n, s in settings(values["settings"]).items() if n not in ("alerts", "fleet")}
     result = {"": digest([filled_settings, branches])}
     for unit_kind, (groups, names) in USED_BY_UNIT.items():

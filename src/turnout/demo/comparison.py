@@ -100,7 +100,7 @@ def compare(connection: duckdb.DuckDBPyConnection, truth: Path, worklist: str) -
 
 
 def _with_neighbours(connection: duckdb.DuckDBPyConnection, sections: set[tuple[str, str]]) -> set[tuple[str, str]]:
-    """(turnout, label) of these sections and of those that are diagnosed with them: their impacts feel each other."""
+    """(turnout, label) of these sections and of those that are diagnosed with them."""
     groups = connection.execute("select turnout_id, string_split(sections, ', ') from change_findings").fetchall()
     near = [{(turnout, label) for label in labels} for turnout, labels in groups]
     return sections.union(*(group for group in near if group & sections))

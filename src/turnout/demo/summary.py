@@ -89,7 +89,7 @@ def print_summary(
     if table:
         say("\n   Found against true:\n      " + table.replace("\n", "\n      "))
     say(f"\n   Pages: {Path(pages).resolve() / 'index.html'}")
-    say(f"   Registry: {registry}/registry.duckdb, for any tool that speaks DuckDB. Three questions to try:")
+    say(f"   Registry: {registry}/registry.duckdb, for any tool that reads DuckDB. Three questions to try:")
     for question, sql in QUESTIONS:
         say(f'\n   {question}\n      {_command()} query "{sql}"')
 

@@ -185,7 +185,7 @@ def _refit(
     settings: IdentifySettings,
     max_damping: float | None = None,
 ) -> Explanation:
-    """The same explanation fitted to other decays from modes ``theta``, its noise and the tests of its modes anew.
+    """The same explanation fitted to other decays from modes ``theta``, its noise and new tests of its modes.
 
     The noise is that of the residual after a first fit: at ``theta`` it would contain the scatter of the poles.
     """

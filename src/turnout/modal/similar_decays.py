@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from turnout.modal.mixed_effects import MixedFit
 
-MIN_DECAYS = 12  # fewer are not combined: no fit would become cheaper by half
+MIN_DECAYS = 12  # fewer are not combined: no fit would take half the time
 MIN_GROUPS = 6  # groups from which the spread between impacts can be judged
 # Energy, in variances of the noise, that the scatter of the poles within a group may add to its combined decay.
 # A criterion of the choice changes by it, and no choice depends on two (``SEARCH_RSS_STEP`` is 1).

@@ -63,7 +63,7 @@ def decode_profile(
     search = _RowSearch(profile, highest, peaks, first, np.tile(SCALES, min(N_STARTS, peaks.size)))
     for group in pattern.groups:
         for count in range(group.maximum):
-            if not search.alive.any():
+            if not search.is_continued.any():
                 break  # every row has ended: no vehicle can be added
             search.add_vehicle(group.vehicles, is_required=count < group.minimum)
     value, positions = search.finish()
@@ -84,7 +84,7 @@ class _RowSearch:
         self.profile, self.highest, self.scale = profile, highest, scale
         self.peak_position, self.peak_height = peaks * GRID_STEP, profile[peaks]
         self.first, self.rear = first, np.zeros(first.size)
-        self.alive, self.score = np.ones(first.size, bool), np.zeros(first.size)
+        self.is_continued, self.score = np.ones(first.size, bool), np.zeros(first.size)
         self.positions = np.zeros((first.size, 0))
         self.best_end: tuple[float, np.ndarray | None] = (-np.inf, None)
 
@@ -106,10 +106,10 @@ class _RowSearch:
         is_gaining = gain[choice, rows] > (-0.35 if is_required else -0.1)
         if not is_required:
             # a hypothesis that finds no further vehicle has ended and does not change any more
-            self.alive &= is_gaining
-        self.score = np.where(self.alive, self.score + collected, self.score)
+            self.is_continued &= is_gaining
+        self.score = np.where(self.is_continued, self.score + collected, self.score)
         self.rear = np.array([v.rear for v in vehicles])[choice]
-        added[~self.alive] = np.nan
+        added[~self.is_continued] = np.nan
         self.positions = np.hstack([self.positions, added])
 
     def finish(self) -> tuple[float, np.ndarray | None]:

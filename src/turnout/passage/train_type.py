@@ -267,7 +267,7 @@ def _is_plausible(
     speed: float,
     speed_se: float,
 ) -> bool:
-    """Whether the known speed allows the pattern, by a cheap test.
+    """Whether the known speed allows the pattern, by a short test.
 
     It compares the length of a fixed row, or the first wheelbase of a free one.
     """

@@ -192,7 +192,7 @@ def _is_compared(name: str, text: str) -> bool:
 
 
 def _numbers_of_other(number: str) -> Iterator[Candidate]:
-    """A number that its name explains, unless it is the rate in disguise, or a step."""
+    """A number that its name explains, unless it is the rate in another form, or a step."""
     yield Candidate(RATE, number, True, number=number_value(number), is_of_other=True)
     if is_inverse_of_rate(number, 1.0):
         yield from _of_rate(number, number, RateUnit(True, Fraction(1)), is_weak=True)

@@ -1,6 +1,6 @@
 """Notations of times that become one: days of the year, weeks, months as words, ISO durations, fractions behind colons.
 
-Loggers print "2026-332T07:28:14", "28-Nov-2026 07:28:14", "PT0.5S" and "07:28:14:000050". They are written anew as a
+Loggers print "2026-332T07:28:14", "28-Nov-2026 07:28:14", "PT0.5S" and "07:28:14:000050". They are rewritten as a
 date of the calendar, a count of days and a decimal fraction, which all other modules read.
 """
 

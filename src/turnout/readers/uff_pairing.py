@@ -215,7 +215,7 @@ def _check_order(
 
 
 MAX_SIZED_RECORDS = 100  # no test has more impacts, and the search grows with their square
-MIN_MOVED_RECORDS = 3  # that a lost set moves; fewer are not told from impacts that differ
+MIN_MOVED_RECORDS = 3  # that a lost set moves; fewer are not distinguished from impacts that differ
 MIN_SIZE_SPREAD = 0.05  # of the logarithm of energies: below it all impacts are alike, and their order shows nothing
 
 
@@ -256,7 +256,7 @@ def _copies(sets: Sequence[UffDataset | None]) -> dict[int, int]:
 # Spread of the ratios of sizes in the order of the file, in units of that with two sets lost, by the number of records;
 # the last one holds for more. Of 400 intact tests one exceeds it if responses do not depend on the force at all, and
 # none if they do. If the impacts differ by 20 % and their ratios by 3 %, a sixth of the losses is found with 4 records,
-# two thirds with 6, nine in ten with 8. With fewer than 4, two lost sets cannot be told from impacts that differ.
+# two thirds with 6, nine in ten with 8. With fewer than 4, two lost sets look like impacts that differ.
 MIN_SPREAD_RATIOS = {4: 15.0, 5: 9.0, 6: 5.5, 7: 4.5, 8: 4.0}
 
 

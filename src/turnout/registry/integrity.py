@@ -50,7 +50,7 @@ def check(registry_dir: PathLike, hashes: bool = True) -> list[str]:
     if generation.incomplete:
         names = ", ".join(generation.incomplete)
         problems.append(f"Damaged files of {names} were taken off the list: the next run restores their rows.")
-    lost = orphans(root, generation)
+    lost = unlisted_files(root, generation)
     if lost:
         number = "1 file is" if len(lost) == 1 else f"{len(lost)} files are"
         problems.append(f"{number} on no list, the first {lost[0]}: run 'turnout registry vacuum'.")
@@ -77,13 +77,13 @@ def vacuum(registry_dir: PathLike) -> list[str]:
     """
     root = Path(registry_dir)
     with registry_lock(root):
-        lost = orphans(root, load(root))
+        lost = unlisted_files(root, load(root))
         for path in lost:
             (root / path).unlink(missing_ok=True)
     return lost
 
 
-def orphans(root: Path, generation: Generation) -> list[str]:
+def unlisted_files(root: Path, generation: Generation) -> list[str]:
     """Files below the tables' folders, and temporary ones, that are neither live nor retired.
 
     Parameters

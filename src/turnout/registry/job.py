@@ -29,7 +29,7 @@ def register(
     config_hash: str | None = None,
     code_version: str = "",
     started_at: datetime | None = None,
-    patience: float = 600.0,
+    max_wait: float = 600.0,
 ) -> RegistrationResult:
     """Register the results of work batches and rows from the configuration.
 
@@ -52,7 +52,7 @@ def register(
         whole. In other tables, rows of an earlier call that are missing now are superseded.
     config_hash, code_version, started_at
         Written to ``runs``; by default the run began with this call. [UTC, naive]
-    patience : float
+    max_wait : float
         How long to wait for another run that holds the lock. [s]
 
     Raises
@@ -61,7 +61,7 @@ def register(
         Locked, disk full, no permission, or made by another version. Then nothing was changed.
     """
     root, started = Path(registry_dir), started_at or datetime.now(UTC).replace(tzinfo=None)
-    with registry_lock(root, patience):
+    with registry_lock(root, max_wait):
         before = take_off_damage(root, load(root))
         check_schemas(before)
         faults: dict[str, str] = {}

@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def registry_lock(registry_dir: Path, patience: float = 600.0) -> Iterator[None]:
+def registry_lock(registry_dir: Path, max_wait: float = 600.0) -> Iterator[None]:
     """Hold the registry for writing.
 
     Parameters
     ----------
     registry_dir : Path
         Folder of the registry, created where it does not exist.
-    patience : float
+    max_wait : float
         How long to wait for another run that holds the lock. [s]
 
     Raises
     ------
     RegistryError
-        If another run still holds it after ``patience``, or without permission to write.
+        If another run still holds it after ``max_wait``, or without permission to write.
     """
-    with folder_lock(registry_dir, "the registry", patience, RegistryError):
+    with folder_lock(registry_dir, "the registry", max_wait, RegistryError):
         yield

@@ -37,7 +37,7 @@ from turnout.registry.supersede import (
     remove_known_rows,
     remove_present_rows,
     supersede,
-    supersede_orphans,
+    supersede_unlisted_results,
 )
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ class Registration:
         stored = {table for table in tables() if before.of(table)}
         n_superseded = supersede(self.con, number, run_id, self.filled, stored)
         if before.incomplete:
-            n_superseded += supersede_orphans(self.con, number, run_id)
+            n_superseded += supersede_unlisted_results(self.con, number, run_id)
         if before.incomplete:
             remove_present_rows(self.con)
         else:

@@ -94,7 +94,7 @@ def supersede(
     return con.execute("select count(*) from new_supersedes").fetchall()[0][0]
 
 
-def supersede_orphans(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
+def supersede_unlisted_results(con: duckdb.DuckDBPyConnection, generation: int, run_id: str) -> int:
     """Supersede rows whose result is in no file any more: damage took the result away, and no work batch holds it.
 
     Parameters
@@ -114,15 +114,16 @@ def supersede_orphans(con: duckdb.DuckDBPyConnection, generation: int, run_id: s
     with_result = [t for t in tables() if t != "results" and t not in WHOLE_TABLES and "result_id" in names(t)]
     held = " union ".join(f"select result_id from old_{table}" for table in with_result)
     con.execute(
-        f"""create temp table orphans as select result_id from ({held}) where result_id is not null
+        f"""create temp table unlisted_results as select result_id from ({held}) where result_id is not null
         and result_id not in (select result_id from old_results union all select result_id from new_results)"""
     )
     selects = [
-        f"select distinct {id_column} as id, '{row_type}' as kind from old_{table} semi join orphans using (result_id)"
+        f"select distinct {id_column} as id, '{row_type}' as kind from old_{table} "
+        "semi join unlisted_results using (result_id)"
         for row_type, (table, id_column, _) in KINDS.items()
         if table != "results"
     ]
-    ids = " union all ".join(["select result_id as id, 'result' as kind from orphans", *selects])
+    ids = " union all ".join(["select result_id as id, 'result' as kind from unlisted_results", *selects])
     added = con.execute(
         f"""insert into new_supersedes by name
         select id as old_id, $generation as generation, null as new_id, kind, 'new_data' as reason, $run as run_id,

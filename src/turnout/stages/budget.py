@@ -55,7 +55,7 @@ class Watch:
 
 @dataclass
 class Budget:
-    """Cache of a ``TrackCase``: predictions count on ``watch``, and those that are not cheap are stored in ``replay``.
+    """Cache of a ``TrackCase``: predictions count on ``watch``, and those of passages are stored in ``replay``.
 
     ``replay`` is a mapping or None. An interrupted diagnosis repeats the same requests, so that it continues within a
     fit.
@@ -64,9 +64,9 @@ class Budget:
     watch: Watch
     replay: MutableMapping[str, list[np.ndarray]] | None = None
 
-    def __call__(self, predictor: Predictor, is_cheap: bool) -> Predictions:
+    def __call__(self, predictor: Predictor, is_hammer_only: bool) -> Predictions:
         """The cache around a predictor."""
-        return CountedPredictions(predictor, self.watch) if is_cheap else ReplayedPredictions(predictor, self)
+        return CountedPredictions(predictor, self.watch) if is_hammer_only else ReplayedPredictions(predictor, self)
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def _since_words(row: Mapping[str, Any]) -> str:
 
 
 def _change_words(row: Mapping[str, Any]) -> str:
-    """Size of the change as impacts feel it, with its 95 % interval; of growth also what it has reached."""
+    """Size of the change under impacts, with its 95 % interval; of growth also what it has reached."""
     what = "change" if row["component"] is None else f"stiffness of the {row['component']} under impacts"
     words = f"{what} {_size_words(row, 'change')}"
     if not row["grows"]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from turnout.constants import KMH
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.distinguishability import Distinguishability, cheapest_addition, distinguishability
+from turnout.mismatch.engine.distinguishability import Distinguishability, best_addition, distinguishability
 from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.mismatch.turnout.unproven_panels import reservation
@@ -75,7 +75,7 @@ def planned_matrix(
     plan = Plan(turnout, placed_sensors, impacts, passages)
     matrix = _matrix(plan, effects)
     extended = {name: (EFFORT_HOURS[name], _matrix(p, effects)) for name, p in _additions(plan, sensors, temperatures)}
-    name, resolved, _ = cheapest_addition(matrix, extended)
+    name, resolved, _ = best_addition(matrix, extended)
     advice = "No single addition distinguishes more pairs."
     if resolved:
         advice = f"Most would be added by {name}: {resolved} more pairs distinguished."

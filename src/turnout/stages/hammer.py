@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-import scipy.signal  # noqa: F401 - it is loaded at its first use otherwise, in each of the forked processes anew
+import scipy.signal  # noqa: F401 - each of the forked processes would load it at its first use otherwise
 
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.settings.identify import IdentifySettings

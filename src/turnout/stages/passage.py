@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, cast
 from zlib import crc32
 
-import scipy.signal  # noqa: F401 - it is loaded at its first use otherwise, in each of the forked processes anew
+import scipy.signal  # noqa: F401 - each of the forked processes would load it at its first use otherwise
 
 from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import TurnoutConfig

@@ -1,4 +1,4 @@
-"""Stage worklist: the list of the next morning, with the diagnoses of open alarms."""
+"""Stage worklist: the sections that need attention, with the diagnoses of open alarms."""
 
 import csv
 import io

@@ -128,7 +128,7 @@ def _excluded_files(plan: Path) -> list[dict]:
 def _uncounted_rows(configuration: Configuration) -> list[dict]:
     """Quarantine rows of lines of the configuration that do not count, such as an event of an unknown turnout.
 
-    ``turnout_id`` is that unknown turnout: if it has results, it was taken out of the table, and nobody is told.
+    ``turnout_id`` is that unknown turnout: if it has results, it was taken out of the table, and there is no message.
     """
     unknown = {event.turnout for event in configuration.events} - set(configuration.ids)
     return [

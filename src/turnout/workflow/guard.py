@@ -67,7 +67,7 @@ def compute_guarded(
     OSError
         For a fault of the machine (bad sector, disk full); MemoryError likewise.
     InstallationError
-        If a package is missing or broken: every unit would fail, and none is to blame.
+        If a package is missing or broken: every unit would fail, and none is the cause.
     """
     try:
         tables, faults = _compute(compute, unit, turnout, raw_root, algo=algo, **extra)

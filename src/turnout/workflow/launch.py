@@ -126,7 +126,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     }
     if scan:
         load(REGISTRY)  # before anything is computed for it: a list that cannot be read stops the run with its remedy
-        _keep_other_runs_out()  # Snakemake's own lock comes too late: a refused run would have replaced the plans
+        _keep_other_runs_out()  # Snakemake's own lock comes too late: a rejected run would have replaced the plans
         started = datetime.now(UTC).replace(tzinfo=None)
         raw, accept = Path(job["raw"]), _flag(options, "accept_vanished")
         write_plans(configuration, raw, Path(PLAN_FOLDER), shards, turnouts, accept)

@@ -156,7 +156,7 @@ class _Run:
         self.retried: dict[str, str] = {}
         self.faults_before = read_postponed(path)[1] | read_retried(path)
         self.postponed_since = first_postponed(path)
-        self.suspects = started_units(path)
+        self.unfinished = started_units(path)
 
     def bring_up(self, planned: list[PlannedUnit], only: Sequence[str] | None) -> Summary:
         """Compute missing units, write batches and state."""
@@ -176,10 +176,10 @@ class _Run:
 
     def _clear_notes(self, due: list[Task], only: Sequence[str] | None) -> None:
         """Clear the marks of started units that need no computation any more."""
-        requested = {name for name in self.suspects if only is None or name.split("/", 1)[0] in only}
+        requested = {name for name in self.unfinished if only is None or name.split("/", 1)[0] in only}
         for name in requested - {_name(task) for task in due}:
             clear_mark(self.path, name)
-            del self.suspects[name]
+            del self.unfinished[name]
 
     def _compute_all(self, tasks: list[Task]) -> Counter[str]:
         """Compute the tasks and store every result; returns the number of units by status."""
@@ -188,12 +188,14 @@ class _Run:
             self.compute = load_function(self.stage.compute)
         self.progress, self.statuses = Progress(self.name, len(tasks)), Counter[str]()
         tasks_by_name = {_name(task): task for task in tasks}
-        tasks_alone = [tasks_by_name[name] for name in self.suspects if name in tasks_by_name]
+        tasks_alone = [tasks_by_name[name] for name in self.unfinished if name in tasks_by_name]
         map_tasks = (
             map_in_processes if tasks_alone else map_in_order
         )  # a process that has computed may have threads, no fork then
         try:
-            for computed in map_tasks(self._compute, [t for t in tasks if _name(t) not in self.suspects], self.threads):
+            for computed in map_tasks(
+                self._compute, [t for t in tasks if _name(t) not in self.unfinished], self.threads
+            ):
                 if isinstance(computed, LostTask):
                     tasks_alone.append(computed.task)
                 else:
@@ -219,7 +221,7 @@ class _Run:
             self._keep(self._after_second_night(computed, {name: task}))
         elif self.strict:
             raise RuntimeError(f"{name}: {PROCESS_DIED}")
-        elif name not in self.suspects or (self.launched and self.suspects[name] == self.launched):
+        elif name not in self.unfinished or (self.launched and self.unfinished[name] == self.launched):
             self._keep(Postponed(name, PROCESS_DIED))
         else:
             self._keep(computed := _provisional(self._compute_with_guard(task, death_rows)))

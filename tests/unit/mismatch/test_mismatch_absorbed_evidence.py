@@ -26,7 +26,7 @@ def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
 class Springs(Case):
     """Two springs in series of which both logarithms are hidden; the second is soft."""
 
-    expensive = True
+    is_large = True
 
     def __init__(self):
         self.nuisances = tuple(Nuisance(f"spring_{k}", "-", 0.0, TAU) for k in range(2))

@@ -26,7 +26,7 @@ SIZE = (Parameter("depth", "-", 0.0, (-9.0, 9.0), "size", "made up 2026", (0.0, 
 class Dented(Case):
     """A bump of a known width and an unknown depth at a support, four recordings, a slope, and an effect everywhere."""
 
-    expensive = True
+    is_large = True
 
     def __init__(self, true_position, impossible=()):
         rng = np.random.default_rng(6)

@@ -26,14 +26,14 @@ def case():
 
 
 def test_columns_in_hammer_tests_are_the_exact_change(case):
-    cheap = case.cheap_case()
-    fit = fit_jointly(cheap, iterations=0)
-    columns = cheap.screen(fit)
-    chairs = [c for c in cheap.candidates if c.family == "slide_chair_gap"]
+    hammer = case.hammer_case()
+    fit = fit_jointly(hammer, iterations=0)
+    columns = hammer.screen(fit)
+    chairs = [c for c in hammer.candidates if c.family == "slide_chair_gap"]
     assert len(chairs) >= 3
-    for candidate in cheap.candidates:
+    for candidate in hammer.candidates:
         for k, start in enumerate(candidate.starts):
-            exact = cheap.predict(fit.values, (candidate.term(start),), cheap.observations)
+            exact = hammer.predict(fit.values, (candidate.term(start),), hammer.observations)
             for column, new, old in zip(columns[candidate.key, k], exact, fit.predictions):
                 size = np.max(np.abs(new - old))
                 assert column == pytest.approx(new - old, abs=1e-4 * size + 1e-15), candidate.key
@@ -46,12 +46,12 @@ def test_every_chair_is_tried_on_hammer_tests(case):
 @pytest.mark.parametrize("name", ["rail_bending", "rail_shear"])
 def test_derivatives_by_the_rail_contain_the_closure_rail_behind_the_heel(case, name):
     """Against models on a rail 5 % stiffer and softer; without the closure rail the error is 26 to 31 %."""
-    cheap = case.cheap_case()
-    values = {n.name: 0.0 for n in cheap.nuisances}
-    base = cheap.predict(values, (), cheap.observations)
-    column = [n.name for n in cheap.nuisances].index(name)
-    jacobian = cheap.nuisance_jacobian(values, (), cheap.observations, base)
-    plus, minus = (cheap.predict({**values, name: by}, (), cheap.observations) for by in (0.05, -0.05))
+    hammer = case.hammer_case()
+    values = {n.name: 0.0 for n in hammer.nuisances}
+    base = hammer.predict(values, (), hammer.observations)
+    column = [n.name for n in hammer.nuisances].index(name)
+    jacobian = hammer.nuisance_jacobian(values, (), hammer.observations, base)
+    plus, minus = (hammer.predict({**values, name: by}, (), hammer.observations) for by in (0.05, -0.05))
     exact = np.concatenate([(a - b) / 0.1 for a, b in zip(plus, minus)])
     linear = np.concatenate([j[:, column] for j in jacobian])
     assert np.linalg.norm(linear - exact) < 5e-3 * np.linalg.norm(exact)
@@ -61,15 +61,15 @@ def test_derivatives_by_the_rail_contain_the_closure_rail_behind_the_heel(case, 
 @pytest.mark.parametrize("effect", ["", "slide_chair_gap", "heel_support"])
 def test_derivatives_by_the_chairs_follow_those_that_an_effect_leaves(case, name, effect):
     """Against central differences. A chair without contact does not follow."""
-    cheap = case.cheap_case()
-    candidates = [c for c in cheap.candidates if c.family == effect]
+    hammer = case.hammer_case()
+    candidates = [c for c in hammer.candidates if c.family == effect]
     terms = tuple(c.term(c.starts[-1]) for c in candidates[1:2] or candidates[:1])
     assert bool(terms) is bool(effect)
-    values = {n.name: 0.0 for n in cheap.nuisances} | {name: 0.2}
-    base = cheap.predict(values, terms, cheap.observations)
-    column = [n.name for n in cheap.nuisances].index(name)
-    jacobian = cheap.nuisance_jacobian(values, terms, cheap.observations, base)
-    plus, minus = (cheap.predict({**values, name: 0.2 + by}, terms, cheap.observations) for by in (1e-3, -1e-3))
+    values = {n.name: 0.0 for n in hammer.nuisances} | {name: 0.2}
+    base = hammer.predict(values, terms, hammer.observations)
+    column = [n.name for n in hammer.nuisances].index(name)
+    jacobian = hammer.nuisance_jacobian(values, terms, hammer.observations, base)
+    plus, minus = (hammer.predict({**values, name: 0.2 + by}, terms, hammer.observations) for by in (1e-3, -1e-3))
     exact = np.concatenate([(a - b) / 2e-3 for a, b in zip(plus, minus)])
     linear = np.concatenate([j[:, column] for j in jacobian])
     assert np.linalg.norm(exact) > 0.0

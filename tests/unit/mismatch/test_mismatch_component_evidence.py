@@ -54,7 +54,7 @@ class Supports(Case):
         }
         self.observations = tuple(Observation(name, name, y, NOISE, data_type=name) for name, y in data.items())
 
-    def is_cheap(self, observation):
+    def is_hammer_test(self, observation):
         return observation.name == "hammer"
 
     def predict(self, values, terms, observations):

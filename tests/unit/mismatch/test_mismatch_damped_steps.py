@@ -13,7 +13,7 @@ from turnout.mismatch.engine.observation import Observation
 class Wall(Case):
     """A number that a straight step promises to reach, and that falls by ``slope`` instead: nothing helps."""
 
-    expensive = False
+    is_large = False
     nuisances = (Nuisance("x", "-", 0.0, 1e3),)
     observations = (Observation("a", "a", np.array([0.5]), 1.0),)
 

@@ -87,7 +87,7 @@ CASES = {
     "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),
     "residual_has_structure": ([score()], 2.0, {"structure": 0.5, "residual_excess": 1.5}),
     "value_without_meaning": ([score(size=-0.0034)], 2.0, {}),
-    "single_witness": ([score(single_witness="day 2")], 2.0, {}),
+    "single_source": ([score(single_source="day 2")], 2.0, {}),
     "condition_contradicts": ([score(worst=-9.0)], 2.0, {}),
     "size_at_limit": ([score(size=0.05, flags={"limit_form": "gap"}), score("gap", 20.0)], 2.0, {}),
     "rival_within_margin": ([score(), score("gap", 35.0)], 2.0, {}),
@@ -146,7 +146,7 @@ def test_each_rule_on_a_name_applies_to_a_case_of_its_own(name, excess, more, fa
 
 def evidence_with_names_of_two_words():
     """Evidence of every table, with effects and values whose names have an underscore."""
-    soft = score("soft_pad", single_witness="day 2", flags={"external_evidence": 38.0, "evidence_suffices": True})
+    soft = score("soft_pad", single_source="day 2", flags={"external_evidence": 38.0, "evidence_suffices": True})
     gap = score("slide_chair_gap", 38.0, where={})
     strained = str(StrainedValue(Nuisance("rail_mass", "-", 0.0, 1.0), 5.0, 20.0))
     settings, case = MismatchSettings(), {"strained": strained, "local_change": 20.0}

@@ -23,7 +23,7 @@ MASSES = UnsprungMass.distant_starts
 class Pitch(Case):
     """A tone of twelve turns times a factor, known to 6 %, under noise of 0.1; columns are straight lines."""
 
-    expensive = True
+    is_large = True
     nuisances = (Nuisance("tune", "-", 0.0, 0.06),)
 
     def __init__(self, true, afar=()):

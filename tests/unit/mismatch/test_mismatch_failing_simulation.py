@@ -58,7 +58,7 @@ def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made(
     """From 3 to the data's 1.2 in steps; derivatives are rejected from the second time on."""
 
     class Dear(Case):
-        expensive, asked = True, 0
+        is_large, asked = True, 0
         nuisances = (Nuisance("amount", "-", 3.0, 1.0),)
         observations = (Observation("o", "day", 1.2 * WAVE, 0.1),)
 

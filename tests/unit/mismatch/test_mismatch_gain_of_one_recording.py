@@ -15,7 +15,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.single_witness import REPETITION, single_witness
+from turnout.mismatch.engine.single_source import REPETITION, single_source
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -67,9 +67,9 @@ def test_plainness_is_the_energy_of_the_change():
 )
 def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gains, alone):
     case, fit = fitted(factors)
-    assert single_witness(Search(case), fit, case.candidates[0], 25.0, gains) == alone
+    assert single_source(Search(case), fit, case.candidates[0], 25.0, gains) == alone
     of_a_train = replace(case.candidates[0], site=EffectSite({"train": "ic3"}))
-    assert single_witness(Search(case), fit, of_a_train, 25.0, gains) == ""
+    assert single_source(Search(case), fit, of_a_train, 25.0, gains) == ""
 
 
 @pytest.mark.parametrize(
@@ -140,21 +140,21 @@ def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
     conditions = [f"{position} {year}" for position in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
     case = ImpactCampaigns(2.1, 4.2, 9.0)
-    assert single_witness(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
+    assert single_source(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
 
 
 def test_of_two_positions_neither_is_the_single_one():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = ImpactCampaigns(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
-    assert single_witness(Search(of_two), fit, case.candidates[0], 19.0, gains) == ""
-    assert single_witness(Search(of_two), fit, case.candidates[0], 15.0, gains) == REPETITION
+    assert single_source(Search(of_two), fit, case.candidates[0], 19.0, gains) == ""
+    assert single_source(Search(of_two), fit, case.candidates[0], 15.0, gains) == REPETITION
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
 def test_it_gets_no_name(gain, answer):
     candidate = Candidate.of("bump", (), lambda p: None, ())
-    score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_witness="a")
+    score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_source="a")
     said = judge([score], 0.8, MismatchSettings())
     assert said.answer == answer and not said.names
     assert "bump" in said.reason

@@ -31,12 +31,12 @@ def test_whatever_the_start_the_end_is_the_same(seed):
     supports = range(turnout.track.support.size)
     terms = [physics.LocalPad(j, float(np.exp(-0.4 + 0.4 * rng.normal()))) for j in supports]
     terms += [physics.LocalBallast(j, float(np.exp(0.4 + 0.4 * rng.normal()))) for j in supports]
-    case = TrackCase(measured_campaign(plan, terms, seed)).cheap_case()
+    case = TrackCase(measured_campaign(plan, terms, seed)).hammer_case()
     ends = []
     for k in range(4):
         far = 0.7 * np.random.default_rng(k).normal(size=len(case.nuisances)) if k else np.zeros(len(case.nuisances))
         start = {n.name: n.mean + f * n.sd for n, f in zip(case.nuisances, far)}
-        ends.append(float(fit_jointly(case, values=start, iterations=THRESHOLDS.max_cheap_steps).cost))
+        ends.append(float(fit_jointly(case, values=start, iterations=THRESHOLDS.max_hammer_steps).cost))
     assert np.ptp(ends) < 1.0  # half a nat; a fit ends where ten steps in a row would gain no more
 
 
@@ -85,7 +85,7 @@ class Arctangent(Case):
 @pytest.mark.parametrize("start", [1.39, 1.391, -1.3917])
 def test_a_step_to_the_other_side_of_a_valley_is_no_end_of_a_fit(start):
     """2 x / (1 + x²) = arctan x has its root at 1.39175. Just below it a full step gains less than half a nat."""
-    options = {"iterations": THRESHOLDS.max_cheap_steps, "min_gain": THRESHOLDS.min_cheap_step_gain}
+    options = {"iterations": THRESHOLDS.max_hammer_steps, "min_gain": THRESHOLDS.min_hammer_step_gain}
     assert abs(fit_jointly(Arctangent(), values={"x": start}, **options).values["x"]) < 0.02
 
 

@@ -30,7 +30,7 @@ class Bent(Case):
     def __init__(self, frozen):
         rng = np.random.default_rng(4)
         self.along, self.across = rng.normal(size=(60, 12)), rng.normal(size=(60, 12))
-        self.expensive = frozen
+        self.is_large = frozen
         self.nuisances = tuple(Nuisance(f"x{k}", "-", 0.0, 3.0) for k in range(12))
         data = self._shown(rng.normal(size=12)) + 0.1 * rng.normal(size=60)
         self.observations = (Observation("all", "all", data, np.full(60, 0.1)),)
@@ -76,7 +76,9 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
     """Twenty of the cost per sample are 1,200 in all, which ends it early; leaders go on for a fifth of others'."""
     early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, THRESHOLDS.fine_stall))
     assert early.cost > late.cost + 1.0
-    assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(late.cost, abs=0.2)  # cheap: none
+    assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(
+        late.cost, abs=0.2
+    )  # a small case: none
     asked = []
     search = Search(Bent(True))
     monkeypatch.setattr(Search, "fit", lambda *a, stall=THRESHOLDS.stall: asked.append(stall) or late)

@@ -48,7 +48,7 @@ def test_receptances_with_chairs_that_open_agree_with_a_march_in_time(case):
 
 def test_only_a_track_with_slide_chairs_has_them(case):
     assert rms_error(case, case.predictor.lifting) < 0.35 * rms_error(case, None)
-    assert case.cheap_case().predictor.lifting is case.predictor.lifting
+    assert case.hammer_case().predictor.lifting is case.predictor.lifting
     plain = case.predictor.site.nominal.turnout.track_of("main").with_(blade=None)
     assert lifting_chairs(plain, case.frf_pairs.values()) is None
 

@@ -7,14 +7,16 @@ import pytest
 from scipy.stats import f
 
 from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
 from turnout.mismatch.engine.fit_quality import is_significantly_worse
-from turnout.mismatch.engine.localization import Location, _credible_evidence, locate
+from turnout.mismatch.engine.localization import Location, _credible_evidence, _location_of_candidate, locate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.residual_space import ResidualSpace
+from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.space_evidence import (
     AMPLITUDES,
     NOISE_FACTORS,
@@ -370,13 +372,41 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
     ("place", "text"),
     [
         (3.6, "at 3.6 m, between 3.0 and 4.2 m"),
-        (0.6, "before 2.4 m, the distance is not known"),
-        (9.0, "beyond 8.1 m, the distance is not known"),
+        (0.6, "before 2.4 m, at an unknown distance"),
+        (9.0, "beyond 8.1 m, at an unknown distance"),
     ],
 )
 def test_a_position_beyond_the_measured_range_is_not_stated_to_a_metre(place, text):
     found = Location("place", place, 40.0, place, place - 0.6, place + 0.6, measured_range=(2.4, 8.1))
     assert str(found) == text
+
+
+@pytest.mark.parametrize(
+    ("frame", "where", "text"),
+    [
+        (
+            "condition",
+            {},
+            "along the whole track",
+        ),  # as of pads that soften with temperature: no recording has it alone
+        ("frequency", {}, "along the whole track"),
+        ("clock", {"sensor": "S1"}, "in channel S1"),  # as of a time offset
+        ("wavelength", {"wavelength": 0.05}, "along the rail, at the wavelength 0.050 m"),
+        ("wheel", {"train": "railcar", "axle": 3}, "on axle 3 of railcar"),
+        ("place", {"place": 3.0}, "at 3.0 m, between 3.0 and 3.0 m"),
+    ],
+)
+def test_a_candidate_without_a_name_is_the_location_in_words(frame, where, text):
+    candidate = Candidate.of("soft", (), dict, (), where, frame=frame)
+    assert str(_location_of_candidate(Score(candidate, 40.0, 0.0, 1.0, None))) == text
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [("clock", "in all channels of the recording r 7"), ("condition", "in the recordings of r 7")],
+)
+def test_evidence_for_a_recording_or_a_visit_names_it(frame, text):
+    assert str(Location(frame, "r 7", 40.0)) == text
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_a_fit_with_an_effect_is_not_left_in_a_basin_worse_than_none():
     effect = Candidate.of("effect", SIZE, lambda p: p["size"], ((0.5,),))
     broad = fit_jointly(step.broad_case, (effect,), [0.5], {"x": -0.8}, iterations=60)
     assert broad.values["x"] == pytest.approx(-1.0, abs=0.05)
-    assert fit_jointly(step.cheap_case, (effect,), broad.psi, broad.values, iterations=60).cost > step.base.cost
+    assert fit_jointly(step.hammer_case, (effect,), broad.psi, broad.values, iterations=60).cost > step.base.cost
     best = step._fit_actual((effect,), broad)
     assert best.values["x"] == pytest.approx(1.0, abs=0.05)
     assert best.cost < step.base.cost
@@ -57,7 +57,7 @@ def test_a_fit_with_an_effect_is_not_left_in_a_basin_worse_than_none():
 def test_what_the_base_gains_from_the_nuisances_of_an_effect_is_no_evidence_for_it():
     """The base in the worse basin; that of the effect leads it to the better one, as far as that is better."""
     step = prescreen_from(-0.8)
-    better, beside = base_fit(step.cheap_case, 0.8), SimpleNamespace(values={"x": 1.0})
+    better, beside = base_fit(step.hammer_case, 0.8), SimpleNamespace(values={"x": 1.0})
     found = step.base_shortfall(beside)
     assert found == pytest.approx(better.evidence - step.base.evidence, abs=0.1) and found > 0.3
     assert prescreen_from(0.8).base_shortfall(beside) == pytest.approx(0.0, abs=0.1)

@@ -25,9 +25,9 @@ IMITATION = 3.0  # of the nuisance: there it changes the recordings nearly as th
 class Imitated(Case):
     """A wave of height 1, and a nuisance that imitates it behind a barrier: from 0 to 3 the fit first gets worse."""
 
-    def __init__(self, expensive=True):
+    def __init__(self, is_large=True):
         rng = np.random.default_rng(11)
-        self.expensive = expensive
+        self.is_large = is_large
         self.nuisances = (Nuisance("stiffness", "-", 0.0, 0.5),)
         self.candidates = (
             Candidate.of("wave", SIZE, lambda p: p, ((0.1,),), {}),
@@ -113,14 +113,14 @@ def test_none_begins_again_where_another_effect_gains_a_name(monkeypatch):
     assert [t.candidate.family for t in begun] == ["wave"]
 
 
-def test_none_begins_again_beside_an_effect_or_in_a_cheap_case(monkeypatch):
-    """Beside another effect what is left is also an error in its shape; a cheap case starts everywhere anyway."""
+def test_none_begins_again_beside_an_effect_or_in_a_small_case(monkeypatch):
+    """Beside another effect what is left is also an error in its shape; a small case starts everywhere."""
     begun = []
     monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
     case = Imitated()
     beside = fit_jointly(case, case.candidates[1:], [0.0], {"stiffness": IMITATION})
     ranked(monkeypatch, case, fit=beside)
-    ranked(monkeypatch, Imitated(expensive=False))
+    ranked(monkeypatch, Imitated(is_large=False))
     assert begun == []
 
 

@@ -26,7 +26,7 @@ SHAPE = (
 class Turning(Case):
     """A wave of two numbers that turns with both, four recordings, and a ramp that the base may bend for it."""
 
-    expensive = True
+    is_large = True
 
     def __init__(self):
         rng = np.random.default_rng(4)

@@ -54,7 +54,7 @@ class Spread(Shapes):
     """Wave and ramp of four times the energy, for four times the samples, each spread evenly over the ``cells``
     (recording, sensor) in which it shows."""
 
-    expensive = True
+    is_large = True
 
     def __init__(self, **cells):
         super().__init__(False)

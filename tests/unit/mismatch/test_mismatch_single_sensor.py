@@ -13,7 +13,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.refit import _with_condition_gains
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.single_witness import single_sensor
+from turnout.mismatch.engine.single_source import single_sensor
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -46,7 +46,7 @@ class TwoSensors(Case):
         """Without the bump and with it."""
         return fit_jointly(self), fit_jointly(self, self.candidates, [0.5], iterations=20)
 
-    def witness(self, candidate=None, gain=15.0):
+    def source(self, candidate=None, gain=15.0):
         (own,) = self.candidates
         fit = fit_jointly(self, self.candidates, [0.5], iterations=20)
         without = replace(fit, predictions=[np.zeros(SENSORS.size) for _ in self.observations])
@@ -54,7 +54,7 @@ class TwoSensors(Case):
 
 
 @pytest.mark.parametrize(
-    "true, model, witness",
+    "true, model, source",
     [
         ((1.0, 1.0), (1.0, 1.0), ""),  # both show it
         ((1.0, 0.0), (1.0, 1.0), "the sensor A1"),  # A2 would show as much, and loses
@@ -65,30 +65,30 @@ class TwoSensors(Case):
         ((1.0, 0.5), (1.0, 0.72), ""),  # A2 has the effect, though smaller
     ],
 )
-def test_an_effect_gains_where_its_change_has_energy(true, model, witness):
-    assert TwoSensors(true, model).witness() == witness
+def test_an_effect_gains_where_its_change_has_energy(true, model, source):
+    assert TwoSensors(true, model).source() == source
 
 
 def test_a_gain_that_is_the_penalty_of_nuisances_has_no_sensor():
     """Half of the bump fits best: A1 gains about 3,800 nats and A2 loses 1,300, together less than half of 6,000."""
     case = TwoSensors((1.0, 0.0), (1.0, 1.0))
-    assert case.witness(gain=15.0) == "the sensor A1" and case.witness(gain=6000.0) == ""
+    assert case.source(gain=15.0) == "the sensor A1" and case.source(gain=6000.0) == ""
 
 
 def test_without_a_simulation_there_is_nothing_to_compare():
-    assert TwoSensors((1.0, 0.0), (1.0, 1.0), impossible_without=True).witness() == ""
+    assert TwoSensors((1.0, 0.0), (1.0, 1.0), impossible_without=True).source() == ""
 
 
-@pytest.mark.parametrize("true, witness", [((1.0, 1.0), ""), ((1.0, 0.0), "the sensor A1")])
-def test_the_leader_of_a_search_is_tested_for_it(true, witness):
+@pytest.mark.parametrize("true, source", [((1.0, 1.0), ""), ((1.0, 0.0), "the sensor A1")])
+def test_the_leader_of_a_search_is_tested_for_it(true, source):
     case = TwoSensors(true, (1.0, 1.0))
-    case.expensive = True
+    case.is_large = True
     without, fit = case.fits()
     leader = _with_condition_gains(Search(case), without, Score(case.candidates[0], 15.0, 0.0, 1.0, fit))
-    assert leader.single_witness == witness
+    assert leader.single_source == source
 
 
 def test_what_a_sensor_does_itself_needs_no_other():
     case = TwoSensors((1.0, 0.0), (1.0, 1.0))
     of_a_sensor = replace(case.candidates[0], site=EffectSite({"sensor": "A1"}))
-    assert case.witness() == "the sensor A1" and case.witness(of_a_sensor) == ""
+    assert case.source() == "the sensor A1" and case.source(of_a_sensor) == ""

@@ -21,7 +21,7 @@ SHAPES = {"wave": np.sin(9.0 * X), "near": np.sin(9.4 * X), "ramp": X - 0.5}
 class Shapes(Case):
     """Sums of shapes under noise of 0.1; a wave counts from 10 on, the others always."""
 
-    expensive = True
+    is_large = True
 
     def __init__(self, **true):
         noise = 0.1 * np.random.default_rng(6).normal(size=X.size)
@@ -44,7 +44,7 @@ class Shapes(Case):
     def predict(self, values, terms, observations):
         return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size))]
 
-    def is_cheap(self, observation):
+    def is_hammer_test(self, observation):
         return True
 
     def ranked(self):

@@ -133,7 +133,7 @@ def test_a_locked_registry_is_said_and_left_alone(bench, hammer):
         FileLock(bench.registry / ".lock"),
         pytest.raises(RegistryError, match=r"another run has locked the registry for more than 0.1 s"),
     ):
-        bench.register(hammer(section="A2"), patience=0.1)
+        bench.register(hammer(section="A2"), max_wait=0.1)
     assert bench.ask("select count(*) from modes") == [(1,)], "reading needs no lock"
     bench.register()
     assert bench.ask("select count(*) from modes") == [(2,)]

@@ -130,13 +130,13 @@ def test_a_replay_computes_nothing_twice_and_knows_the_rail(tmp_path):
         assert plain.n + softer.n == n
 
 
-def test_the_first_prediction_never_exceeds_the_budget_and_cheap_ones_never_do(tmp_path):
+def test_the_first_prediction_never_exceeds_the_budget_and_hammer_tests_never_do(tmp_path):
     told = []
     budget = Budget(Watch(deadline=0.0, tell=told.append), Replay(tmp_path, "predictions"))
-    cheap, dear = budget(Doubling(), True), budget(Doubling(), False)
+    hammer, passage = budget(Doubling(), True), budget(Doubling(), False)
     for _ in range(3):
-        cheap.predict({"a": 1.0}, (), ())
-    dear.predict({"a": 1.0}, (), ())
+        hammer.predict({"a": 1.0}, (), ())
+    passage.predict({"a": 1.0}, (), ())
     with pytest.raises(BudgetSpentError):
-        dear.predict({"a": 2.0}, (), ())
+        passage.predict({"a": 2.0}, (), ())
     assert told == [1, 2, 3, 4, 5]

@@ -76,7 +76,7 @@ class MismatchSettings:
     scouted_places: int = setting(2, why="positions of an effect fitted to hammer tests alone", minimum=1, maximum=50)
     promise: float = setting(2.0, "nats", "estimated gain below which a candidate is not refitted", 0.0)
     joint_starts: int = setting(1, why="positions of the first effects that are refitted", minimum=1, maximum=20)
-    refits: int = setting(5, why="effects refitted jointly where a prediction is expensive", minimum=2, maximum=50)
+    refits: int = setting(5, why="effects refitted jointly where passages are simulated", minimum=2, maximum=50)
     iterations: int = setting(6, why="Gauss-Newton steps of a joint refit", minimum=1, maximum=50)
     effects: int = setting(2, why="effects sought one after the other", minimum=1, maximum=3)
     numerics_share: float = setting(

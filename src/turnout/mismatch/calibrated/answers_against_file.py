@@ -67,8 +67,8 @@ def file_answer(
     by_name = {p.name: p for p in parameters}
     steps = [c for c in candidates if not c.grows]
     history = estimate_history(parameters, visits, events, accepted=None)
-    price = float(np.log(max(len(steps), 1)))
-    least = threshold + price
+    penalty = float(np.log(max(len(steps), 1)))
+    least = threshold + penalty
     gains, sizes, sds = evidence_from_first(history, steps)
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
@@ -78,7 +78,7 @@ def file_answer(
         return _at_dip(deviation, history, surface)
     first = order[0]
     stated = LeadingEffect.of(
-        steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - price
+        steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - penalty
     )
     jump = history.steps[0].innovation  # without a visit nothing has evidence
     if not _explains_first_visit(parameters, visits, events, steps[first], jump):

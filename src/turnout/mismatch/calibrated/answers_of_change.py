@@ -148,7 +148,7 @@ def change_answer(
     margin : float
         [nats]
     is_alarmed : bool
-        Whether an open alarm asks: then a change of any size is told.
+        Whether an open alarm asks: then a change of any size is stated.
     with_trains : (sequence of StateParameter, sequence of VisitInformation) or None
         What tells soft ballast from a gap, None: ``parameters`` and ``visits``.
     surface : sequence of ChangeEffect
@@ -161,17 +161,17 @@ def change_answer(
     """
     visit = visits[-1].visit
     levels, history, evidence = _evidence_of_changes(parameters, visits, events, candidates, is_alarmed)
-    price = float(np.log(max(len(candidates), 1)))
+    penalty = float(np.log(max(len(candidates), 1)))
     with_loads = with_offsets(parameters, visits)
     by_name = {p.name: p for p in with_loads[0]}
-    least = threshold + price
-    material = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
-    material = [e for e in material if e.gain >= e.from_first]
-    gain = _evidence_of_name(material, by_name)
+    least = threshold + penalty
+    relevant = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
+    relevant = [e for e in relevant if e.gain >= e.from_first]
+    gain = _evidence_of_name(relevant, by_name)
     if gain < least:
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
         return _on_surface(_answer_without_name(by_stated_errors, visit, by_name), by_stated_errors, surface)
-    leader = material[0]
+    leader = relevant[0]
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if is_under_load(leader.effect):
         parameters, visits = with_loads
@@ -179,7 +179,7 @@ def change_answer(
     courses = courses_of(history, leader.effect)
     sizes = (leader.size if leader.effect.grows else courses.last_size, courses.last_size)
     size, total = (_with_model_error(leader.effect, s) for s in sizes)
-    stated = LeadingEffect.of(leader.effect, by_name, size, gain - price, courses.onset_interval())
+    stated = LeadingEffect.of(leader.effect, by_name, size, gain - penalty, courses.onset_interval())
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
     with_change = _history_of_changes(parameters, visits, opened, levels)
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
@@ -191,7 +191,7 @@ def change_answer(
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
         information = with_trains or (parameters, visits)
         names = names_of_softer_ballast(*information, events, leader, _present_size(leader), margin, levels)
-    rivals = [name_of(e.effect, by_name) for e in material if e.gain > leader.gain - margin]
+    rivals = [name_of(e.effect, by_name) for e in relevant if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
     return replace(answer, changed=tuple(leader.effect.direction), total=total[0], total_sd=total[1], ends=ends)
@@ -219,7 +219,7 @@ def _evidence_of_changes(
 ) -> tuple[dict[str, float], History, list[OnsetEvidence]]:
     """Levels of the errors, history and evidence. The levels are those that the most evident change leaves.
 
-    Where an alarm asks, a change of any size is told: there the errors are the stated ones.
+    Where an alarm asks, a change of any size is stated: there the errors are the stated ones.
     """
     ordinary = [c for c in candidates if not is_under_load(c)]
     levels = {} if is_alarmed else own_levels(parameters, visits, events)
@@ -233,11 +233,11 @@ def _evidence_of_changes(
     return levels, history, with_evidence_under_load(evidence, parameters, visits, events, candidates, levels)
 
 
-def _evidence_of_name(material: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:
+def _evidence_of_name(relevant: Sequence[OnsetEvidence], by_name: Mapping[str, StateParameter]) -> float:
     """Sum of the likelihood ratios of all candidates with the name and the sign of the first one. [nats]"""
-    if not material:
+    if not relevant:
         return -np.inf
-    return float(np.logaddexp.reduce([e.gain for e in changes_alike(material, material[0], by_name)]))
+    return float(np.logaddexp.reduce([e.gain for e in changes_alike(relevant, relevant[0], by_name)]))
 
 
 def _with_model_error(effect: ChangeEffect, size: tuple[float, float]) -> tuple[float, float]:

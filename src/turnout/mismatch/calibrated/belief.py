@@ -19,7 +19,7 @@ class StateParameter:
     ``mean`` and ``sd`` are those of the file, in ``unit``. ``walk_sd`` is the standard deviation of its random walk
     after one year, ``visit_sd`` that of what each visit adds of its own: another train of the type comes, for example.
     Parameters of one ``group`` are alike, at different ``position`` [m] along the track; ``index`` numbers adjacent
-    ones. ``may_change``: whether a change of it may be told; not of supports that absorb what lies beyond them.
+    ones. ``may_change``: whether a change of it may be stated; not of supports that absorb what lies beyond them.
     ``is_beyond_sensors``: a support beyond the outer sensors and impacts, where the error of the model is larger.
     """
 

@@ -74,8 +74,8 @@ class CalibrationConstants:
     )
     max_stretch: int = threshold(6, "supports", "adjacent ones that change together: 3 m of track", PAGE)
     gap_shares: tuple[float, ...] = threshold(
-        (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the softening under impacts that trains still feel above a gap: all "
-        "of it where no train closes the gap", PAGE,
+        (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the softening under impacts that remains under trains above a gap: "
+        "all of it where no train closes the gap", PAGE,
     )  # fmt: skip
     soft_damper_shares: tuple[float, ...] = threshold(
         (0.0, 0.25, 0.5, 0.75, 1.0), "share", "of the change of ln stiffness that the damper of a softer bed has: a "

@@ -113,7 +113,7 @@ def estimate_history(
     constant_errors : bool
         Whether the values before all visits have the error of the model that all visits share, see
         ``Belief.with_constant_error``. Then the first visit tells it, and it cancels in a change. Otherwise each visit
-        has it anew in all directions of which it knows less than the file. For changes alone.
+        has it again in all directions of which it knows less than the file. For changes alone.
 
     Returns
     -------

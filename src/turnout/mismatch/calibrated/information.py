@@ -115,7 +115,7 @@ class GroupInformation:
     def without(self, names: Iterable[str]) -> GroupInformation:
         """Information in which these parameters have an unknown value of this visit alone.
 
-        Example: a sensor that has slipped. What other parameters can be told apart from it stays.
+        Example: a sensor that has slipped. What other parameters can be distinguished from it stays.
 
         Parameters
         ----------

@@ -29,7 +29,7 @@ class StretchEnds:
     """Intervals of the positions of the first and the last support that have changed. [m]
 
     ``first`` and ``last`` are (least, largest). None is an open end: the change may reach farther than the supports
-    that can be told from each other, or than the longest stretch that is compared.
+    that can be distinguished, or than the longest stretch that is compared.
     """
 
     first: tuple[float | None, float]

@@ -69,16 +69,16 @@ def evidence_of_gap(
 ) -> float:
     r"""Evidence of a hanging sleeper over softer ballast, in one fit of impacts and trains.
 
-    - *A softer bed* is felt alike by impacts and trains. Its damper loses any share of what the logarithm of the
+    - *A softer bed* is alike under impacts and trains. Its damper loses any share of what the logarithm of the
       stiffness loses: ``CALIBRATION.soft_damper_shares`` are equally probable before.
     - *Beside a gap* only a share s of the bed bears the unloaded sleeper. Stiffness and damping are both
       proportional to the area in contact, so both become s times what they were: their logarithms change alike.
-      Trains close the gap, so they feel less of it, or all of it where none closes it: ``CALIBRATION.gap_shares`` are
+      Trains close the gap, so it acts less under them, or as much where none closes it: ``CALIBRATION.gap_shares`` are
       equally probable before.
 
     An error of the model that is the same at all visits cancels in a change, and not in an effect of the first visit.
     The prior of the size is so wide that it favours none. Where neither the damper nor trains decide, the evidence is
-    small: a gap that no train closes feels as a bed that has lost as much damping as stiffness.
+    small: a gap that no train closes acts as a bed that has lost as much damping as stiffness.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def evidence_of_gap(
     effect = leader.effect if isinstance(leader, OnsetEvidence) else leader
     springs, dampers = _supports_of(effect, parameters)
     offsets = {
-        p.name: replace(p, name=f"{p.name} as trains feel it", mean=0.0, sd=scatter_sd(p, parameters))
+        p.name: replace(p, name=f"{p.name} under trains", mean=0.0, sd=scatter_sd(p, parameters))
         for p in (*springs, *dampers)
     }
     sd = CALIBRATION.gap_size_sds * max(effect.sd, abs(size))
@@ -144,7 +144,7 @@ def _supports_of(
 def _with_offsets(
     offsets: Mapping[str, StateParameter], events: Sequence[Event], visits: Sequence[VisitInformation]
 ) -> tuple[list[Event], list[VisitInformation]]:
-    """Events that open what trains feel as they open what impacts feel, and the visits with trains of their own."""
+    """Events that open offsets under trains as they open parameters, and the visits with trains of their own."""
     opened, split = list(events), list(visits)
     for name, offset in offsets.items():
         opened = [

@@ -25,13 +25,13 @@ from turnout.mismatch.calibrated.information import GroupInformation, VisitInfor
 from turnout.mismatch.calibrated.levels import IMPACTS, kind_of
 from turnout.mismatch.calibrated.model_answer import NAMES
 
-END = " as trains feel it"  # of the name of an offset
+END = " under trains"  # of the name of an offset
 DAMPER_SHARE = 0.5  # change of the logarithm of the damping over that of the stiffness, as of other effects
 
 
 @dataclass(frozen=True)
 class Law:
-    """An effect that trains feel alone: ``group`` of the candidate, name of the ``spring`` and of its ``damper``.
+    """An effect under trains alone: ``group`` of the candidate, name of the ``spring`` and of its ``damper``.
 
     The names are the first part of those of the parameters. A local one has a position behind "@".
     """
@@ -54,7 +54,7 @@ LAWS = (
 
 
 def is_under_load(effect: ChangeEffect) -> bool:
-    """Whether trains feel the effect and impacts do not.
+    """Whether the effect acts under trains and not under impacts.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def with_evidence_under_load(
     candidates: Sequence[ChangeEffect],
     levels: Mapping[str, float] | None = None,
 ) -> list[OnsetEvidence]:
-    """Evidence of changes, and that of those which trains feel alone, the strongest first.
+    """Evidence of changes, and of those under trains alone, the strongest first.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def is_all_explained(
 ) -> bool:
     """Whether the visits after a time are as expected with ``events``, in all and at each parameter.
 
-    An effect that trains feel alone is near to many others: it is named only if nothing else has changed.
+    An effect under trains alone is near to many others: it is named only if nothing else has changed.
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def is_all_explained(
 
 
 def candidates_under_load(parameters: Sequence[StateParameter], without: Collection[str] = ()) -> list[ChangeEffect]:
-    """Steps and growth of what trains feel and impacts do not.
+    """Steps and growth of what changes under trains and not under impacts.
 
     Parameters
     ----------

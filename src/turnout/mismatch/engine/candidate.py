@@ -118,7 +118,7 @@ class RefitStarts:
     from_base : bool
         False: refits start with the nuisance parameters at their priors, not at the base fit.
     prescreen_group : str
-        Not empty: tried on the cheap observations at every site, whatever the residual promises. Families with the same
+        Not empty: tried on the hammer tests at every site, whatever the residual promises. Families with the same
         word share these trials.
     promise : float or None
         Gain that a look at the residual promises [nats]. Such a candidate starts at its first point as it is, with the
@@ -126,7 +126,7 @@ class RefitStarts:
     nuisances : mapping
         Nuisance parameter -> value.
     sign_ambiguous : bool
-        The cheap observations hardly tell a value from its mirror image about neutral.
+        The hammer tests hardly distinguish a value from its mirror image about neutral.
     nonlinear_in_size : bool
         The response changes its shape with the size. A start says nothing of larger or smaller sizes.
     """

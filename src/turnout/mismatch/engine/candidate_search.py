@@ -119,7 +119,7 @@ def gain_with_wide_prior(m: float, s: float, tau: float, wide_sd: float) -> tupl
 class RefitTask:
     """A ``candidate`` to refit from ``start`` (n_term,) and nuisance ``values``.
 
-    ``promise`` is the gain that it was selected for, and ``cheap_gain`` that from the cheap observations alone [nats].
+    ``promise`` is the gain that it was selected for, and ``hammer_gain`` that from the hammer tests alone [nats].
     A ``rival`` is refitted only if another effect of its component gains something.
     """
 
@@ -127,15 +127,15 @@ class RefitTask:
     start: np.ndarray
     values: dict[str, float]
     promise: float = 0.0
-    cheap_gain: float = 0.0
+    hammer_gain: float = 0.0
     rival: bool = False
 
 
 def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> list[RefitTask]:
     """Candidates to refit on top of a fit.
 
-    If predictions are cheap, every family is refitted from every start. In an expensive case, families that show in
-    the cheap observations are ``prescreened``. The others are scored by the columns of their starts (``Case.screen``),
+    In a small case, every family is refitted from every start. In a large case, families that show in
+    the hammer tests are ``prescreened``. The others are scored by the columns of their starts (``Case.screen``),
     or by a prediction if there is no column.
 
     Parameters
@@ -156,7 +156,7 @@ def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> li
         for c in (*case.candidates, *case.residual_candidates(fit))
         if not any(is_same_site(c, k) for k in fit.candidates)
     ]
-    if not case.expensive:
+    if not case.is_large:
         return [RefitTask(c, np.asarray(s, dtype=float), {}) for c in candidates for s in c.starts]
     prescreened = [e for e in prescreened if e.candidate in candidates]
     masked = [e for e in masked_candidates(case, fit) if e.candidate in candidates]
@@ -177,7 +177,7 @@ def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> li
 
 
 def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | None = ()) -> list[Entry]:
-    """Candidates of an expensive case, fitted to its cheap observations beside the effects of a fit.
+    """Candidates of a large case, fitted to its hammer tests beside the effects of a fit.
 
     They are fitted from the priors, so they do not depend on the nuisances of the fit.
 
@@ -192,9 +192,9 @@ def prescreened_entries(search: Search, fit: Fit, promising: Collection[str] | N
     Returns
     -------
     list of Entry
-        The best of each family. [] for a cheap case.
+        The best of each family. [] for a small case.
     """
-    if not search.case.expensive:
+    if not search.case.is_large:
         return []
     families = None
     if fit.candidates and promising is not None:
@@ -239,7 +239,7 @@ def required_promise(entry: Entry, fit: Fit, prescreen_gains: Mapping[str, float
     fit : Fit
         Without the candidate of the entry.
     prescreen_gains : mapping
-        Key of a candidate -> its gain in the cheap observations. [nats]
+        Key of a candidate -> its gain in the hammer tests. [nats]
     settings : MismatchSettings
 
     Returns
@@ -249,8 +249,8 @@ def required_promise(entry: Entry, fit: Fit, prescreen_gains: Mapping[str, float
     """
     if not fit.candidates:
         return settings.promise
-    is_cheap_gain = entry.gain == prescreen_gains.get(entry.candidate.key)
-    return settings.threshold * (THRESHOLDS.cheap_promise_share if is_cheap_gain else 1.0)
+    is_hammer_gain = entry.gain == prescreen_gains.get(entry.candidate.key)
+    return settings.threshold * (THRESHOLDS.hammer_promise_share if is_hammer_gain else 1.0)
 
 
 def with_fitted_start(entry: Entry, by_family: Mapping[str, Sequence[Entry]]) -> Entry:

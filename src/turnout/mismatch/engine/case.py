@@ -35,9 +35,10 @@ class Case:
     free_laws : tuple of Candidate
         Stiffness and damping of any form, by a few candidates without a meaning of their own. They are never named. A
         name beside which they still explain much of held-out recordings is withdrawn.
-    expensive : bool
-        Predictions are expensive. Derivatives of the nuisances are then kept and updated by Broyden's formula, except
-        for the observations for which ``is_cheap`` holds.
+    is_large : bool
+        Too large to refit every candidate from every start, as with simulated passages. Candidates are then chosen by
+        their first-order changes and compared by evidence. Derivatives of the nuisances are updated by Broyden's
+        formula, except for the observations for which ``is_hammer_test`` holds.
     reuses_derivatives : bool
         Derivatives of earlier points are used again. After a step that costs more, a fit then computes new ones before
         it tries smaller steps.
@@ -68,7 +69,7 @@ class Case:
     nuisances: tuple[Nuisance, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     free_laws: tuple[Candidate, ...] = ()
-    expensive = False
+    is_large = False
     reuses_derivatives = False
     max_simulations: int | None = None
     start_values: Values = {}
@@ -86,8 +87,8 @@ class Case:
         """Simulations that the case has cost so far; 0 for a case without a bound."""
         return 0
 
-    def is_cheap(self, observation: Observation) -> bool:
-        """Whether derivatives of an observation cost next to nothing.
+    def is_hammer_test(self, observation: Observation) -> bool:
+        """Whether an observation is a hammer test: its derivatives are computed again at every step of a fit.
 
         Parameters
         ----------
@@ -319,8 +320,8 @@ class Case:
         """
         return self
 
-    def cheap_case(self) -> Case | None:
-        """A case of the cheap observations alone, with the same shared nuisances. None if there are none."""
+    def hammer_case(self) -> Case | None:
+        """A case of the hammer tests alone, with the same shared nuisances. None if there are none."""
         return None
 
     def residual_spaces(self, fit: Fit) -> Iterable[ResidualSpace]:

@@ -41,12 +41,12 @@ def loud_recording(case: Case, fit: Fit) -> int | None:
     Returns
     -------
     int or None
-        Its number. None if no recording is above the level, or several are, or fewer than ``min_witnesses`` others
-        could show it.
+        Its number. None if no recording is above the level, or several are, or fewer than
+        ``min_confirming_recordings`` others could show it.
     """
     excesses = _recording_excesses(case, fit)
     above = [k for k, excess in excesses.items() if excess > 1.0]
-    return above[0] if len(above) == 1 and len(excesses) > THRESHOLDS.min_witnesses else None
+    return above[0] if len(above) == 1 and len(excesses) > THRESHOLDS.min_confirming_recordings else None
 
 
 def _recording_excesses(case: Case, fit: Fit) -> dict[int, float]:
@@ -95,7 +95,7 @@ def is_lone_excess(case: Case, fit: Fit) -> bool:
     Returns
     -------
     bool
-        False if fewer than ``min_witnesses`` other recordings of the same type could show it.
+        False if fewer than ``min_confirming_recordings`` other recordings of the same type could show it.
     """
     n_above, n_within = 0, 0
     for o, white in zip(case.observations, fit.white):
@@ -103,4 +103,4 @@ def is_lone_excess(case: Case, fit: Fit) -> bool:
             continue
         above = int(np.sum(channel_mean_squares(o, white) > case.cell_level[o.data_type]))
         n_above, n_within = n_above + above, n_within + (above == 0)
-    return n_above == 1 and n_within >= THRESHOLDS.min_witnesses
+    return n_above == 1 and n_within >= THRESHOLDS.min_confirming_recordings

@@ -22,7 +22,7 @@ import numpy as np
 from turnout.mismatch.engine.component_spread import spread_of_others
 from turnout.mismatch.engine.large_values import evidence_of_large_values
 from turnout.mismatch.engine.projector import Projector
-from turnout.mismatch.engine.single_witness import impact_repetitions
+from turnout.mismatch.engine.single_source import impact_repetitions
 from turnout.mismatch.engine.space_evidence import SpaceEvidence
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -75,13 +75,13 @@ def evidence_by_position(gains: Gains) -> list[SpaceEvidence]:
 
 
 def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
-    r"""Gain of each component by a value of its own in the recordings that are expensive to predict.
+    r"""Gain of each component by a value of its own in the passages.
 
-    In a turnout these are the passages, and hammer tests are cheap. The gain of a change is
+    The hammer tests keep the shared value. The gain of a change is
 
     .. math:: \frac{(c^T C^{-1} y)^2}{2 (1 + i)} - \frac12 \ln(1 + i), \quad i = c^T C^{-1} c
 
-    nats. c is the derivative of the expensive recordings by the value, in units of a wide prior of the change. C is the
+    nats. c is the derivative of the passages by the value, in units of a wide prior of the change. C is the
     covariance of errors and nuisances.
 
     Parameters
@@ -98,11 +98,11 @@ def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     numbers = _components(case)
     if not numbers or not fit.jacobian:
         return []
-    is_expensive = np.concatenate([np.full(o.data.size, not case.is_cheap(o)) for o in case.observations])
-    if np.all(is_expensive) or not np.any(is_expensive):
+    is_passage = np.concatenate([np.full(o.data.size, not case.is_hammer_test(o)) for o in case.observations])
+    if np.all(is_passage) or not np.any(is_passage):
         return []
     projector = Projector(case, fit)
-    columns = projector.scaled[:, numbers] * (THRESHOLDS.max_ordinary_spreads * is_expensive[:, None])
+    columns = projector.scaled[:, numbers] * (THRESHOLDS.max_ordinary_spreads * is_passage[:, None])
     across = projector.scaled.T @ columns
     information = np.sum(columns**2, axis=0) - np.sum(across * (projector.normal @ across), axis=0)
     slopes = projector.right @ columns - projector.shift @ across

@@ -89,8 +89,8 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "of the residual", HOW),
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
          "{e.leader.in_words} would have a value that is physically impossible", HOW),
-    Rule("single_witness", lambda e: e.leader.single_witness, "unknown",
-         "only {e.leader.single_witness} shows {e.leader.in_words}, and no other recording confirms it", ENDS),
+    Rule("single_source", lambda e: e.leader.single_source, "unknown",
+         "only {e.leader.single_source} shows {e.leader.in_words}, and no other recording confirms it", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
          "with {e.leader.in_words}, recordings of one condition are predicted worse than without it "
          "(evidence against it: {e.loss_in_words})", ENDS),

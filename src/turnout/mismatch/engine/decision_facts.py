@@ -143,7 +143,7 @@ class EffectEvidence:
     @cached_property
     def contradicted(self) -> bool:
         """Whether held-out conditions contradict the leader."""
-        return bool(self.leader.single_witness) or is_contradicted(
+        return bool(self.leader.single_source) or is_contradicted(
             self.leader.worst_gain, self.leader.gain, self.settings
         )
 

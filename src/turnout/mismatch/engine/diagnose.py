@@ -234,7 +234,7 @@ def _prepare_next(findings: Findings, verdict: Verdict) -> tuple[Findings, bool]
     if verdict.answer == "a_or_b" and not verdict.is_single_effect:  # both may be present
         return replace(findings, choice=findings), True
     search = findings.search
-    return findings, search.case.expensive or excess_ratio(search, findings.fit) > 1.0
+    return findings, search.case.is_large or excess_ratio(search, findings.fit) > 1.0
 
 
 def grade_names(findings: Findings) -> Findings:

@@ -128,18 +128,18 @@ def _one_per_family(candidates: Iterable[Candidate], strengths: Mapping[str, Arr
         yield chosen[0] if chosen else members[len(members) // 2]
 
 
-def cheapest_addition(
+def best_addition(
     base: Distinguishability,
     additions: Mapping[str, tuple[float, Distinguishability]],
 ) -> tuple[str, int, float]:
-    """The addition to a plan that resolves most pairs of effects, the cheapest among equals.
+    """The addition to a plan that resolves most pairs of effects; of several, the one with the least effort.
 
     Parameters
     ----------
     base : Distinguishability
         Of the plan as it is.
     additions : mapping
-        Name -> (cost, Distinguishability of the plan with it).
+        Name -> (effort [h], Distinguishability of the plan with it).
 
     Returns
     -------
@@ -150,7 +150,7 @@ def cheapest_addition(
         Evidence that it adds. [nats]
     """
     ranked, most = [], THRESHOLDS.max_useful_evidence
-    for name, (cost, extended) in additions.items():
+    for name, (effort, extended) in additions.items():
         common = [n for n in base.names if n in extended.names]
         gained = resolved = 0.0
         for a in common:
@@ -163,6 +163,6 @@ def cheapest_addition(
                 gained += max(0.0, min(after, most) - min(before, most))
             before, after = base.detectability[base.names.index(a)], extended.detectability[extended.names.index(a)]
             resolved += before < THRESHOLDS.min_evidence <= after
-        ranked.append((-resolved, cost, name, gained))
+        ranked.append((-resolved, effort, name, gained))
     resolved, _, name, gained = min(ranked)
     return name, int(-resolved), float(gained)

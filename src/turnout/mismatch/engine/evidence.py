@@ -82,7 +82,7 @@ def _total_excess(level: Mapping[str, float], control: Mapping[str, float]) -> f
 def score_of(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> Score:
     """Score of a candidate: gain less the logarithm of the number of sites.
 
-    The gain is that of held-out conditions. In an expensive case with many nuisances it is the evidence, in which the
+    The gain is that of held-out conditions. In a large case with many nuisances it is the evidence, in which the
     first condition is predicted from the priors.
 
     Parameters
@@ -97,7 +97,7 @@ def score_of(search: Search, fit: Fit, refit: Fit, candidate: Candidate) -> Scor
     Score
     """
     case, gain, by_condition = search.case, refit.evidence - fit.evidence, {}
-    if not case.expensive:
+    if not case.is_large:
         with_candidate, without_candidate = held_out_score(case, refit), held_out_score(case, fit)
         by_condition = {c: with_candidate[c] - without_candidate[c] for c in without_candidate}
         gain = sum(by_condition.values()) if by_condition else gain

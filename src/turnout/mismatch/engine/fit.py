@@ -17,7 +17,7 @@ class Fit:
     """Result of a joint fit.
 
     ``values`` of nuisances, ``psi`` (n_term,) of the terms. ``residuals`` list by observation, ``white`` the same
-    whitened. ``jacobian`` whitened too; [] in a fit ``without_jacobian``, in single precision in an expensive case.
+    whitened. ``jacobian`` whitened too; [] in a fit ``without_jacobian``, in single precision in a large case.
     ``scale`` noise scale by data type, at least 1. ``cost`` minus twice the log posterior up to a constant.
     ``covariance`` of nuisances and psi. ``level`` weighted mean square by data type, in units of ``sigma``.
     ``evidence`` log probability of the data by Laplace's approximation, up to a constant of the case. [nats]

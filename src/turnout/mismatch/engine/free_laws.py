@@ -62,7 +62,7 @@ def free_law_share(search: Search, base: Fit, fit: Fit) -> float:
     ):
         try:
             refit = fit_jointly(
-                case, candidates, psi, start.values, iterations=THRESHOLDS.max_cheap_steps,
+                case, candidates, psi, start.values, iterations=THRESHOLDS.max_hammer_steps,
                 min_gain=THRESHOLDS.least_gain,
             )  # fmt: skip
             squares.append(weighted_mean_square(observations, predict_reserved(case, refit, observations)))

@@ -1,4 +1,4 @@
-"""Prescreening: joint fits to the cheap observations alone, before any expensive fit.
+"""Prescreening: joint fits to the hammer tests alone, before any fit to passages.
 
 Every family is fitted at its likeliest sites. The base model may have changed to hide an effect, so each fit starts
 from the priors with the effect in it. A first fit with large independent errors finds the basin, a second one with the
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PrescreenFit:
-    """A candidate fitted to the cheap observations.
+    """A candidate fitted to the hammer tests.
 
     ``gain`` in evidence less the logarithm of the number of sites [nats]. ``psi`` its parameters. ``values`` of
-    nuisances that the cheap observations determine. ``level`` with it, ``before`` without it: weighted mean square.
+    nuisances that the hammer tests determine. ``level`` with it, ``before`` without it: weighted mean square.
     """
 
     gain: float
@@ -52,7 +52,7 @@ class _Start(NamedTuple):
 
 @dataclass
 class _Prescreen:
-    """The cheap observations with broad and with actual errors, and the fits of the ``accepted`` effects to both.
+    """The hammer tests with broad and with actual errors, and the fits of the ``accepted`` effects to both.
 
     ``trial_gains`` are gains of trial fits at the sites of a group of families, ``trial_ends`` the nuisances and
     parameters where trials of a candidate from a start ended: its fit goes on from there.
@@ -60,7 +60,7 @@ class _Prescreen:
 
     settings: MismatchSettings
     broad_case: Case
-    cheap_case: Case
+    hammer_case: Case
     accepted: tuple[Candidate, ...]
     broad_fit: Fit
     base: Fit
@@ -78,14 +78,14 @@ class _Prescreen:
         (values, psi), n = self.trial_ends.get((candidate.key, *start), from_priors), self.broad_fit.psi.size
         max_cost = self.broad_fit.cost - 2.0 * self.settings.promise if candidate.refit.prescreen_group else np.inf
         try:
-            broad_fit = _fit_cheaply(self.broad_case, candidates, psi, values)
+            broad_fit = _fit_hammer_tests(self.broad_case, candidates, psi, values)
             if broad_fit.cost > max_cost:
                 return None
             refit = self._fit_actual(candidates, broad_fit)
         except SimulationError:
             return None
         gain = refit.evidence - self.base.evidence - np.log(candidate.site.n_scanned)
-        values = informed_values(self.cheap_case, refit, candidate)
+        values = informed_values(self.hammer_case, refit, candidate)
         level, before = (max(f.level.values()) for f in (refit, self.base))
         return PrescreenFit(gain, candidate, refit.psi[n:], values, level, before)
 
@@ -94,10 +94,10 @@ class _Prescreen:
 
         A model with an effect more cannot be worse: such a fit has ended in another basin than the base.
         """
-        refit = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, broad_fit.values)
+        refit = _fit_hammer_tests(self.hammer_case, candidates, broad_fit.psi, broad_fit.values)
         if refit.cost <= self.base.cost:
             return refit
-        other = _fit_cheaply(self.cheap_case, candidates, broad_fit.psi, self.base.values)
+        other = _fit_hammer_tests(self.hammer_case, candidates, broad_fit.psi, self.base.values)
         return min(refit, other, key=lambda f: f.cost)
 
     def base_shortfall(self, best: PrescreenFit) -> float:
@@ -107,7 +107,7 @@ class _Prescreen:
         """
         values = {**self.base.values, **best.values}
         try:
-            continued = _fit_cheaply(self.cheap_case, self.accepted, self.base.psi, values)
+            continued = _fit_hammer_tests(self.hammer_case, self.accepted, self.base.psi, values)
         except SimulationError:
             return 0.0
         return max(0.0, continued.evidence - self.base.evidence)
@@ -170,7 +170,7 @@ class _Prescreen:
 
 
 def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None) -> list[PrescreenFit]:
-    """Fits at the best site of every family that the cheap observations show on top of ``fit``.
+    """Fits at the best site of every family that the hammer tests show on top of ``fit``.
 
     Parameters
     ----------
@@ -183,18 +183,18 @@ def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None)
     Returns
     -------
     list of PrescreenFit
-        The largest gain first. [] without cheap observations.
+        The largest gain first. [] without hammer tests.
     """
     case = search.case
-    cheap_case = case.cheap_case()
-    if cheap_case is None or (families is not None and not families):
+    hammer_case = case.hammer_case()
+    if hammer_case is None or (families is not None and not families):
         return []
-    accepted, broad_case = fit.candidates, cheap_case.with_broad_errors()
-    broad_fit = _fit_cheaply(broad_case, accepted, fit.psi)
-    base = _fit_cheaply(cheap_case, accepted, broad_fit.psi, broad_fit.values)
-    step = _Prescreen(search.settings, broad_case, cheap_case, accepted, broad_fit, base)
+    accepted, broad_case = fit.candidates, hammer_case.with_broad_errors()
+    broad_fit = _fit_hammer_tests(broad_case, accepted, fit.psi)
+    base = _fit_hammer_tests(hammer_case, accepted, broad_fit.psi, broad_fit.values)
+    step = _Prescreen(search.settings, broad_case, hammer_case, accepted, broad_fit, base)
     by_family: dict[str, list[_Start]] = {}
-    for entry in _column_starts(case, broad_case, broad_fit) + _column_starts(case, cheap_case, base):
+    for entry in _column_starts(case, broad_case, broad_fit) + _column_starts(case, hammer_case, base):
         by_family.setdefault(entry.candidate.family, []).append(entry)
     best_fits = []
     for family, starts in by_family.items():
@@ -212,14 +212,14 @@ def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None)
 
 
 def informed_values(case: Case, fit: Fit, candidate: Candidate) -> dict[str, float]:
-    """Values of the nuisances that the cheap observations determine, and of the masking parameter.
+    """Values of the nuisances that the hammer tests determine, and of the masking parameter.
 
     They do not determine the masking parameter beside the candidate. Its value in the base fit must not come on top.
 
     Parameters
     ----------
     case : Case
-        Of the cheap observations.
+        Of the hammer tests.
     fit : Fit
         With the candidate.
     candidate : Candidate
@@ -237,11 +237,11 @@ def informed_values(case: Case, fit: Fit, candidate: Candidate) -> dict[str, flo
     return {name: fit.values[name] for name, informed in is_informed.items() if informed}
 
 
-def _fit_cheaply(
+def _fit_hammer_tests(
     case: Case, candidates: Sequence[Candidate], psi: np.ndarray, values: Mapping[str, float] | None = None
 ) -> Fit:
-    """Joint fit to cheap observations, with many steps."""
-    steps, min_gain = THRESHOLDS.max_cheap_steps, THRESHOLDS.min_cheap_step_gain
+    """Joint fit to hammer tests, with many steps."""
+    steps, min_gain = THRESHOLDS.max_hammer_steps, THRESHOLDS.min_hammer_step_gain
     return fit_jointly(case, candidates, psi, values, iterations=steps, min_gain=min_gain)
 
 
@@ -249,9 +249,9 @@ def _prior_means(case: Case) -> dict[str, float]:
     return {n.name: n.mean for n in case.nuisances}
 
 
-def _column_starts(case: Case, cheap_case: Case, fit: Fit) -> list[_Start]:
-    """Starts of every candidate that shows in the cheap observations, scaled by their columns."""
-    columns = cheap_case.screen(fit)
+def _column_starts(case: Case, hammer_case: Case, fit: Fit) -> list[_Start]:
+    """Starts of every candidate that shows in the hammer tests, scaled by their columns."""
+    columns = hammer_case.screen(fit)
     accepted_keys = {c.key for c in fit.candidates}
     chosen = [
         (c, k)
@@ -262,5 +262,5 @@ def _column_starts(case: Case, cheap_case: Case, fit: Fit) -> list[_Start]:
     ]
     if not chosen:
         return []
-    scores = Projector(cheap_case, fit).scores([columns[c.key, k] for c, k in chosen], *zip(*chosen))
+    scores = Projector(hammer_case, fit).scores([columns[c.key, k] for c, k in chosen], *zip(*chosen))
     return [_Start(0.5 * gain, c, c.scaled_start(k, share)) for (c, k), (gain, share) in zip(chosen, scores)]

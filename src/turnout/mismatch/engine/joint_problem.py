@@ -35,7 +35,7 @@ class JointProblem:
         self.parameters = [p for c in self.candidates for p in c.parameters]
         self.iterations, self.evaluations = iterations, 0
         size = sum(o.n_effective for o in self.observations)
-        self.min_decrease = max(2.0 * min_gain, stall * size if case.expensive else 0.0)
+        self.min_decrease = max(2.0 * min_gain, stall * size if case.is_large else 0.0)
         priors = [(n.mean, n.sd) for n in case.nuisances] + [_prior(p) for p in self.parameters]
         self.mean, self.sd = np.array(priors, dtype=float).reshape(-1, 2).T.copy()
         bounds = [n.bounds for n in case.nuisances] + [p.bounds for p in self.parameters]
@@ -198,7 +198,7 @@ class JointProblem:
         Returns
         -------
         list of (n, p) array of float
-            By observation; in single precision in an expensive case.
+            By observation; in single precision in a large case.
 
         Raises
         ------
@@ -214,12 +214,12 @@ class JointProblem:
             base = [j[:, : self.n] for j in reused]
         columns = [self._column(theta, k, predictions) for k in range(self.n, theta.size)]
         full = [np.column_stack([j, *(c[i] for c in columns)]) if columns else np.array(j) for i, j in enumerate(base)]
-        return [j.astype(np.float32) for j in full] if self.case.expensive else full
+        return [j.astype(np.float32) for j in full] if self.case.is_large else full
 
-    def with_new_cheap_columns(
+    def with_new_hammer_columns(
         self, theta: np.ndarray, predictions: Sequence[np.ndarray], jacobian: list[np.ndarray]
     ) -> list[np.ndarray]:
-        """The Jacobian with new derivatives of cheap observations.
+        """The Jacobian with new derivatives of hammer tests.
 
         Parameters
         ----------
@@ -239,13 +239,13 @@ class JointProblem:
         SimulationError
             If the model cannot be simulated on either side of a parameter.
         """
-        chosen = [i for i, o in enumerate(self.observations) if self.case.is_cheap(o)]
+        chosen = [i for i, o in enumerate(self.observations) if self.case.is_hammer_test(o)]
         if not chosen:
             return jacobian
-        cheap_problem = JointProblem(self.case, self.candidates, [self.observations[i] for i in chosen])
-        cheap_jacobian = cheap_problem.jacobian(theta, [predictions[i] for i in chosen])
+        hammer_problem = JointProblem(self.case, self.candidates, [self.observations[i] for i in chosen])
+        hammer_jacobian = hammer_problem.jacobian(theta, [predictions[i] for i in chosen])
         updated = list(jacobian)
-        for i, j in zip(chosen, cheap_jacobian):
+        for i, j in zip(chosen, hammer_jacobian):
             updated[i] = j
         return updated
 

@@ -53,11 +53,11 @@ def fit_large_values(
     Fit
         Its evidence is that with the wide priors.
     """
-    price, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.large_value_lead, partners or {}
+    penalty, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.large_value_lead, partners or {}
     large: tuple[str, ...] = ()
     for _ in range(THRESHOLDS.max_large_values):
         gains = evidence_of_large_values(search.case, fit, names, widening, _with_partners(large, partners))
-        promising = sorted((n for n, g in gains.items() if g > price), key=lambda n: -gains[n])
+        promising = sorted((n for n, g in gains.items() if g > penalty), key=lambda n: -gains[n])
         fits = {}
         for name in promising[: THRESHOLDS.n_large_starts]:
             try:
@@ -65,7 +65,7 @@ def fit_large_values(
             except SimulationError:
                 continue
         leader = max(fits, key=lambda n: fits[n].evidence, default=None)
-        if leader is None or fits[leader].evidence - price <= fit.evidence:
+        if leader is None or fits[leader].evidence - penalty <= fit.evidence:
             break
         large, fit = (*large, leader), fits[leader]
     return fit
@@ -160,7 +160,7 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
     """Fit with wide priors of these values: the best of several starts.
 
     One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where
-    fits of the case start: the fit without it has moved them to hide it, and may be in another valley. These end where
+    fits of the case start: the fit without it has moved them to hide it, and may be at another minimum. These end where
     their steps do not lead below the best one so far.
     """
     wide = replace(search, case=with_wide_priors(search.case, _with_partners(large, partners), widening))

@@ -48,7 +48,7 @@ def polish(search: Search, fit: Fit, score: Score) -> Score:
 def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     """A leader fitted to convergence at the best position that is reached by steps to a better neighbour.
 
-    The position was chosen by the cheap observations, or by columns of one size. It is a parameter like others, but
+    The position was chosen by the hammer tests alone, or by columns of one size. It is a parameter like others, but
     with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. So is the
     length of a stretch. Each site is tried once.
 
@@ -176,7 +176,7 @@ def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
 
     def compute() -> Fit | None:
         try:
-            psi = _cheapest_psi(search.case, score, reset_values)
+            psi = _lowest_cost_psi(search.case, score, reset_values)
             return search.converge(search.fit(score.fit.candidates, psi, reset_values))
         except SimulationError:
             return None
@@ -186,7 +186,7 @@ def restart_leader(search: Search, fit: Fit, score: Score) -> Score:
     return max(score, restarted, key=lambda s: s.gain)
 
 
-def _cheapest_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndarray:
+def _lowest_cost_psi(case: Case, score: Score, values: dict[str, float]) -> np.ndarray:
     """``psi`` with the first two parameters of the leader at those shares of their values that cost least."""
     candidate, psi_slice = score.candidate, score.fit.part(score.candidate)
     sizes, costs = score.fit.psi[psi_slice], []

@@ -167,11 +167,11 @@ class DampedSteps:
         return None, 0.0
 
     def _next_damping(self, damping: float, kept_share: float) -> float:
-        """Damping after a step that kept this share of its promise: less, or more in a cheap case after a poor one.
+        """Damping after a step that kept this share of its promise: less, or more after a poor one in a small case.
 
-        An expensive case has old derivatives, which new ones improve more than smaller steps.
+        A large case has old derivatives, which new ones improve more than smaller steps.
         """
-        if kept_share < THRESHOLDS.min_kept_promise and not self.joint.case.expensive:
+        if kept_share < THRESHOLDS.min_kept_promise and not self.joint.case.is_large:
             return max(THRESHOLDS.damping_increase * damping, THRESHOLDS.first_damping)
         return damping * THRESHOLDS.damping_decrease if damping > THRESHOLDS.min_damping else 0.0
 

@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 class Location:
     """Location of a residual.
 
-    ``frame`` and ``level`` with the largest evidence ``nats``. ``place`` is the middle of ``low`` to ``high`` [m],
-    ``sensor``, ``train`` and ``axle`` if it has them. ``next_best`` frame -> nats of the other frames.
-    ``measured_range`` first and last position of sensors and impacts [m]: beyond them positions cannot be
-    distinguished.
+    ``frame`` and ``level`` with the largest evidence ``nats``; ``level`` None is the whole track. ``place`` is the
+    middle of ``low`` to ``high`` [m], ``sensor``, ``train`` and ``axle`` if it has them. ``next_best`` frame -> nats of
+    the other frames. ``measured_range`` first and last position of sensors and impacts [m]: beyond them positions
+    cannot be distinguished.
     """
 
     frame: str
@@ -59,20 +59,25 @@ class Location:
         if self.place is not None and not self.measured_range[0] <= self.place <= self.measured_range[1]:
             before = self.place < self.measured_range[0]
             end = self.measured_range[0] if before else self.measured_range[1]
-            return f"{'before' if before else 'beyond'} {end:.1f} m, the distance is not known"
+            return f"{'before' if before else 'beyond'} {end:.1f} m, at an unknown distance"
         if self.place is not None:
             return f"at {self.place:.1f} m, between {self.low:.1f} and {self.high:.1f} m"
         if self.axle is not None:
             return f"on axle {self.axle} of {self.train}"
-        if self.frame == "train":
+        if self.train is not None:
             return f"on {self.train}"
-        if self.frame == "sensor":
+        if self.sensor is not None:
             return f"in channel {self.sensor}"
-        if self.frame == "clock":
-            return f"in recording {self.level}, in any state of the wheels"
-        return {"frequency": "along the whole track", "condition": f"in the tests of {self.level}"}.get(
-            self.frame, f"locked to {self.frame} {self.level}"
-        )
+        text = _FRAME_TEXTS.get(self.frame) if self.level is not None else None
+        return text.format(level=self.level) if text else "along the whole track"
+
+
+# Text of a location without position, train and sensor. A cause in any other frame acts along the whole track.
+_FRAME_TEXTS = {
+    "clock": "in all channels of the recording {level}",
+    "condition": "in the recordings of {level}",
+    "wavelength": "along the rail, at the wavelength {level}",
+}
 
 
 def locate(
@@ -121,27 +126,27 @@ def locate(
     if absorbed is not None and absorbed.nuisance.at is None:
         # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
         floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
-    witnesses = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
+    ranked = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
     if absorbed is not None and absorbed.nuisance.at is not None:
         is_intact = all(fit.level[name] <= level for name, level in floor.items())
-        if (is_intact and worst_channel_excess(case, fit) <= 1.0) or _lead(witnesses) < absorbed.nats:
-            witnesses = [SpaceEvidence(*absorbed.nuisance.at, absorbed.nats)]
+        if (is_intact and worst_channel_excess(case, fit) <= 1.0) or _lead(ranked) < absorbed.nats:
+            ranked = [SpaceEvidence(*absorbed.nuisance.at, absorbed.nats)]
     if (
         leader is not None
         and leader.explained >= THRESHOLDS.min_explained_share
-        and (not witnesses or leader.gain > witnesses[0].nats)
+        and (not ranked or leader.gain > ranked[0].nats)
     ):
         return replace(_location_of_candidate(leader), measured_range=case.measured_range)
-    if not witnesses:
+    if not ranked:
         return None
-    strongest = witnesses[0]
+    strongest = ranked[0]
     if strongest.frame == "place" and not fit.candidates:
         component = locate_component(case, fit, threshold + THRESHOLDS.shape_error_share * strongest.nats)
         if component is not None:
             return component
     if strongest.frame == "place" and absorbed is None and strongest.nats < case.place_level:
         return None
-    return replace(_location_of_evidence(witnesses), measured_range=case.measured_range)
+    return replace(_location_of_evidence(ranked), measured_range=case.measured_range)
 
 
 def location_of_ambiguity(case: Case) -> Location | None:
@@ -188,26 +193,26 @@ def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
     return replace(_location_of_evidence(positions), measured_range=case.measured_range) if positions else None
 
 
-def _lead(witnesses: Sequence[SpaceEvidence]) -> float:
+def _lead(ranked: Sequence[SpaceEvidence]) -> float:
     """Evidence for the first location over the best of the others, which do not overlap it. [nats]"""
-    if not witnesses:
+    if not ranked:
         return 0.0
-    first, others = witnesses[0], witnesses[1:]
+    first, others = ranked[0], ranked[1:]
     if first.frame == "place":
         low, high = _ends(first.level)
         others = [w for w in others if w.frame != "place" or _ends(w.level)[0] > high or _ends(w.level)[1] < low]
     return first.nats - max((w.nats for w in others), default=0.0)
 
 
-def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
+def _credible_evidence(case: Case, ranked: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
     """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel,
     only if impacts, if any, support it.
     """
-    hammer_names = {o.name for o in case.observations if case.is_cheap(o)}
-    for w in witnesses:
+    hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
+    for w in ranked:
         nats = w.nats
         if w.frame in ("wheel", "train"):
-            others = (v.nats for v in witnesses if v.frame == w.frame and _train_of(v) != _train_of(w))
+            others = (v.nats for v in ranked if v.frame == w.frame and _train_of(v) != _train_of(w))
             nats -= max(others, default=0.0)
         if (
             w.frame == "sensor"
@@ -219,27 +224,26 @@ def _credible_evidence(case: Case, witnesses: Sequence[SpaceEvidence]) -> Iterat
             yield replace(w, nats=nats)
 
 
-def _train_of(witness: SpaceEvidence) -> Any:
-    return witness.level[0] if witness.frame == "wheel" else witness.level
+def _train_of(evidence: SpaceEvidence) -> Any:
+    return evidence.level[0] if evidence.frame == "wheel" else evidence.level
 
 
 def _location_of_candidate(score: Score) -> Location:
     where, position = score.candidate.where, score.candidate.position
-    return Location(
-        score.candidate.frame, score.candidate.key, score.gain, position, position, position, where.get("sensor"),
-        where.get("train"), where.get("axle"),
-    )  # fmt: skip
+    level = f"{where['wavelength']:.3f} m" if "wavelength" in where else score.candidate.key if where else None
+    sensor, train, axle = (where.get(name) for name in ("sensor", "train", "axle"))
+    return Location(score.candidate.frame, level, score.gain, position, position, position, sensor, train, axle)
 
 
-def _location_of_evidence(witnesses: Sequence[SpaceEvidence]) -> Location:
-    strongest, by_frame = witnesses[0], dict[str, float]()
-    for w in witnesses:
+def _location_of_evidence(ranked: Sequence[SpaceEvidence]) -> Location:
+    strongest, by_frame = ranked[0], dict[str, float]()
+    for w in ranked:
         by_frame.setdefault(w.frame, w.nats)
     fields: dict[str, Any] = {"next_best": {k: round(v, 1) for k, v in by_frame.items() if k != strongest.frame}}
     if strongest.frame == "place":
         stretches = [
             _ends(w.level)
-            for w in witnesses
+            for w in ranked
             if w.frame == "place" and strongest.nats - w.nats < THRESHOLDS.position_margin
         ]
         low, high = min(first for first, _ in stretches), max(last for _, last in stretches)

@@ -59,7 +59,7 @@ def fit_jointly(
     min_gain : float
         A step that gains less is the last. [nats]
     stall : float
-        The same for an expensive case, as a share of the cost per sample.
+        The same for a large case, as a share of the cost per sample.
     sought_cost : float
         The fit ends where it is if even a multiple of what a step promises leads to a higher cost.
 
@@ -79,7 +79,7 @@ def fit_jointly(
         return _fit_result(joint, point, [np.zeros((o.data.size, 0)) for o in joint.observations])
     jacobian = joint.jacobian(theta, predictions, reused_jacobian)
     if reused_jacobian is not None:
-        jacobian = joint.with_new_cheap_columns(theta, predictions, jacobian)
+        jacobian = joint.with_new_hammer_columns(theta, predictions, jacobian)
     refresh_steps = THRESHOLDS.n_refresh_steps if reused_jacobian is None else 0
     end = _iterate(joint, point, jacobian, refresh_steps, sought_cost)
     return _fit_result(joint, *with_probable_division(joint, *end))
@@ -93,12 +93,12 @@ def steps_from(
     iterations: int,
     sought_cost: float = np.inf,
 ) -> tuple[float, dict[str, float], np.ndarray]:
-    """End of a few steps of a joint fit to cheap observations, without the derivatives that a ``Fit`` needs.
+    """End of a few steps of a joint fit to hammer tests, without the derivatives that a ``Fit`` needs.
 
     Parameters
     ----------
     case : Case
-        Not an expensive one.
+        A small one.
     candidates : iterable of Candidate
         Effects in the model.
     start : (n_term,) array of float
@@ -144,10 +144,10 @@ def _iterate(
 ) -> tuple[FitPoint, list[np.ndarray]]:
     """Steps until nothing is gained.
 
-    The Jacobian of an expensive case is updated. It is recomputed after every ``refresh_steps`` steps (0: never) and
-    before the last one, since after many updates its directions are wrong.
+    The Jacobian of a large case is updated. It is recomputed after every ``refresh_steps`` steps (0: never)
+    and before the last one, since after many updates its directions are wrong.
     """
-    expensive = joint.case.expensive
+    is_large = joint.case.is_large
     min_decrease, n_since_refresh, damping = joint.min_decrease, 0, 0.0
     for iteration in range(joint.iterations):
         steps = DampedSteps(joint, point.theta, point.residuals, jacobian)
@@ -161,19 +161,19 @@ def _iterate(
             improvement, damping = steps.first_improvement(point.cost, damping)
         gain = point.cost - improvement.cost if improvement else 0.0
         if improvement:
-            if expensive:
+            if is_large:
                 jacobian = _updated_jacobian(joint, jacobian, point, improvement)
             point = improvement
         n_since_refresh += 1
         if (
             gain < min_decrease
             and not (improvement and damping >= THRESHOLDS.first_damping)
-            and (n_since_refresh == 1 or not (expensive and refresh_steps))
+            and (n_since_refresh == 1 or not (is_large and refresh_steps))
         ):
             break
         if iteration + 1 == joint.iterations:  # no step follows
             continue
-        if not expensive or 0 < refresh_steps <= n_since_refresh or (refresh_steps and gain < min_decrease):
+        if not is_large or 0 < refresh_steps <= n_since_refresh or (refresh_steps and gain < min_decrease):
             jacobian, n_since_refresh = _refreshed_jacobian(joint, point, jacobian), 0
     else:
         if refresh_steps and n_since_refresh:
@@ -184,23 +184,23 @@ def _iterate(
 def _updated_jacobian(
     joint: JointProblem, jacobian: list[np.ndarray], before: FitPoint, after: FitPoint
 ) -> list[np.ndarray]:
-    """The Jacobian after a step: updated for the expensive observations, new for the cheap ones."""
+    """The Jacobian after a step: updated for passages, new for hammer tests."""
     step, updated = after.theta - before.theta, list(jacobian)
-    chosen = [i for i, o in enumerate(joint.observations) if not joint.case.is_cheap(o)]
+    chosen = [i for i, o in enumerate(joint.observations) if not joint.case.is_hammer_test(o)]
     old, residuals_before, residuals_after = (
         [values[i] for i in chosen] for values in (jacobian, before.residuals, after.residuals)
     )
     for i, new in zip(chosen, broyden_update(old, step / joint.sd**2, step, residuals_before, residuals_after)):
         updated[i] = new
-    return joint.with_new_cheap_columns(after.theta, after.predictions, updated)
+    return joint.with_new_hammer_columns(after.theta, after.predictions, updated)
 
 
 def _refreshed_jacobian(joint: JointProblem, point: FitPoint, updated: list[np.ndarray]) -> list[np.ndarray]:
-    """A new Jacobian. In an expensive case the ``updated`` one if the simulation fails close to the point."""
+    """A new Jacobian. In a large case the ``updated`` one if the simulation fails close to the point."""
     try:
         return joint.jacobian(point.theta, point.predictions)
     except SimulationError:
-        if joint.case.expensive:
+        if joint.case.is_large:
             return updated
         raise
 

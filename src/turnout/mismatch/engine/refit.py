@@ -17,7 +17,7 @@ from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_o
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
 from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader, start_from_priors
-from turnout.mismatch.engine.single_witness import single_sensor, single_witness
+from turnout.mismatch.engine.single_source import single_sensor, single_source
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None
     fit : Fit
         Without the candidates.
     promising : collection of str or None
-        Families that are tried on the cheap observations on top of a first effect. None: all.
+        Families that are tried on the hammer tests on top of a first effect. None: all.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def score_candidates(search: Search, fit: Fit, promising: Collection[str] | None
     if continued is not None:  # the shortfall of the base fit is no evidence
         shortfall = max(0.0, continued.evidence - fit.evidence)
         ranked = [replace(s, gain=s.gain - shortfall) for s in ranked]
-    if search.case.expensive and ranked:
+    if search.case.is_large and ranked:
         ranked = correct_for_leader(search, fit, ranked)
     return tuple(_with_condition_gains(search, fit, s) for s in ranked), fit
 
@@ -85,7 +85,7 @@ def _rank_families(search: Search, fit: Fit, prescreened: Sequence[Entry]) -> li
         if score.family not in scores or score.gain > scores[score.family].gain:
             scores[score.family] = score
     ranked = sorted(scores.values(), key=lambda s: -s.gain)
-    return _refine_leaders(search, fit, ranked) if search.case.expensive and ranked else ranked
+    return _refine_leaders(search, fit, ranked) if search.case.is_large and ranked else ranked
 
 
 def _restart_unkept_promises(
@@ -99,10 +99,10 @@ def _restart_unkept_promises(
     threshold = search.settings.threshold
     gains = {s.family: s.gain for s in scores.values()}
     has_name = any(s.is_reportable and s.gain > threshold for s in scores.values())
-    if not search.case.expensive or fit.candidates or has_name:
+    if not search.case.is_large or fit.candidates or has_name:
         return []
-    unkept = [t for t in tasks if not t.rival and t.promise > threshold >= gains.get(t.candidate.family, -np.inf)]
-    restarted = [s for s in (start_from_priors(search, fit, task) for task in unkept) if s is not None]
+    without_gain = [t for t in tasks if not t.rival and t.promise > threshold >= gains.get(t.candidate.family, -np.inf)]
+    restarted = [s for s in (start_from_priors(search, fit, task) for task in without_gain) if s is not None]
     if not restarted:
         return []
     best, *others = sorted(restarted, key=lambda s: -s.gain)
@@ -110,14 +110,14 @@ def _restart_unkept_promises(
 
 
 def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score]:
-    """The scores of an expensive case, with leaders fitted to convergence and forms of one effect compared."""
+    """The scores of a large case, with leaders fitted to convergence and forms of one effect compared."""
     settings = search.settings
     ranked = _refit_equivalent_forms(search, fit, ranked)
-    material = [s for s in ranked if s.is_reportable][:2]
+    reportable = [s for s in ranked if s.is_reportable][:2]
     min_close_gain = (
-        min(material[0].gain - settings.margin, THRESHOLDS.min_held_share * material[0].gain) if material else 0.0
+        min(reportable[0].gain - settings.margin, THRESHOLDS.min_held_share * reportable[0].gain) if reportable else 0.0
     )
-    leaders = [s for s in material if s.gain > max(THRESHOLDS.min_leader_gain * settings.threshold, min_close_gain)]
+    leaders = [s for s in reportable if s.gain > max(THRESHOLDS.min_leader_gain * settings.threshold, min_close_gain)]
     polished = [at_best_position(search, fit, polish(search, fit, s)) for s in leaders]
     if polished and not fit.candidates:  # beside another effect the residual is also an error in its shape
         polished[0] = restart_leader(search, fit, polished[0])
@@ -128,9 +128,9 @@ def _base_from_leader(search: Search, fit: Fit, ranked: Sequence[Score]) -> Fit 
     """``fit`` computed again from the leader's nuisances, to convergence.
 
     If the leader is far above the threshold, the fit ends where it does not lead a threshold below ``fit``. None if
-    nobody leads, the case is not expensive, or the simulation fails.
+    nobody leads, the case is small, or the simulation fails.
     """
-    if not search.case.expensive or not ranked or ranked[0].gain <= search.settings.threshold:
+    if not search.case.is_large or not ranked or ranked[0].gain <= search.settings.threshold:
         return None
     leader, threshold = ranked[0], search.settings.threshold
     is_strong = leader.gain > THRESHOLDS.far_start_gain * threshold  # a small shortfall is none of its evidence
@@ -223,33 +223,33 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
     threshold, candidate, is_channel = search.settings.threshold, task.candidate, task.candidate.frame == "sensor"
     accepted = "+".join(c.key for c in fit.candidates)
     key = f"{search.label}:{accepted}:{candidate.key}:{tuple(np.round(task.start, 12))}"
-    is_far = is_channel and task.cheap_gain > THRESHOLDS.far_start_gain * threshold
+    is_far = is_channel and task.hammer_gain > THRESHOLDS.far_start_gain * threshold
     refit = search.stored_fit(key, lambda: _refit(search, fit, task, is_far), (*fit.candidates, candidate))
     if refit is None:
         return None
     score = score_of(search, fit, refit, candidate)
-    if not search.case.expensive:
+    if not search.case.is_large:
         return score
-    min_cheap_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
-    if score.gain < THRESHOLDS.min_held_share * task.cheap_gain and task.cheap_gain > min_cheap_gain:
+    min_hammer_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
+    if score.gain < THRESHOLDS.min_held_share * task.hammer_gain and task.hammer_gain > min_hammer_gain:
         return polish(search, fit, score)
     return score
 
 
 def _with_condition_gains(search: Search, fit: Fit, score: Score) -> Score:
-    """A leader of an expensive case with its gain condition by condition, each left out in turn."""
+    """A leader of a large case, with its gain condition by condition, each left out in turn."""
     case = search.case
-    if not case.expensive or not score.fit.jacobian:
+    if not case.is_large or not score.fit.jacobian:
         return score
     with_candidate, without_candidate = held_out_score(case, score.fit), held_out_score(case, fit)
     by_condition = {c: with_candidate[c] - without_candidate[c] for c in without_candidate}
-    witness = ""
+    source = ""
     if score.is_reportable:
-        witness = single_witness(search, score.fit, score.candidate, score.gain, by_condition)
-        witness = witness or single_sensor(search, fit, score)
+        source = single_source(search, score.fit, score.candidate, score.gain, by_condition)
+        source = source or single_sensor(search, fit, score)
     worst_gain, unmasked_gain = min(by_condition.values(), default=0.0), gain_where_unmasked(case, fit, by_condition)
     return replace(
-        score, worst_gain=worst_gain, by_condition=by_condition, single_witness=witness, unmasked_gain=unmasked_gain
+        score, worst_gain=worst_gain, by_condition=by_condition, single_source=source, unmasked_gain=unmasked_gain
     )
 
 
@@ -269,7 +269,7 @@ def _refit(search: Search, fit: Fit, task: RefitTask, is_far: bool) -> Fit | Non
         refit = search.fit(candidates, psi, values, jacobian, sought_cost=search.least_cost_of_interest(fit))
     except SimulationError:
         return None
-    return refit.without_jacobian() if case.expensive else refit
+    return refit.without_jacobian() if case.is_large else refit
 
 
 def _start_jacobian(
@@ -280,9 +280,9 @@ def _start_jacobian(
     values: dict[str, float],
     is_far: bool,
 ) -> list[np.ndarray] | None:
-    """Derivatives from which a refit of an expensive case starts: those of ``fit``, new ones if ``is_far``."""
-    if not case.expensive or not is_far:
-        return fit.jacobian if case.expensive else None
+    """Derivatives from which a refit of a large case starts: those of ``fit``, new ones if ``is_far``."""
+    if not case.is_large or not is_far:
+        return fit.jacobian if case.is_large else None
     joint = JointProblem(case, candidates)
     theta = np.concatenate([[values.get(n.name, n.mean) for n in case.nuisances], psi])
     return joint.jacobian(theta, joint.predict(theta))
@@ -291,7 +291,7 @@ def _start_jacobian(
 def _best_start(case: Case, candidates: tuple[Candidate, ...], psi: np.ndarray, values: dict[str, float]) -> np.ndarray:
     """``psi`` or the last candidate's own starts, whichever costs least.
 
-    The expensive observations decide what the cheap ones cannot see.
+    The passages decide what the hammer tests do not show.
     """
     candidate = candidates[-1]
     if candidate.refit.from_base and not candidate.refit.sign_ambiguous:

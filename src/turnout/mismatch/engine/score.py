@@ -21,8 +21,8 @@ class Score:
 
     ``gain`` in held-out log density over the base model, less the log of the number of sites [nats]. ``worst_gain``
     least gain of a condition. ``explained`` share of the excess. ``is_ordinary``: similar components of this case
-    differ by this size anyway, or the required observations do not support it. ``single_witness``: the one recording,
-    position of impacts or sensor on which it rests, in words (module ``single_witness``). ``unmasked_gain`` gain of
+    differ by this size anyway, or the required observations do not support it. ``single_source``: the one recording,
+    position of impacts or sensor on which it rests, in words (module ``single_source``). ``unmasked_gain`` gain of
     conditions in which no earlier effect shows.
     """
 
@@ -33,7 +33,7 @@ class Score:
     fit: Fit
     by_condition: dict[str, float] = field(default_factory=dict)
     is_ordinary: bool = False
-    single_witness: str = ""
+    single_source: str = ""
     unmasked_gain: float = 0.0
 
     @property

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def _report_nothing(n_done: int, total: int, key: str) -> None:
-    """Progress of which nobody is told."""
+    """Progress that is not reported."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Search:
         report: Callable[[int, int, str], Any] | None = None,
         store: MutableMapping[str, Any] | None = None,
     ) -> Search:
-        """A search with the default for each argument that is None. Fits of a cheap case have more steps.
+        """A search with the default for each argument that is None. Fits of a small case have more steps.
 
         Parameters
         ----------
@@ -76,8 +76,8 @@ class Search:
         Search
         """
         settings = settings or MismatchSettings()
-        if not case.expensive:
-            steps = THRESHOLDS.max_cheap_steps
+        if not case.is_large:
+            steps = THRESHOLDS.max_hammer_steps
             settings = replace(settings, base_iterations=steps, iterations=steps)
         return cls(case, settings, {} if store is None else store, report or _report_nothing)
 
@@ -128,7 +128,7 @@ class Search:
         reused_jacobian : list of (n, p) array of float or None
             Nuisance columns that are updated instead of recomputed.
         stall : float
-            Gain per sample that ends the fit of an expensive case.
+            Gain per sample that ends the fit of a large case.
         sought_cost : float
             The fit ends where its steps do not promise to reach it.
 
@@ -161,9 +161,9 @@ class Search:
         Returns
         -------
         float
-            Infinite for a cheap case, whose candidates are compared by held-out conditions.
+            Infinite for a small case, whose candidates are compared by held-out conditions.
         """
-        return fit.cost - self.settings.threshold if self.case.expensive else np.inf
+        return fit.cost - self.settings.threshold if self.case.is_large else np.inf
 
     def continue_fit(self, fit: Fit, stall: float = THRESHOLDS.stall) -> Fit:
         """The fit continued from where it is, with new derivatives.
@@ -172,7 +172,7 @@ class Search:
         ----------
         fit : Fit
         stall : float
-            Gain per sample that ends the fit of an expensive case.
+            Gain per sample that ends the fit of a large case.
 
         Returns
         -------

@@ -113,8 +113,8 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[Space
         for key, nats in _level_evidence(space, *products, floor[first_member.data_type]):
             by_law = by_level.setdefault(key, {})
             by_law.setdefault(space.law, {})[space.names[0]] = first_member.effective * nats
-    witnesses = [_combined_evidence(key, by_level) for key in by_level]
-    return sorted(witnesses, key=lambda w: -w.nats)
+    ranked = [_combined_evidence(key, by_level) for key in by_level]
+    return sorted(ranked, key=lambda w: -w.nats)
 
 
 def _combined_evidence(

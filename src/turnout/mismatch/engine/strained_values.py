@@ -1,7 +1,7 @@
 """Values of the base model that a fit has moved so far from their file that no tolerance explains it.
 
 The base model may absorb what it lacks by one value that all recordings share. The residual is then as small as in
-intact recordings, but the value has paid for it.
+intact recordings, but the value is then improbable.
 """
 
 from __future__ import annotations

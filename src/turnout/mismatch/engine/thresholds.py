@@ -86,9 +86,12 @@ class Thresholds:
     # Held-out conditions
     min_recordings: int = threshold(3, "recordings", "a jackknife over fewer has no meaning", "Efron and Stein 1981")
     min_energy_ratio: float = threshold(
-        0.5, "share", "of the effect's energy in the main witness; a recording with more must confirm the effect", FITS
+        0.5,
+        "share",
+        "of the effect's energy in the recording that gains most; a recording with more must confirm the effect",
+        FITS,
     )
-    min_witnesses: int = threshold(2, "recordings", "nuisances may absorb the gain of one", FITS)
+    min_confirming_recordings: int = threshold(2, "recordings", "nuisances may absorb the gain of one", FITS)
     max_masked_energy: float = threshold(
         0.01, "share of the largest energy", "an effect with less does not show in a recording: a tenth in amplitude",
         PAIRS,
@@ -141,10 +144,10 @@ class Thresholds:
     same_effect_distance: float = threshold(
         1.5, "m", "two sleeper bays: a second effect of the same family that is closer is an error in shape", PAIRS
     )
-    cheap_promise_share: float = threshold(
+    hammer_promise_share: float = threshold(
         0.5,
         "share of the promise",
-        "of a second effect that only cheap observations promise: others add to it",
+        "of a second effect that only hammer tests promise: others add to it",
         PAIRS,
     )
     min_promise_share: float = threshold(
@@ -169,10 +172,10 @@ class Thresholds:
         "numerical",
     )  # fmt: skip
 
-    # Prescreening by cheap observations
+    # Prescreening by hammer tests
     n_trial_steps: int = threshold(4, "steps", "of a trial fit", PRESCREEN)
     max_trial_starts: int = threshold(5, "starts", "of an effect of the whole track that are tried", PAIRS)
-    min_cheap_step_gain: float = threshold(0.5, "nats", "a step that gains less ends a fit", PRESCREEN)
+    min_hammer_step_gain: float = threshold(0.5, "nats", "a step that gains less ends a fit", PRESCREEN)
 
     # Refits
     max_rounds: int = threshold(
@@ -182,14 +185,14 @@ class Thresholds:
         (1.0, 0.75, 0.5), "shares", "of a leader's first two parameters: its response is nonlinear in both", FITS
     )
     min_held_share: float = threshold(
-        0.5, "share of the gain", "from cheap observations; a refit that gains less has not converged", FITS
+        0.5, "share of the gain", "from hammer tests; a refit that gains less has not converged", FITS
     )
     min_component_gain: float = threshold(
         0.5, "thresholds", "that an effect of a component must gain before its other effects are refitted", PARTS
     )
     min_leader_gain: float = threshold(0.5, "thresholds", "from which a leader is fitted to convergence", FITS)
     far_start_gain: float = threshold(
-        4.0, "thresholds", "promised by cheap observations; beyond, a start needs derivatives of its own", FITS
+        4.0, "thresholds", "promised by hammer tests; beyond, a start needs derivatives of its own", FITS
     )
     max_halvings: int = threshold(
         4, "halvings", "of a start that costs more than no effect; a sixteenth of it is linear", FITS
@@ -197,7 +200,9 @@ class Thresholds:
 
     # Joint fit
     n_steps: int = threshold(6, "steps", "of a joint fit, unless its caller sets more", "numerical")
-    max_cheap_steps: int = threshold(60, "steps", "of a fit to cheap observations alone: some valleys are long", FITS)
+    max_hammer_steps: int = threshold(
+        60, "steps", "of a fit to hammer tests or of a small case: some minima are long and narrow", FITS
+    )
     min_gain: float = threshold(0.05, "nats", "a smaller gain ends the iteration", "numerical")
     least_gain: float = threshold(
         1e-4, "nats", "the same where fits are compared whose residual is below the tolerated error", "numerical"
@@ -216,12 +221,12 @@ class Thresholds:
         1e-6, "1 / prior variance", "of a value in the data, below which its large values are not sought", "numerical"
     )
     stall: float = threshold(
-        5e-4, "of minus twice the log posterior per sample", "a fit of an expensive case that gains less ends", FITS
+        5e-4, "of minus twice the log posterior per sample", "a fit of a large case that gains less ends", FITS
     )
     fine_stall: float = threshold(
         1e-4, "of minus twice the log posterior per sample", "the same for fits on which the verdict rests", FITS
     )
-    n_refresh_steps: int = threshold(4, "steps", "after which the Jacobian of an expensive case is recomputed", FITS)
+    n_refresh_steps: int = threshold(4, "steps", "after which the Jacobian of a large case is recomputed", FITS)
     max_term_step: float = threshold(
         0.35, "share of the bounds", "largest step of a parameter of an effect", "numerical"
     )
@@ -254,7 +259,7 @@ class Thresholds:
     damping_increase: float = threshold(6.0, "-", "factor on the damping after a failed step", "Marquardt 1963")
     damping_decrease: float = threshold(0.2, "-", "factor on the damping after an accepted step", "Marquardt 1963")
     min_kept_promise: float = threshold(
-        0.25, "share of the promise", "of a step of a cheap case; after one that gains less the next is smaller",
+        0.25, "share of the promise", "of a step of a small case; after one that gains less the next is smaller",
         "Marquardt 1963",
     )  # fmt: skip
     hold_damping: float = threshold(1e12, "times the diagonal", "the parameter does not move", "numerical")

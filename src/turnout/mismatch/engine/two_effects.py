@@ -248,7 +248,7 @@ class PairEvidence(_EvidenceBesideFirst):
 
     @cached_property
     def first_is_redundant(self) -> bool:
-        """Whether the first of a pair deserves no name beside the second: it had absorbed the second effect."""
+        """Whether the first of a pair gets no name beside the second: it had absorbed the second effect."""
         if not self.is_pair or self.converged_second is None:
             return False
         gain = _evidence_gain(self.findings.fit, self.converged_second, self.first.scores[0].candidate)

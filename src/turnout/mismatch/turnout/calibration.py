@@ -34,7 +34,7 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     """Parameters of a case that all visits share, with names that do not depend on the case.
 
     Components are numbered and named by their position in the whole track, since a case holds only the part of the
-    track that its sensors hear.
+    track that its sensors record.
 
     Parameters
     ----------

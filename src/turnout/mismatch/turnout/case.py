@@ -53,7 +53,7 @@ class TrackCase(PredictedCase):
     accepted : iterable of AcceptedEffect
         Effects of the track's file. Every prediction contains them, and their parameters are nuisances.
     cache : callable
-        Makes the cache around the predictor of this case, and around those of its cheap cases.
+        Makes the cache around the predictor of this case, and around that of its hammer tests.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class TrackCase(PredictedCase):
         No recording can be used, or all of them are reserved.
     """
 
-    expensive = True
+    is_large = True
 
     def __init__(
         self,
@@ -142,14 +142,14 @@ class TrackCase(PredictedCase):
         """``AlignedPassage`` of each passage that is fitted; reserved passages may not suggest a candidate."""
         return [self.aligned_passages[o.name] for o in self.observations if o.name in self.aligned_passages]
 
-    def cheap_case(self) -> HammerCase | None:
+    def hammer_case(self) -> HammerCase | None:
         """Case of the hammer tests alone; None without hammer tests."""
         if not any(o.name in self.frf_pairs for o in self.observations):
             return None
         return hammer_case(self.data, self.predictor, self.all_candidates, self.accepted, self.cache)
 
-    def is_cheap(self, observation: Observation) -> bool:
-        """Hammer tests are cheap to predict; passages have to be simulated.
+    def is_hammer_test(self, observation: Observation) -> bool:
+        """Whether an observation is a receptance of a hammer test; passages have to be simulated.
 
         Parameters
         ----------
@@ -194,9 +194,8 @@ class TrackCase(PredictedCase):
     def with_updated_errors(self, fit: Fit) -> TrackCase:
         """The case with the rail under the passages and the roughness errors of the wheels as ``fit`` has them.
 
-        Returns the case itself where all changes are within ``CASE.update_threshold``. The rail was first
-        fitted to the
-        hammer tests alone, where it may have absorbed part of the effect that ``fit`` explains now.
+        Returns the case itself where all changes are within ``CASE.update_threshold``. The rail was first fitted to
+        the hammer tests alone, where it may have absorbed part of the effect that ``fit`` explains now.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Hammer tests of a turnout as a case of their own, which is cheap to predict."""
+"""Hammer tests of a turnout as a case of their own, which needs no simulation."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 class HammerCase(PredictedCase):
-    """The hammer tests of a site alone: cheap, with exact derivatives."""
+    """The hammer tests of a site alone, with exact derivatives."""
 
     def with_broad_errors(self) -> HammerCase:
         """The same case with one broad, independent error for every line.
 
-        Smoothly varying errors would excuse a resonance at the wrong frequency.
+        Smoothly varying errors would tolerate a resonance at the wrong frequency.
         """
         broad = copy(self)
         broad.observations = tuple(
@@ -44,7 +44,7 @@ class HammerCase(PredictedCase):
         in which neighbouring pads share out what they explain together in another way. So fits begin at draws of the
         priors as well: ``RECEPTANCE.n_drawn_starts``, always the same.
         """
-        steps = THRESHOLDS.max_cheap_steps
+        steps = THRESHOLDS.max_hammer_steps
         rough_fit = fit_jointly(self.with_broad_errors(), iterations=steps)
         fits = [fit_jointly(self, values=rough_fit.values, iterations=steps)]
         for start in self._drawn_starts():

@@ -1,4 +1,4 @@
-"""The fit of a visit from several positions of the noses: where trains meet a nose, a fit has more than one valley."""
+"""The fit of a visit from several positions of the noses: where trains meet a nose, a fit has more than one minimum."""
 
 from __future__ import annotations
 

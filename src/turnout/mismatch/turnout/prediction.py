@@ -133,19 +133,19 @@ class Predictor(ReceptancePredictor, PassagePredictor, Predictions):
         return sensitivity.nuisance_jacobian(self, nuisances, values, terms, observations, base)
 
 
-# (predictor, whether a prediction is cheap) -> a cache around the predictor, or the predictor itself
+# (predictor, whether it predicts hammer tests alone) -> a cache around the predictor, or the predictor itself
 PredictionCache: TypeAlias = Callable[[Predictor, bool], Predictions]
 
 
-def no_cache(predictor: Predictor, is_cheap: bool) -> Predictions:
+def no_cache(predictor: Predictor, is_hammer_only: bool) -> Predictions:
     """The predictor itself.
 
     Parameters
     ----------
     predictor : Predictor
         Predicts the recordings of the site.
-    is_cheap : bool
-        Whether a prediction is cheap.
+    is_hammer_only : bool
+        Whether it predicts hammer tests alone, which takes no simulation.
 
     Returns
     -------

@@ -4,7 +4,7 @@ In a passage the force at a position x is free in time: all sensors respond by t
 tests a linear change at x adds :math:`q(f)\,H_{bx}(f)\,H_{xs}(f)`, by reciprocity, with one free q(f) for all impacts b
 and sensors s. This holds for a change of a support, a mass or a loose fastening alike. A change that is not linear has
 another :math:`q_b(f)` for each impact. Neighbouring supports may change together. Sensors on the changed sleeper itself
-are an exception: they feel the changed link as well.
+are an exception: the changed link acts on them directly as well.
 """
 
 from __future__ import annotations

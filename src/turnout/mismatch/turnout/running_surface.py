@@ -54,14 +54,14 @@ class SurfaceParameter:
         if self.field in POSITION_FIELDS:
             sd = self.spread * abs(getattr(self.component, self.field))
             length = abs(_field_values(self.component, LENGTH_FIELDS)[0])
-            trust = min(SURFACE.max_step_sd, SURFACE.max_relative_step * length / sd)
+            max_step = min(SURFACE.max_step_sd, SURFACE.max_relative_step * length / sd)
             return Nuisance(
                 self.name,
                 "m",
                 0.0,
                 sd,
                 meaning=f"{description} less its file's",
-                max_step_sd=trust,
+                max_step_sd=max_step,
                 can_mask=False,
                 group="surface",
             )

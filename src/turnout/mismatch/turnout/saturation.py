@@ -241,10 +241,10 @@ def _dwell_limit(sizes: Sequence[np.ndarray]) -> float | None:
     None where that passage is not among the loudest. A clipped channel stays at its limit; a flat or a nose gives
     single peaks.
     """
-    dwelling = max(sizes, key=lambda x: (np.mean(x > SATURATION.top_share * x.max()), x.max()))
-    if dwelling.max() < SATURATION.top_share * max(x.max() for x in sizes):
+    sizes_at_limit = max(sizes, key=lambda x: (np.mean(x > SATURATION.top_share * x.max()), x.max()))
+    if sizes_at_limit.max() < SATURATION.top_share * max(x.max() for x in sizes):
         return None
-    return float(np.median(dwelling[dwelling > SATURATION.top_share * dwelling.max()]))
+    return float(np.median(sizes_at_limit[sizes_at_limit > SATURATION.top_share * sizes_at_limit.max()]))
 
 
 def without_saturated(campaign: CampaignInput, saturated: Container[str]) -> CampaignInput:

@@ -11,7 +11,7 @@ with open_alarms as (
     where closed_at_utc is null
     group by all
 ),
-spoken as (
+acknowledged_charts as (
     select
         s.turnout_id, s.section_id, s.band, s.source, o.raised_at_utc,
         max_by(k.by_whom || ': ' || k.reason, k.at_utc) filter (
@@ -47,7 +47,7 @@ select
     s.last_measured_at_utc, s.n_campaigns, s.changed_component, s.ballast_stiffness_pct, s.ballast_stiffness_low_pct,
     s.ballast_stiffness_high_pct, s.pad_stiffness_pct, s.pad_stiffness_low_pct, s.pad_stiffness_high_pct
 from chart_status_on("asof") s
-join spoken p using (turnout_id, section_id, band, source)
+join acknowledged_charts p using (turnout_id, section_id, band, source)
 where in_service(s.turnout_id) and not has_left(s.section_id);
 
 -- One row per chart: its state at the newest measurement, in the words of the worklist.

@@ -33,7 +33,7 @@ raised as (
     from recent
     group by turnout_id, section_id, band, source
 ),
-spoken as (
+acknowledged_alarms as (
     select
         r.*,
         (
@@ -67,7 +67,7 @@ alarmed as (
         coalesce(told and d.is_coupled, false) as follows_other,
         case when r.acknowledged is null and not is_small and not follows_other then 'inspect this week' else 'plan' end as state,
         null::varchar as why
-    from spoken r
+    from acknowledged_alarms r
     left join chart_states_on("asof") s using (turnout_id, section_id, band, source)
     left join chart_status_on("asof") d using (turnout_id, section_id, band, source)
     left join chart_status c using (turnout_id, section_id, band, source)

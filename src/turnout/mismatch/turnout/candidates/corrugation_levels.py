@@ -149,16 +149,16 @@ def band_power(case: TrackCase, aligned: AlignedPassage, wavelengths: np.ndarray
         frequency,
         aligned.speed / wavelengths[:, None] * np.exp([-0.5 * CORRUGATION.bin_width, 0.5 * CORRUGATION.bin_width]),
     )
-    alive = np.any(samples != samples[:, :1], axis=1)
-    power = power[alive]
+    has_signal = np.any(samples != samples[:, :1], axis=1)
+    power = power[has_signal]
     total = np.column_stack([power[:, a : max(b, a + 1)].mean(axis=1) for a, b in edges])
     level = np.log(total)
     number = np.arange(wavelengths.size) / CORRUGATION.overlap  # in widths of a bin
     distance = np.abs(np.subtract.outer(number, number))
     near = (distance >= CORRUGATION.background_gap) & (distance <= CORRUGATION.background_reach)
     usual = np.exp(np.column_stack([np.median(level[:, row], axis=1) for row in near]))
-    positions = np.array([s.place for s in aligned.sensors])[alive]
-    return BandPower(aligned.name, aligned.passage.train, aligned.speed, total, usual, alive, positions)
+    positions = np.array([s.place for s in aligned.sensors])[has_signal]
+    return BandPower(aligned.name, aligned.passage.train, aligned.speed, total, usual, has_signal, positions)
 
 
 def passage_groups(passages: Sequence[BandPower]) -> list[list[BandPower]]:

@@ -7,7 +7,7 @@ the right one gains, tens of nats. With s and S the slope and size of sine and c
 .. math:: L(\varphi, \lambda) = \tfrac12 \frac{(A/e^2 + s^T u)^2}{e^{-2} + u^T S u} - \tfrac12 \frac{A^2}{e^2}
           - \tfrac12 \ln(1 + e^2 u^T S u)
 
-The best phase is the start of the joint fit, and its price is
+The best phase is the start of the joint fit, and its penalty is
 
 .. math:: \max_\varphi F - \ln \overline{e^F}, \quad F(\varphi) = \ln \int p(\lambda) e^{L} d\lambda
 
@@ -37,7 +37,7 @@ class WaveInBand:
 
     ``start`` [m] is the position at which its sine begins, ``amplitude`` [m] and ``wavelength`` [m] its size there.
     ``gain`` [nats] is that in the fitted band, ``evidence`` [nats] the mean over all phases, wavelengths and
-    amplitudes, and ``price`` [nats] that of the search for the phase. ``nuisances`` are the amplitudes of the free
+    amplitudes, and ``penalty`` [nats] that of the search for the phase. ``nuisances`` are the amplitudes of the free
     waves beside it.
     """
 
@@ -46,7 +46,7 @@ class WaveInBand:
     wavelength: float
     gain: float
     evidence: float
-    price: float
+    penalty: float
     nuisances: Mapping[str, float]
 
 

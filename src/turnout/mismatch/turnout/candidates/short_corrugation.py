@@ -211,14 +211,14 @@ def _candidate(
 def _in_phase(
     hypothesis: Hypothesis, scan: RailScan, stretch: tuple[float, float], priors: Mapping[str, tuple[float, float]]
 ) -> Hypothesis:
-    """The hypothesis with the phase that the free waves show; the search for it has its price."""
+    """The hypothesis with the phase that the free waves show; the search for it has its penalty."""
     wave = wave_in_band(scan, stretch, priors["wavelength"], priors["sine"])
     assert hypothesis.promise is not None
     return replace(
         hypothesis,
         starts=((wave.amplitude, wave.wavelength),),
         fixed={**hypothesis.fixed, "start": wave.start},
-        n_scanned=hypothesis.n_scanned * float(np.exp(wave.price)),
+        n_scanned=hypothesis.n_scanned * float(np.exp(wave.penalty)),
         promise=hypothesis.promise + wave.gain,
         start_nuisances=wave.nuisances,
     )

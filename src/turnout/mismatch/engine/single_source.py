@@ -1,4 +1,4 @@
-"""Single witnesses: the one recording, position of impacts or sensor without which a name has no support."""
+"""Single sources: the one recording, position of impacts or sensor without which a name has no support."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 REPETITION = "the repetition of impacts at the same positions"
 
 
-def single_witness(
+def single_source(
     search: Search, fit: Fit, candidate: Candidate, gain: float, by_condition: Mapping[str, float]
 ) -> str:
     """The condition whose gain alone supports a name while the gain of all others together does not.
@@ -32,10 +32,10 @@ def single_witness(
     at least two others show the effect with half its energy. Two are needed, since nuisances may absorb the gain of
     one. Trains are exempt: speed and roughness differ at each passage.
 
-    Impacts at one position are one witness, however often they are repeated. They share the fittings, the twist of the
+    Impacts at one position are one source, however often they are repeated. They share the fittings, the twist of the
     rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
-    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the witness.
-    Passages share none of these faults: if they are enough for a name without any impact, they are a second witness.
+    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the source.
+    Passages share none of these faults: if they are enough for a name without any impact, they are a second source.
     What other impacts lose by the name is a question of its own (``is_contradicted``).
 
     The error of a receptance is that of the model, so it is the same at each visit. Tests that repeat impacts at one
@@ -66,7 +66,11 @@ def single_witness(
         return ""
     energies = effect_energy(case, fit, candidate)
     min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
-    return strongest if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_witnesses else ""
+    return (
+        strongest
+        if sum(energy >= min_energy for energy in energies.values()) >= THRESHOLDS.min_confirming_recordings
+        else ""
+    )
 
 
 def impact_repetitions(hammer_positions: Mapping[str, float]) -> dict[str, int]:
@@ -105,7 +109,7 @@ def _single_hammer_position(
     """Position, in words, whose impacts alone support half of a name or more, while all others do not.
 
     "" if there is none, or if recordings without impacts support the name. Half of a name is enough to confirm one:
-    the price of a name is that of a search among many effects, and others need to confirm only the one that was found.
+    the threshold of a name is for a search among many effects, and others need to confirm only the one that was found.
     """
     gains: dict[float, float] = {}
     for condition, condition_gain in by_condition.items():
@@ -130,7 +134,7 @@ def single_sensor(search: Search, without: Fit, score: Score) -> str:
     What only one channel shows belongs to this channel. A real effect gains where its change has energy. The test is
     made if the change has half as much energy in all other channels together as in that one. They confirm a name with
     half of the evidence that it needs, as other positions confirm that of impacts at one position. No sensor shows the
-    prior penalty that nuisances pay to imitate an effect: if that is most of the gain, no sensor is the witness.
+    prior penalty that nuisances pay to imitate an effect: if that is most of the gain, no sensor is the only source.
 
     Parameters
     ----------
