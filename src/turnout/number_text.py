@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 LARGEST_ODDS = 1_000_000  # to 1: beyond, the number tells nobody anything
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number_text(value: float) -> str:
@@ -40,8 +40,32 @@ def number_text(value: float) -> str:
         return f"{value:,.0f}"
     if -6 <= exponent < 0:
         return f"{value:.{5 - exponent}f}".rstrip("0")
-    mantissa = f"{value / 10.0**exponent:g}"
-    power = "10" + str(exponent).translate(SUPERSCRIPTS)
+    return power_of_ten_text(value)
+
+
+def power_of_ten_text(value: float, n_digits: int = 6) -> str:
+    """A number as a multiple of a power of ten.
+
+    Parameters
+    ----------
+    value : float
+        Finite and not 0.
+    n_digits : int
+        Largest number of significant digits.
+
+    Returns
+    -------
+    str
+        Its text; the power alone where the multiple is one.
+
+    Examples
+    --------
+    >>> power_of_ten_text(1.5e-5), power_of_ten_text(-1e9), power_of_ten_text(9.9996e5, n_digits=3)
+    ('1.5·10⁻⁵', '-10⁹', '10⁶')
+    """
+    mantissa, _, exponent = f"{value:.{n_digits - 1}e}".partition("e")
+    power = "10" + str(int(exponent)).translate(_SUPERSCRIPTS)
+    mantissa = f"{float(mantissa):.{n_digits}g}"
     return {"1": power, "-1": f"-{power}"}.get(mantissa, f"{mantissa}·{power}")
 
 

@@ -3,6 +3,8 @@
 Forces and moments of the rail are taken at whole time steps, velocities at half steps (Yee 1966, for a Timoshenko
 beam). Every support, contact and body is explicit. At 1/60000 s the stiffest, a wheel on 12 kg of rail, advances by
 0.2 rad a step. Damping forces use the velocity half a step earlier.
+
+All compiled parts are in this file: numba compiles ``march`` again only if the file that contains it has changed.
 """
 
 from __future__ import annotations
@@ -170,6 +172,18 @@ def _attached_mass_step(
 
 
 @compile_part()
+def _fill_stencil(stencil: np.ndarray, coordinate: float) -> int:
+    """Weights of a cubic B-spline at a position between nodes; returns the node below it, the second of the four."""
+    k = int(np.floor(coordinate))
+    s = coordinate - k
+    stencil[0] = (1.0 - s) ** 3 / 6.0
+    stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
+    stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
+    stencil[3] = s**3 / 6.0
+    return k
+
+
+@compile_part()
 def _path_height(wheels: Wheels, path: np.ndarray, i: int, x: float) -> float:
     coordinate = (x - wheels.path_start) / wheels.path_step
     k = int(np.floor(coordinate))
@@ -234,7 +248,6 @@ def _wheel_forces(
     motion: WheelMotion,
     grid_start: float,
     h: float,
-    n: int,
     t: float,
     w: np.ndarray,
     f: np.ndarray,
@@ -249,13 +262,7 @@ def _wheel_forces(
         if share == 0.0:
             contact[i] = hertz_force(wheels.stiffness[i], wheels.local, z[i] + static_approach, contact[i])
             continue
-        coordinate = (x - grid_start) / h
-        k = int(np.floor(coordinate))
-        s = coordinate - k
-        stencil[0] = (1.0 - s) ** 3 / 6.0
-        stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
-        stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
-        stencil[3] = s**3 / 6.0
+        k = _fill_stencil(stencil, (x - grid_start) / h)
         height = _interpolate(w, k - 1, stencil) + _path_height(wheels, wheels.path, i, x)
         contact[i] = hertz_force(wheels.stiffness[i], wheels.local, z[i] - share * height + static_approach, contact[i])
         _add_force(f, k - 1, stencil, share * contact[i])
@@ -344,13 +351,7 @@ def _wheel_forces_of_two_rails(
         if share == 0.0:
             contact[i] = hertz_force(wheels.stiffness[i], wheels.local, approach, contact[i])
             continue
-        coordinate = (x - grid_start) / h
-        k = int(np.floor(coordinate))
-        s = coordinate - k
-        stencil[0] = (1.0 - s) ** 3 / 6.0
-        stencil[1] = (3.0 * s**3 - 6.0 * s**2 + 4.0) / 6.0
-        stencil[2] = (-3.0 * s**3 + 3.0 * s**2 + 3.0 * s + 1.0) / 6.0
-        stencil[3] = s**3 / 6.0
+        k = _fill_stencil(stencil, (x - grid_start) / h)
         contact[i] = 0.0
         for line in range(2):
             on_line = x < blade.change_end if line == 0 else x > blade.change_start + 4.0 * h
@@ -498,7 +499,7 @@ def march(
                     wheels, motion, blade, grid_start, beam.step, t, w, f, w2, f2, z, contact, contact2, stencil
                 )
             else:
-                _wheel_forces(wheels, motion, grid_start, beam.step, n, t, w, f, z, contact, stencil)
+                _wheel_forces(wheels, motion, grid_start, beam.step, t, w, f, z, contact, stencil)
             _car_step(cars, wheels, dt, z, zv, b, bv, contact)
             if step % every == 0:
                 wheel_forces[step // every] = contact

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 from dataclasses import dataclass
 from os import PathLike
@@ -12,7 +11,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.rate_units import hertz_of, rate_unit
-from turnout.readers.source import Source, load
+from turnout.readers.source import GZIP_HEAD, Source, load
 from turnout.readers.stated_units import is_meaningless, known_unit
 from turnout.readers.uff import FREQUENCY_RESPONSE, TIME_RESPONSE, read_frf
 from turnout.readers.uff_datasets import read_datasets
@@ -74,7 +73,7 @@ def find_responses(path: PathLike | str, root: PathLike | str) -> FrequencyRespo
 
 def _find(source: Source, path: PathLike | str, root: PathLike | str) -> FrequencyResponses | None:
     head = source.head
-    if head.lstrip()[:2] == b"-1" or head[:2] == b"\x1f\x8b":
+    if head.lstrip()[:2] == b"-1" or head.startswith(GZIP_HEAD):
         return _of_uff(source, path, root)
     if head[:4] == b"PK\x03\x04" and source.path.suffix.lower() == ".npz":
         return _of_npz(source)
@@ -84,11 +83,9 @@ def _find(source: Source, path: PathLike | str, root: PathLike | str) -> Frequen
 
 
 def _of_uff(source: Source, path: PathLike | str, root: PathLike | str) -> FrequencyResponses | None:
-    data = source.data
-    if data[:2] == b"\x1f\x8b":
-        with source.parsed_by("gzip"):
-            data = gzip.decompress(data)
-    types = {s.func_type for s in read_datasets(data) if s.dataset_type in ("58", "58b") and not s.damage}
+    types = {
+        s.func_type for s in read_datasets(source.unpacked_data()) if s.dataset_type in ("58", "58b") and not s.damage
+    }
     if FREQUENCY_RESPONSE not in types or TIME_RESPONSE in types:
         return None
     found = read_frf(path, root)

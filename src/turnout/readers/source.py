@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import math
 import mmap
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from turnout.readers.entries import Entry, UnreadObject
     from turnout.readers.lazy import LazyColumn
 
+GZIP_HEAD = b"\x1f\x8b"  # first bytes of a gzipped file
 COPY_AGAIN = "Copy the file again from the logger"
 SYSTEM_ERROR = re.compile(r"errno = (\d{1,9})\b")
 BLOCK_SIZE = 2**18  # samples of each channel that are read or checked at a time: long records need little memory
@@ -94,6 +96,23 @@ class Source:
     def data(self) -> bytes:
         """All bytes of the file."""
         return self.path.read_bytes()
+
+    def unpacked_data(self) -> bytes:
+        """All bytes of the file; of a gzipped one those that it contains.
+
+        Returns
+        -------
+        bytes
+
+        Raises
+        ------
+        ReadError
+            If a gzipped file is damaged.
+        """
+        if not self.data.startswith(GZIP_HEAD):
+            return self.data
+        with self.parsed_by("gzip"):
+            return gzip.decompress(self.data)
 
     @cached_property
     def memory_map(self) -> mmap.mmap:

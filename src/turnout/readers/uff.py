@@ -1,6 +1,5 @@
 """Reader of Universal File Format 58 and 58b: time responses as records, frequency responses with ``read_frf``."""
 
-import gzip
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -337,10 +336,7 @@ def read_frf(path: PathLike | str, root: PathLike | str = ".") -> FrequencyRespo
         If there is no frequency response, one is damaged, or their frequencies differ.
     """
     source = load(path, root)
-    data = source.data
-    if data[:2] == b"\x1f\x8b":
-        with source.parsed_by("gzip"):
-            data = gzip.decompress(data)
+    data = source.unpacked_data()
     all_sets = read_datasets(data)
     stated_units = file_units(data, all_sets)
     functions = [s for s in all_sets if s.dataset_type in ("58", "58b")]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.number_text import SUPERSCRIPTS
+from turnout.number_text import power_of_ten_text
 from turnout.report.formatting import escape
 
 if TYPE_CHECKING:
@@ -139,6 +139,8 @@ def format_number(value: float, step: float | None = None) -> str:
     ('0.2', '1500', '10⁻⁹', '0')
     >>> format_number(-1.5e-4), format_number(1.5e-5), format_number(2e4), format_number(2e5)
     ('-0.00015', '1.5·10⁻⁵', '20000', '2·10⁵')
+    >>> format_number(999_990.0, step=1e6), format_number(-1e5)
+    ('10⁶', '-10⁵')
     >>> format_number(530.00002, step=1e-5)
     '530.00002'
     """
@@ -148,9 +150,7 @@ def format_number(value: float, step: float | None = None) -> str:
     n_digits = exponent - math.floor(math.log10(step) + 1e-12) + 1 if step else 0
     if -4 <= exponent <= 4:
         return f"{value:.{max(6, n_digits)}g}"
-    mantissa = value / 10.0**exponent
-    power = "10" + str(exponent).translate(SUPERSCRIPTS)
-    return power if abs(mantissa - 1) < 1e-9 and n_digits <= 3 else f"{mantissa:.{max(3, n_digits)}g}·{power}"
+    return power_of_ten_text(value, max(3, n_digits))
 
 
 def format_day(seconds: float) -> str:

@@ -91,10 +91,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     SimulationError
         A file is there already or cannot be written.
     """
-    request = with_format(request)
-    check_request(request)
-    turnout, settings = _turnout(request)
-    track = _track(request, turnout)
+    request, turnout, settings, track = _prepare(request)
     section = _label_or_position(request["section"])
     position, base = resolve_location(track, section)
     route = track.locations[section][1] if isinstance(section, str) and section in track.locations else "main"
@@ -150,10 +147,7 @@ def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     SimulationError
         The file is there already or cannot be written.
     """
-    request = with_format(request)
-    check_request(request)
-    turnout, settings = _turnout(request)
-    track = _track(request, turnout)
+    request, turnout, settings, track = _prepare(request)
     vehicle = load_vehicle(request["vehicle"], request["load"], units=request["units"])
     description = turnout.passages.description if turnout is not None and turnout.passages else None
     sensors = _passage_sensors(description, track)
@@ -186,6 +180,16 @@ def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     _write_truth(request, path, track, request["route"], recording, forces)
     peak = truth.force.max()
     yield path, f"{len(vehicle.wheels)} axles, {recording.duration:.2f} s, highest wheel force {peak / 1e3:.0f} kN"
+
+
+def _prepare(
+    request: Mapping[str, Any],
+) -> tuple[Mapping[str, Any], TurnoutConfig | None, SimulateSettings, TurnoutTrack]:
+    """The checked request with its file format, its turnout, the settings and the track."""
+    request = with_format(request)
+    check_request(request)
+    turnout, settings = _turnout(request)
+    return request, turnout, settings, _track(request, turnout)
 
 
 def _turnout(request: Mapping[str, Any]) -> tuple[TurnoutConfig | None, SimulateSettings]:

@@ -4,23 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.blade_turnout import with_blade
 
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.simulate.blade import Blade
-from turnout.simulate.wheel_path import BladeTop, StockFall
 
 
 @pytest.fixture(scope="module")
 def case():
     plan = small_plan((15.0,), hammer_positions=(24.0,))
-    track = plan.turnout.track
-    turnout = replace(
-        plan.turnout,
-        track=track.with_(blade=Blade(20.1, 25.2, 32.0, track.rail, 3e8, 3e4)),
-        routes={"main": ((StockFall(21.6, 3.0, 0.02),), (BladeTop(20.1, 3.0, 0.015),))},
-    )
+    turnout = with_blade(plan.turnout)
     campaign = replace(measured_campaign(plan, (), 3), turnout=turnout, passages=())
     return TrackCase(campaign, families=("slide_chair_gap", "heel_support"))
 

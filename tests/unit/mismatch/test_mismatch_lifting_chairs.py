@@ -4,26 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.blade_turnout import with_blade
 
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.lifting_chairs import lifting_chairs, with_lifting_error
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.receptance_observation import local_rms
 from turnout.physics.slide_chair_gap import SlideChairGap
-from turnout.simulate.blade import Blade
-from turnout.simulate.wheel_path import BladeTop, StockFall
 
 
 @pytest.fixture(scope="module")
 def case():
     """Three impacts amid the blade, on a track that is exactly as filed, simulated with chairs that press only."""
     plan = small_plan((15.0,), passages=False, hammer_positions=(23.4,))
-    track = plan.turnout.track
-    turnout = replace(
-        plan.turnout,
-        track=track.with_(blade=Blade(20.1, 25.2, 32.0, track.rail, 3e8, 3e4)),
-        routes={"main": ((StockFall(21.6, 3.0, 0.02),), (BladeTop(20.1, 3.0, 0.015),))},
-    )
+    turnout = with_blade(plan.turnout)
     return TrackCase(measured_campaign(replace(plan, turnout=turnout, n_impacts=3), (), 3))
 
 

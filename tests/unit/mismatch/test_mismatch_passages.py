@@ -243,14 +243,23 @@ def test_all_lags_at_once_are_as_good_as_one_by_one(without_worst):
     assert found == pytest.approx(max(by_hand), abs=1e-9) and found[1:] == pytest.approx((37, 0.005))
 
 
+@pytest.fixture(scope="module")
+def heavy_passage(intact):
+    """Case, a passage of a heavy train, its sensors, and the simulated signals of this and of a light train."""
+    case, values = intact
+    sensors = case.aligned_passages["heavy 2"].sensors
+    passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
+    simulator = case.predictor.passage_simulator(values, (), passage)
+    vehicles = (passage.vehicle, case.aligned_passages["light 2"].passage.vehicle)
+    signals, light = (simulator(passage, vehicle, passage.speed, sensors) for vehicle in vehicles)
+    return case, passage, sensors, signals, light
+
+
 @pytest.mark.parametrize("wrong", [0, 1])
-def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(intact, wrong):
+def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(heavy_passage, wrong):
     """Its sign reversed, four sensors are alike by (3 - 1) / 4 at most; three of them as before. Two reversed, or the
     wrong train, stay below what is asked for."""
-    case, values = intact
-    passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
-    sensors = case.aligned_passages["heavy 2"].sensors
-    signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    case, passage, sensors, signals, light = heavy_passage
     reference, speed, _ = align(passage, low_pass(passage.recording, sensors), signals, case.predictor.solver.rate)
     rows = [passage.recording.index(s.name) for s in sensors]
 
@@ -266,22 +275,16 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     )  # two steps of the search
     assert found[1] == pytest.approx(speed, rel=0.003)
     assert reversed_(wrong, wrong + 2)[2] < ALIGNMENT.min_correlation
-    light = case.predictor.passage_simulator(values, (), passage)(
-        passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
-    )
     assert (
         align(passage, low_pass(passage.recording, sensors), light, case.predictor.solver.rate)[2]
         < ALIGNMENT.min_correlation
     )
 
 
-def test_impacts_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(intact):
+def test_impacts_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(heavy_passage):
     """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: what was recorded is hardly like
     itself with them, and of a wrong train they make none."""
-    case, values = intact
-    passage = next(p for p in case.campaign.passages if p.name == "heavy 2")
-    sensors = case.aligned_passages["heavy 2"].sensors
-    signals = case.predictor.passage_simulator(values, (), passage)(passage, passage.vehicle, passage.speed, sensors)
+    case, passage, sensors, signals, light = heavy_passage
     quiet = low_pass(passage.recording, sensors)
     reference = align(passage, quiet, signals, case.predictor.solver.rate)[0]
     time = np.arange(quiet.shape[1]) / 800.0
@@ -290,9 +293,6 @@ def test_impacts_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(
     alike = np.sum(quiet * with_impacts, axis=1) / np.linalg.norm(quiet, axis=1) / np.linalg.norm(with_impacts, axis=1)
     assert np.max(np.abs(alike)) < 0.7 * ALIGNMENT.min_correlation
     assert align(passage, with_impacts, signals, case.predictor.solver.rate)[2] > ALIGNMENT.min_correlation
-    light = case.predictor.passage_simulator(values, (), passage)(
-        passage, case.aligned_passages["light 2"].passage.vehicle, passage.speed, sensors
-    )
     assert align(passage, with_impacts, light, case.predictor.solver.rate)[2] < ALIGNMENT.min_correlation
 
 

@@ -5,28 +5,13 @@ import pandas as pd
 import pytest
 from benchmarks.trend_fleet import Fleet, modes
 from benchmarks.trend_oracle import cusum_by_loop
-from tests.oracles.trend_views import connect_views
+from tests.unit.trend.evaluated_views import KEYS, evaluated_views
 
 from turnout.report.formatting import badge
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.history import history_panel
-from turnout.trend import alarm_rows, baseline_rows, candidates, chart_rows, chart_status, describe_flagged, evaluate
+from turnout.trend import evaluate
 from turnout.trend.cusum import cusum
-
-KEYS = ("turnout_id", "section_id", "band", "source")
-
-
-def viewed(rows, settings, events=None, asof=None, **more):
-    rows = rows.astype({k: object for k in KEYS})
-    charts = evaluate(rows, events, settings)
-    status = chart_status(charts, settings)
-    frames = {
-        "modes": rows.assign(method="joint"), "charts": chart_rows(charts), "alarms": alarm_rows(charts, settings),
-        "baselines": baseline_rows(charts, settings),
-        "chart_status": describe_flagged(status, candidates(charts, status, settings), settings), **more,
-    }  # fmt: skip
-    frames |= {} if events is None else {"events": events}
-    return connect_views(frames, asof or rows["measured_at_utc"].max(), rounded=False)
 
 
 def with_loss(fleet, seed, percent, campaigns, sections=(0,)):
@@ -53,7 +38,7 @@ def test_a_loss_of_twenty_percent_is_on_the_list_the_same_day(settings, weeks, e
     rows.loc[(rows["measured_at_utc"] == rows["measured_at_utc"].max()) & (not temperature), "rail_temperature_c"] = (
         np.nan
     )
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         found = listed(con)
     assert {r[0] for r in found if "S0" in r[1].split(", ")} == {f"T{i:05d}" for i in range(20)}
     assert len(found) <= 21  # nothing else of 160 charts; the sections of one turnout share a row
@@ -61,7 +46,7 @@ def test_a_loss_of_twenty_percent_is_on_the_list_the_same_day(settings, weeks, e
 
 def test_what_the_row_says_and_what_to_repeat(settings):
     fleet = Fleet(turnouts=2, weeks=60, band="ballast", frequency=150.0)
-    with viewed(with_loss(fleet, 5, 33.0, [-1]), settings) as con:
+    with evaluated_views(with_loss(fleet, 5, 33.0, [-1]), settings) as con:
         row = con.execute("select * from worklist order by rank limit 1").df().iloc[0]
         states = con.execute("select state, count(*) from chart_states group by all").fetchall()
     assert row["state"] == "confirm now" and row["sections"] == "S0" and row["direction"] == "down"
@@ -75,7 +60,7 @@ def test_what_the_row_says_and_what_to_repeat(settings):
 
 def test_a_loss_of_the_whole_turnout_is_named_too(settings):
     fleet = Fleet(turnouts=2, weeks=60)
-    with viewed(with_loss(fleet, 5, 20.0, [-1], range(8)), settings) as con:
+    with evaluated_views(with_loss(fleet, 5, 20.0, [-1], range(8)), settings) as con:
         rows = listed(con)
         sentences = con.execute("select sentence from worklist where state = 'confirm now'").fetchall()
     assert sorted(rows) == [("T00000", "whole turnout"), ("T00001", "whole turnout")]
@@ -84,9 +69,9 @@ def test_a_loss_of_the_whole_turnout_is_named_too(settings):
 
 def test_two_campaigns_are_an_alarm_and_a_normal_one_ends_it(settings):
     fleet = Fleet(turnouts=5, weeks=60)
-    with viewed(with_loss(fleet, 5, 20.0, [-2, -1]), settings) as con:
+    with evaluated_views(with_loss(fleet, 5, 20.0, [-2, -1]), settings) as con:
         assert not listed(con) and len(listed(con, "inspect this week")) == 5
-    with viewed(with_loss(fleet, 5, 20.0, [-2]), settings) as con:
+    with evaluated_views(with_loss(fleet, 5, 20.0, [-2]), settings) as con:
         assert not listed(con) and not listed(con, "inspect this week")
 
 
@@ -94,7 +79,7 @@ def test_the_day_of_the_campaign_is_remembered(settings):
     """A list of an earlier day names what stood out then."""
     rows = with_loss(Fleet(turnouts=3, weeks=60), 5, 20.0, [-3])
     day = sorted(rows["measured_at_utc"].unique())[-3]
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         then = con.execute("select turnout_id, sections from worklist(?::timestamp) where state = 'confirm now'", [day])
         assert sorted(then.fetchall()) == [(f"T{i:05d}", "S0") for i in range(3)]
 
@@ -111,7 +96,7 @@ def test_work_after_the_campaign_and_a_suppression_take_it_off(settings):
         "until_utc": [newest + pd.Timedelta("30D")],
     }  # fmt: skip
     asof = newest + pd.Timedelta("1D")
-    with viewed(rows, settings, events, asof, acknowledgements=pd.DataFrame(said)) as con:
+    with evaluated_views(rows, settings, events, asof, acknowledgements=pd.DataFrame(said)) as con:
         assert not listed(con)
         states = con.execute("select section_id, state from chart_states where section_id like '%S0'").fetchall()
     assert sorted(states) == [("T00000/S0", "learning"), ("T00001/S0", "suppressed")]
@@ -155,7 +140,7 @@ def test_outliers_in_sql_equal_the_chart_and_a_loop(settings):
         change[1, i, where] = (-6.0) ** np.arange(1, 1 + len(where)) / 6.0 ** np.arange(len(where))
     rows = modes(fleet, 4, change)
     rows = rows[~((rows["section_id"] == "T00000/S4") & rows["measured_at_utc"].rank(method="dense").isin([62, 63]))]
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         found = con.execute("select * from cusum(timestamp '2016-01-01')").df()
         charts, baselines = con.execute("from charts").df(), con.execute("from baselines").df()
     joined = found.merge(charts, on=[*KEYS, "measured_at_utc"], suffixes=("", "_chart"))
@@ -183,7 +168,7 @@ def test_nobody_is_sent_out_for_a_change_below_the_target(settings, percent, sta
     """A precise chart raises an alarm for 1 %; the target is 1.5 %."""
     fleet = Fleet(turnouts=2, weeks=110, sigma=0.1, campaign=0.1, thermometer=0.1, phi=0.0)
     rows = with_loss(fleet, 5, percent, range(56, 110))
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         query = "select state, look_at, sentence from worklist({}) where section_id like '%/S0'"
         for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
             found = con.execute(query.format(asof)).fetchall()

@@ -9,15 +9,15 @@ import pandas as pd
 import pytest
 from benchmarks.trend_fleet import Fleet, drift, modes, step
 from benchmarks.trend_registry import small_registry
-from tests.oracles.trend_views import connect_views
+from tests.unit.trend.evaluated_views import evaluated_views
 
 from turnout.cli.worklist import as_text
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
 from turnout.report.panels.history import history_panel
-from turnout.trend import candidates, chart_rows, chart_status, describe_flagged, evaluate, panel_of
+from turnout.trend import panel_of
 from turnout.trend.forecast import forecast
-from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows
+from turnout.trend.tables import arrow_rows
 from turnout.trend.update import update
 from turnout.workflow.alerts import worklist_entries
 
@@ -33,19 +33,6 @@ def work(turnout, at, section=None):
     )  # fmt: skip
 
 
-def viewed(rows, settings, events=None, **more):
-    rows = rows.astype({k: object for k in ("turnout_id", "section_id", "band", "source")})
-    charts = evaluate(rows, events, settings)
-    status = chart_status(charts, settings)
-    frames = {
-        "modes": rows.assign(method="joint"), "charts": chart_rows(charts), "alarms": alarm_rows(charts, settings),
-        "baselines": baseline_rows(charts, settings),
-        "chart_status": describe_flagged(status, candidates(charts, status, settings), settings), **more,
-    }  # fmt: skip
-    frames |= {} if events is None else {"events": events}
-    return connect_views(frames, rows["measured_at_utc"].max())
-
-
 def fallen(weeks=120):
     """Three turnouts of eight sections; one section falls by 4 % a year from week 60 on."""
     fleet, which = Fleet(turnouts=3, weeks=weeks, phi=0.1), np.zeros((3, 8), bool)
@@ -58,7 +45,7 @@ def test_a_fresh_collapse_comes_before_old_drifts_and_no_open_alarm_is_cut(setti
     which[:25, 4] = True
     change = np.array(np.broadcast_to(drift(fleet, which, -1.5, 60), (30, 8, 156)))
     change[27, 2, -2:] -= 30.0
-    with viewed(modes(fleet, 3, change), settings) as con:
+    with evaluated_views(modes(fleet, 3, change), settings) as con:
         rows = con.execute("select sections, turnout_id, state, n_in_all from worklist order by rank").fetchall()
         short, long = (
             con.execute(f"select count(*) from worklist(newest_measurement(), most := {most})").fetchall()[0][0]
@@ -75,11 +62,11 @@ def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
     then = rows["measured_at_utc"].max() - pd.Timedelta(weeks=20)
     silent = rows[(rows["turnout_id"] != "T00001") | (rows["measured_at_utc"] <= then)]
     question = "select state, sentence from worklist({}) where section_id = 'T00001/S4'"
-    with viewed(silent, settings) as con:
+    with evaluated_views(silent, settings) as con:
         for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
             ((state, sentence),) = con.execute(question.format(asof)).fetchall()
             assert state == "inspect this week" and f"not measured since {then:%Y-%m-%d}" in sentence
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         assert "not measured since" not in con.execute(question.format("newest_measurement()")).fetchall()[0][1]
 
 
@@ -123,7 +110,7 @@ def before_and_after_a_night(hours):
 @pytest.mark.parametrize("hours", [24, 40])
 def test_a_test_before_and_one_after_work_are_two_campaigns(settings, hours):
     rows, events = before_and_after_a_night(hours)
-    with viewed(rows, settings, events) as con:
+    with evaluated_views(rows, settings, events) as con:
         found = con.execute("select section_id, change_pct, change_se_pct from change_since_event('tamping', 28)").df()
     one = found.set_index("section_id").loc["T00000/S0"]
     assert one["change_pct"] == pytest.approx(5.0, abs=3.0 * one["change_se_pct"]) and one["change_se_pct"] < 1.5
@@ -148,7 +135,7 @@ def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
     fleet = Fleet(turnouts=12, weeks=312, phi=0.0, every=6, sigma=1.2, campaign=0.3, band="ballast", frequency=150.0)
     weeks, change = np.arange(0, 312, 6), np.zeros((12, 8, 52))
     change[:8, 2, :] = -0.7 / 52.0 * np.clip(weeks - 52, 0, None)
-    with viewed(modes(fleet, 5, change), settings) as con:
+    with evaluated_views(modes(fleet, 5, change), settings) as con:
         noisy = con.execute(
             "select section_id from chart_status where reason = 'too_noisy' and drift_q <= 0.1"
         ).fetchall()
@@ -174,7 +161,7 @@ def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(sett
     rows = fallen()
     turnouts = pd.DataFrame({"turnout_id": list(named), "name": "", "line": ""})
     kept = set(named or rows["turnout_id"])  # a registry of results alone leaves none out
-    with viewed(rows, settings, turnouts=turnouts) as con:
+    with evaluated_views(rows, settings, turnouts=turnouts) as con:
         for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
             listed = con.execute(
                 f"select turnout_id, state, false_alarm_words from worklist({asof}, most := 1000)"
@@ -198,7 +185,7 @@ def test_a_section_that_left_its_layout_is_off_the_list_and_its_history_stays(se
     rows = fallen()
     sections = pd.DataFrame({"section_id": [f"T00001/S{i}" for i in range(8)]})
     sections = sections.assign(turnout_id="T00001", label="S", left_layout=[None] * 4 + [True] + [False] * 3)
-    with viewed(rows, settings, sections=sections) as con:
+    with evaluated_views(rows, settings, sections=sections) as con:
         for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
             listed = f"select count(*) from worklist({asof}, most := 1000) where sections like '%S4%'"
             assert con.execute(f"{listed} and turnout_id = 'T00001'").fetchall() == [(0,)]
@@ -222,7 +209,7 @@ def test_what_is_silenced_comes_back_on_its_day(settings):
             "until_utc": [newest + pd.Timedelta("3D")],
         }
     )  # fmt: skip
-    with viewed(rows, settings, acknowledgements=said) as con:
+    with evaluated_views(rows, settings, acknowledgements=said) as con:
         seen = {d: con.execute(f"select count(*) from worklist(newest_measurement() + interval {d} day) "
                                "where section_id = 'T00001/S4'").fetchall()[0][0] for d in (0, 2, 3, 4000)}  # fmt: skip
         assert seen == {0: 0, 2: 0, 3: 1, 4000: 1}
@@ -237,7 +224,7 @@ def test_a_fleet_that_falls_silent_is_not_measured_and_its_alarm_stays(settings)
     """Weekly charts are stale after 90 days; one that is learning after work falls silent as others."""
     rows = fallen()
     newest = rows["measured_at_utc"].max()
-    with viewed(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:
+    with evaluated_views(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:
         asked = "select state, count(*) from chart_states_on(newest_measurement() + interval {} day) group by all"
         states = {d: dict(con.execute(asked.format(d)).fetchall()) for d in (0, 89, 91, 800)}
         assert states[0] == states[89] and states[0]["learning"] == 9
@@ -258,7 +245,10 @@ def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
         + pd.to_timedelta(np.where(rows["section_id"].str[-1].astype(int) >= 4, 24, 0), unit="h")
     )
     question = "select section_id, residual_pct from mode_residuals(timestamp '2016-01-01') order by all"
-    found = [connection.execute(question).df() for connection in (viewed(rows, settings), viewed(late, settings))]
+    found = [
+        connection.execute(question).df()
+        for connection in (evaluated_views(rows, settings), evaluated_views(late, settings))
+    ]
     pd.testing.assert_frame_equal(*found)
 
 
@@ -358,7 +348,7 @@ def test_a_loss_after_a_gain_is_called_a_loss(settings):
     rows = modes(fleet, 3, change)
     fell = rows["measured_at_utc"].min() + pd.Timedelta(weeks=96)
     for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
-        with viewed(rows, settings) as con:
+        with evaluated_views(rows, settings) as con:
             opened = con.execute("select direction from alarms where closed_at_utc is null order by raised_at_utc")
             assert opened.fetchall() == [("up",), ("down",)]
             names = "section_id, direction, change_low_pct, change_high_pct, since_at_utc, sentence, look_at"
@@ -375,7 +365,7 @@ def test_work_on_a_whole_turnout_that_resets_nothing_is_not_hidden_by_the_siblin
     fleet = Fleet(turnouts=1, weeks=120, phi=0.0, campaign=0.3)
     rows = modes(fleet, 7, step(fleet, np.ones((1, 8), bool), 2.0, 85))
     at = rows["measured_at_utc"].min() + pd.Timedelta(weeks=84, days=3)
-    with viewed(rows, settings, work("T00000", at).assign(resets_ballast=False, resets_railpad=False)) as con:
+    with evaluated_views(rows, settings, work("T00000", at).assign(resets_ballast=False, resets_railpad=False)) as con:
         found = con.execute("select change_pct, change_se_pct, changed from change_since_event('tamping', 200)").df()
     assert len(found) == 8 and found["changed"].all()
     assert ((found["change_pct"] - 2.0).abs() < 4 * found["change_se_pct"]).all()

@@ -304,24 +304,32 @@ class PairEvidence(_EvidenceBesideFirst):
         return self.second_predicts_worse or self.second_improves_nothing
 
     def _improves_nothing_over(self, first_alone: Fit) -> bool:
-        case = self.search.case
-        (before, before_percent), (after, after_percent) = (
-            reserved_fit(case, fit) for fit in (first_alone, self.findings.fit)
-        )
-        if before is None or after is None or before_percent is None or after_percent is None:
+        comparison = self._reserved_comparison(first_alone)
+        if comparison is None:
             return False
-        changes = zip(case.reserved, before, after)
+        lost_percent, before, after = comparison
+        changes = zip(self.search.case.reserved, before, after)
         evidence = 0.5 * sum(o.effective * float(np.sum(o.whiten(a - b) ** 2)) for o, b, a in changes)
-        return evidence >= self.search.settings.threshold and after_percent <= before_percent
+        return evidence >= self.search.settings.threshold and lost_percent >= 0.0
 
     def _predicts_worse_than(self, first_alone: Fit) -> bool:
-        case = self.search.case
+        comparison = self._reserved_comparison(first_alone)
+        if comparison is None:
+            return False
+        lost_percent, before, after = comparison
+        return lost_percent > max(THRESHOLDS.max_fit_loss, gain_error(self.search.case.reserved, before, after))
+
+    def _reserved_comparison(self, first_alone: Fit) -> tuple[float, list[np.ndarray], list[np.ndarray]] | None:
+        """Points of fit of reserved recordings that the second effect loses, and predictions before and after.
+
+        None where a prediction is not possible.
+        """
         (before, before_percent), (after, after_percent) = (
-            reserved_fit(case, fit) for fit in (first_alone, self.findings.fit)
+            reserved_fit(self.search.case, fit) for fit in (first_alone, self.findings.fit)
         )
         if before is None or after is None or before_percent is None or after_percent is None:
-            return False
-        return before_percent - after_percent > max(THRESHOLDS.max_fit_loss, gain_error(case.reserved, before, after))
+            return None
+        return before_percent - after_percent, before, after
 
     def _scores_beside_second(self, second_alone: Fit) -> Iterator[Score]:
         """The first effect's leader and its close rivals, each with its gain beside the second effect."""
