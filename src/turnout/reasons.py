@@ -30,7 +30,7 @@ REASONS = {
     "dead_channel": "a channel is constant or below its noise floor",
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",
-    "duplicate": "the same bytes as another file, or the same impact as in another record",
+    "duplicate": "the same bytes as another file, or the same impact or samples a second time",
     "wrong_time": "the time of the recording contradicts its campaign, or a passage has none",
     "start_unknown": "the start time in the file is unreadable, implausible or of another day; the recording is used",
     "rate_ambiguous": "the file states a rate before a reduction that nothing confirms; its recordings are used",

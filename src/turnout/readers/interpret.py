@@ -22,6 +22,8 @@ from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_words import CERTAIN
+from turnout.readers.repeated_blocks import repeated_block
+from turnout.readers.simultaneous_records import add_shared, shared_channels, simultaneous_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
@@ -120,6 +122,9 @@ def convert_records(
             errors.extend(error for error in channel_errors if error.problem not in remarked)
         except ReadError as error:
             errors.append(error)
+    simultaneous = simultaneous_errors(recordings, source)
+    recordings = [r for r in recordings if r.record not in simultaneous]
+    errors.extend(simultaneous.values())
     errors.extend(_count_errors(raw, description, source))
     errors.extend(raw.remarks)
     errors.extend(lost_entry_errors(raw.records, source))
@@ -152,6 +157,7 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     unread = {k: record.unread_start for k, record in records if record.unread_start}
     yield from start_errors([(k, record.started_at) for k, record in records], unread, "UTC", source)
     yield from zone_errors(raw.records, "UTC", source)
+    yield from _repetitions(records, source)
     reported: set[tuple[str, str]] = set()
     for k, record in records:
         fills = fill_values(record.entries, record.names)
@@ -164,6 +170,24 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
                 reported.add((name, "samples"))
                 problem = "1 sample is missing" if n == 1 else f"{n} samples are missing"
                 yield source.error(where, problem, "Export the record again from the logger", reason="not_finite")
+
+
+def _repetitions(records: Sequence[tuple[int, RawRecord]], source: Source) -> Iterator[ReadError]:
+    """Errors of blocks of samples, channels and records that a file holds twice."""
+    in_memory = {
+        k: [x.astype(float) for x in record.samples if isinstance(x, np.ndarray) and x.dtype.kind in "fiu"]
+        for k, record in records
+    }
+    for k, samples in in_memory.items():
+        repeat = (
+            repeat_error(np.array(samples), f"record {k + 1}", source) if len(set(map(len, samples))) == 1 else None
+        )
+        yield from [repeat] if repeat else []
+    errors: dict[int, ReadError] = {}
+    names = {k: record.names for k, record in records}
+    for first, second, row, is_whole in shared_channels(list(in_memory.items())):
+        add_shared(errors, (first, second), "" if is_whole else names[first][row], source)
+    yield from errors.values()
 
 
 def _missing_count(column: Column, fills: Sequence[float]) -> int:
@@ -242,6 +266,8 @@ class _Conversion:
         faults = _faults(record, channel_maps, statistics, n_sample, where, source)
         if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
             raise next(iter(faults.values()))
+        if repeat := None if is_long else repeat_error(samples, where, source):
+            raise repeat
         usable = [i for i in range(len(channel_maps)) if i not in faults]
         fields: dict[str, Any] = {
             "rate": rate,
@@ -259,6 +285,37 @@ class _Conversion:
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+REPEAT_REMEDY = (
+    "Export the record again; if its rows were appended twice, delete the second ones. If the logger's own file has "
+    "them, a buffer was written twice and the samples in its place are lost"
+)
+
+
+def repeat_error(samples: np.ndarray, where: str, source: Source) -> ReadError | None:
+    """The error of a record that holds a block of samples twice.
+
+    Parameters
+    ----------
+    samples : (n_channel, n_sample) array of float
+        Samples of its channels.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    ReadError or None
+        None without a repeated block.
+    """
+    block = repeated_block(samples)
+    if block is None:
+        return None
+    start, copy, n = block
+    problem = f"its samples {copy} to {copy + n - 1} repeat the samples {start} to {start + n - 1} to the last digit"
+    return source.error(where, problem, REPEAT_REMEDY, reason="duplicate")
 
 
 def _faults(

@@ -3,7 +3,7 @@
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 from zoneinfo import ZoneInfo
 
@@ -134,7 +134,8 @@ def _longest_ordered(starts: Sequence[Any]) -> list[int]:
     return ordered
 
 
-PLAUSIBLE_YEARS = (1990, 2060)  # of a digital logger; other years are epochs of counters (1904, 1970, 1980)
+FIRST_YEAR = 1990  # of a digital logger; earlier years are epochs of counters (1904, 1970, 1980)
+MAX_LEAD = timedelta(days=1)  # of a logger's clock before ours, with the differences between time zones
 CLOCK_REMEDY = "Check the logger's clock; give the campaign or the time in the file's name"
 SHORT_DATE = re.compile(r"\d{1,2}(?:[-/]\d{1,2}[-/]\d{2,4}|\.\d{1,2}\.\d{2})(?!\d)")
 ORDER_REMEDY = (
@@ -198,9 +199,10 @@ def is_plausible(stamp: datetime) -> bool:
     Returns
     -------
     bool
-        False for the epoch of a counter, such as 1904-01-01.
+        False for the epoch of a counter, such as 1904-01-01, and for a time in the future.
     """
-    return PLAUSIBLE_YEARS[0] <= stamp.year <= PLAUSIBLE_YEARS[1]
+    now = datetime.now(UTC).replace(tzinfo=None)
+    return stamp.year >= FIRST_YEAR and stamp.replace(tzinfo=None) <= now + MAX_LEAD
 
 
 def clock_change(stamp: datetime, time_zone: str) -> str:
@@ -277,9 +279,9 @@ def start_errors(
         yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:
-        problem = (
-            f"the start time {strange[0][1]:{TIME_FORMAT}} is no time of a recording: the logger's clock was not set"
-        )
+        is_early = strange[0][1].year < FIRST_YEAR
+        fault = "no time of a recording: the logger's clock was not set" if is_early else "in the future"
+        problem = f"the start time {strange[0][1]:{TIME_FORMAT}} is {fault}"
         yield _start_error([k for k, _ in strange], problem, source)
     never = [(k, stamp) for k, stamp in timed if clock_change(stamp, time_zone) == "never"]
     if never:

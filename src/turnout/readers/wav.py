@@ -23,7 +23,7 @@ from turnout.readers.array_names import channel_names
 from turnout.readers.entries import FREE_TEXT, Entry, entries_of, entries_of_text, rate_entry
 from turnout.readers.lazy import LazyMatrix
 from turnout.readers.metadata_names import START_NAMES, UNIT_NAMES
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, RawRecord, Source
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements
 
@@ -155,6 +155,8 @@ def find_truncation(file: BinaryIO, size: int) -> str:
     if len(head) < 12:
         return f"the file ends after {size} bytes, before its samples"
     long_sizes = _long_sizes(head)
+    file.seek(0)
+    bytes_per_frame = _frame_sizes(file.read(HEAD_SIZE))[1] or 1
     position, has_samples = 12, False
     while position + 8 <= size:
         file.seek(position)
@@ -164,6 +166,8 @@ def find_truncation(file: BinaryIO, size: int) -> str:
             return "the chunk of samples was never finished by the logger"
         if position + 8 + length > size:
             return f"its chunk {tag.decode('latin-1')!r} ends after {size - position - 8} of {length} bytes"
+        if tag == b"data" and (n_more := length % bytes_per_frame):
+            return f"its samples end within a frame, {n_more} bytes after its beginning"
         has_samples = has_samples or tag == b"data"
         if tag == b"RIFF" or not tag.decode("latin-1").isprintable() or not tag.isascii():
             return f"at byte {position} {tag!r} is no chunk of one file: bytes were inserted or another file appended"
@@ -262,13 +266,19 @@ def _long_sizes(head: bytes) -> dict[bytes, int]:
     return {b"RIFF": riff, b"data": samples}
 
 
-def _byte_rate_entries(head: bytes) -> list[Entry]:
-    """The rate by bytes per second and per frame, which the chunk "fmt " states beside the rate itself."""
+def _frame_sizes(head: bytes) -> tuple[int, int]:
+    """Bytes per second and per frame, which the chunk "fmt " states; (0, 0) for compressed samples and without it."""
     position = head.find(b"fmt ", 12)
     if head[:4] not in (b"RIFF", b"RF64") or position < 0 or len(head) < position + 24:
-        return []
+        return 0, 0
     tag, _, _, bytes_per_second, bytes_per_frame = struct.unpack_from("<HHIIH", head, position + 8)
-    if tag not in UNCOMPRESSED or not bytes_per_second or not bytes_per_frame:
+    return (bytes_per_second, bytes_per_frame) if tag in UNCOMPRESSED else (0, 0)
+
+
+def _byte_rate_entries(head: bytes) -> list[Entry]:
+    """The rate by bytes per second and per frame, which the chunk "fmt " states beside the rate itself."""
+    bytes_per_second, bytes_per_frame = _frame_sizes(head)
+    if not bytes_per_second or not bytes_per_frame:
         return []
     return [rate_entry("bytes per second of the header", bytes_per_second / bytes_per_frame)]
 

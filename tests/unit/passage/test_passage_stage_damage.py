@@ -139,7 +139,8 @@ def test_the_rest_of_a_record_is_said_to_be_too_short_and_costs_no_other_train(n
 def test_a_fault_of_the_program_costs_one_record(tmp_path, monkeypatch):
     """The second of three trains meets one: its row says so, names file and record, and the others stay."""
     sound = on_main()
-    later = [replace(sound, started_at=STARTED + timedelta(seconds=60.0 * k)) for k in range(3)]
+    trains = [sound.samples * (1.0 + 1e-6 * k) for k in range(3)]  # no two trains leave the same samples
+    later = [replace(sound, samples=x, started_at=STARTED + timedelta(seconds=60.0 * k)) for k, x in enumerate(trains)]
     calls = []
 
     def failing(recording, *_):

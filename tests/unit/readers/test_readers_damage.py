@@ -145,6 +145,14 @@ def test_wav_says_how_much_of_its_chunk_is_there(written, in_si):
     path.write_bytes(data[: at + 8 + 1000])
     (error,) = outcome(path, in_si)[1]
     assert f"the header: its chunk 'data' ends after 1000 of {2 * 8 * 301} bytes. Copy the file again" in str(error)
+    for n in (1, 7, 9):  # 16 bytes are a frame of 8 channels with 16 bits
+        size = 2 * 8 * 301 - n
+        end = bytes(size % 2)
+        riff = (len(data[8:at]) + 8 + size + len(end)).to_bytes(4, "little")
+        chunk = size.to_bytes(4, "little") + data[at + 8 : at + 8 + size] + end
+        path.write_bytes(data[:4] + riff + data[8 : at + 4] + chunk)
+        (error,) = outcome(path, in_si)[1]
+        assert f"its samples end within a frame, {16 - n} bytes after its beginning" in str(error)
     path.write_bytes(data[: at + 4] + b"\xff\xff\xff\xff" + data[at + 8 :])
     (error,) = outcome(path, in_si)[1]
     assert "the chunk of samples was never finished by the logger" in str(error)

@@ -7,7 +7,7 @@ import json
 import re
 import unicodedata
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -359,6 +359,8 @@ STARTS = {
     "2026-10-25T02:30:00": "comes twice in Europe/Copenhagen",
     "1904-01-01T00:00:00": "is no time of a recording",
     "1970-01-01T00:00:00": "is no time of a recording",
+    f"{datetime.now() + timedelta(days=3):%Y-%m-%dT%H:%M:%S}": "is in the future",
+    "2097-05-13T10:00:00": "is in the future",
 }
 
 
