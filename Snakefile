@@ -1,14 +1,20 @@
 """Raw files of a fleet in, registry and pages out. `snakemake --config turnouts=ID` does it for one turnout."""
 
+from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
-from turnout.workflow.launch import launch
+from turnout.workflow.launch import TurnoutError, launch
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 
 min_version("9.14")
 
-RUN = launch(config, scan=workflow.is_main_process, formats=FORMATS, to_si=to_si)
+try:
+    RUN = launch(config, scan=workflow.is_main_process, formats=FORMATS, to_si=to_si)
+except (
+    TurnoutError
+) as error:  # of an input: its message stands alone, without the lines of the program
+    raise WorkflowError(str(error)) from None
 
 
 localrules:

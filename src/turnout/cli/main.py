@@ -237,8 +237,13 @@ def _discard_output() -> None:
 
 
 def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
-    """What went wrong. The name of the command stands before it already, and is left out where an error begins so."""
+    """What went wrong. The name of the command stands before it already, and is left out where an error begins so.
+
+    The folder of the configuration has the name of a command, and stays.
+    """
     if isinstance(error, TurnoutError):
+        if args.command == getattr(args, "configuration", ""):
+            return str(error)
         pattern = rf"^(turnout )?{re.escape(args.command)}, "
         return re.sub(pattern, "", str(error), flags=re.MULTILINE)
     paths = getattr(args, "file", None) or ()  # a fault while reading names no file

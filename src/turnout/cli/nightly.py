@@ -13,7 +13,7 @@ run continues where this one ended. docs/operation.md lists the options after --
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from turnout.cli.options import above_zero, add_result, add_use
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 GROUP = "Run"
 HELP = "run the whole workflow unattended"
 INTERRUPTED = 130
+CONFIG_OPTIONS = ("--config", "-C")
 # Options of Snakemake with which the configuration may be elsewhere.
 MOVING_OPTIONS = ("--configfile", "--directory", "-d", "--snakefile", "-s")
 
@@ -52,15 +53,21 @@ def run(args: argparse.Namespace) -> int:
     -------
     int
         Exit code.
+
+    Raises
+    ------
+    ConfigError
+        A word that is no option, an option with a wrong value, or a folder that is no project.
+    ConfigErrors
+        The configuration has errors.
     """
     from dataclasses import asdict
-    from pathlib import Path
 
     from turnout.workflow.nightly import nightly
-    from turnout.workflow.project import snakefile_options
 
-    if snakefile_options(Path()) and not any(word.startswith(MOVING_OPTIONS) for word in args.options):
-        _require_project(_configuration_folder(args.options))
+    _require_options(args.options)
+    if not any(word.startswith(MOVING_OPTIONS) for word in args.options):
+        _require_valid_project(args.options)
     limit = None if args.limit_hours is None else 3600.0 * args.limit_hours
     try:
         night = nightly(args.options, args.profile, limit, quiet=args.quiet)
@@ -73,18 +80,50 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _configuration_folder(options: Sequence[str]) -> str:
-    folders = [word.partition("=")[2] for word in options if word.startswith("configuration=")]
-    return folders[0] if folders else "config"
+    return str(_config_options(options).get("configuration", "config"))
 
 
-def _require_project(folder: str) -> None:
-    """ConfigError without a table of turnouts, before anything is written into a folder that is no project."""
+def _config_options(options: Sequence[str]) -> dict[str, Any]:
+    """Keys and values behind ``--config``, typed as Snakemake types them, for the checks before it starts."""
+    values: dict[str, Any] = {}
+    is_behind = False
+    for word in options:
+        option, _, rest = word.partition("=")
+        if word.startswith("-"):
+            is_behind = option in CONFIG_OPTIONS
+            word = rest if is_behind else ""
+        if is_behind and "=" in word:
+            key, _, value = word.partition("=")
+            values[key] = int(value) if value.isdecimal() else value.strip("'\"")
+    return values
+
+
+def _require_options(options: Sequence[str]) -> None:
+    """ConfigError if the first word is no option: Snakemake would take it for a file to make."""
+    from turnout.errors import ConfigError
+
+    if options and not options[0].startswith("-"):
+        word = options[0]
+        key = f"turnouts={word}" if "=" not in word else word
+        remedy = f"Options of Snakemake stand behind --, as in 'turnout nightly -- --config {key}'"
+        raise ConfigError("turnout nightly", "options", f"{word!r} is no option", remedy)
+
+
+def _require_valid_project(options: Sequence[str]) -> None:
+    """Check table, configuration and options before anything is written; Snakemake's message would be a traceback."""
     from pathlib import Path
 
     from turnout.config.turnouts_table import read_table
+    from turnout.readers.formats import FORMATS
+    from turnout.units import to_si
+    from turnout.workflow.launch import launch
+    from turnout.workflow.project import snakefile_options
 
-    table = Path(folder) / "turnouts.tsv"
-    if not table.exists():
+    values = _config_options(options)
+    table = Path(_configuration_folder(options)) / "turnouts.tsv"
+    if table.exists():
+        launch({name: values[name] for name in values if name != "functions"}, False, FORMATS, to_si)
+    elif "configuration" in values or snakefile_options(Path()):  # else the own Snakefile may name another folder
         raise read_table(table, str(table))[1][0]
 
 

@@ -19,6 +19,7 @@ import sys
 from contextlib import contextmanager
 from decimal import Decimal
 from difflib import get_close_matches
+from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
@@ -98,8 +99,15 @@ def run(args: argparse.Namespace) -> int:
                     for remark in misspelt_names(connection, sql):
                         print(remark, file=sys.stderr)
         except duckdb.Error as error:
-            raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
+            raise RegistryError(f"{error}\n{_remedy(error, args.registry)}") from None
     return 0
+
+
+def _remedy(error: duckdb.Error, registry: str) -> str:
+    """What to do: the files of the registry are to blame where one of them is named, else the query."""
+    if str(Path(registry).resolve()) in str(error):
+        return "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do"
+    return "'turnout query --list' names the tables, views and macros"
 
 
 def misspelt_names(connection: duckdb.DuckDBPyConnection, sql: str) -> list[str]:

@@ -13,6 +13,9 @@ from turnout.files import read_regular
 
 EXTRA_CELLS = "cells beyond the header"
 BROKEN_LINE = "a line that is no row"
+WRONG_SEPARATOR = "a row without commas"
+OTHER_SEPARATORS = (("semicolons", ";"), ("tabs", "\t"))
+SEPARATOR_REMEDY = "Put commas between the columns, and a point before decimals"
 
 
 class TableError(Exception):
@@ -105,10 +108,9 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
         if title not in titles:
             problem = f"no column {title!r}; the header has {', '.join(titles) or 'nothing'}"
             remedy = f"Write the header {','.join(columns)}, with commas between"
-            for separator, mark in (("semicolons", ";"), ("tabs", "\t")):
+            for separator, mark in OTHER_SEPARATORS:
                 if title in map(str.strip, header.split(mark)):
-                    problem = f"{separator} between the columns"
-                    remedy = "Put commas between the columns, and a point before decimals"
+                    problem, remedy = f"{separator} between the columns", SEPARATOR_REMEDY
             raise TableError(Place(name, first, 1), problem, remedy)
     faults = [
         TableError(Place(name, first, start), *fault)
@@ -138,6 +140,8 @@ def row_problem(cells: Mapping) -> tuple[str, str, str] | None:
     """
     if BROKEN_LINE in cells:
         return BROKEN_LINE, cells[BROKEN_LINE], "Write each row in one line; double quotes go around a whole cell"
+    if WRONG_SEPARATOR in cells:
+        return WRONG_SEPARATOR, cells[WRONG_SEPARATOR], SEPARATOR_REMEDY
     if EXTRA_CELLS in cells:
         remedy = "Put a text with commas in double quotes; a number has a decimal point"
         return EXTRA_CELLS, "more cells than columns", remedy
@@ -222,6 +226,10 @@ def _cells(line: str, titles: tuple[str, ...]) -> Cells:
         open_quote = "unexpected end" in str(error)
         cells[BROKEN_LINE] = "a double quote that is not closed in its line" if open_quote else str(error)
         return cells
+    for separator, mark in OTHER_SEPARATORS:
+        if len(values) == 1 < len(titles) and mark in line:
+            cells[WRONG_SEPARATOR] = f"{separator} between the columns"
+            return cells
     while len(values) > len(titles) and not values[-1]:
         values.pop()
     cells.update(zip(titles, values))

@@ -167,6 +167,8 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         return quotation(value), f"Write {_expected_text(key)}"
     if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
         return quotation(value), f"Write {_expected_text(key)}"
+    if isinstance(value, str) and CONTROL_CHARACTER.search(value):
+        return quotation(value), "Write it without control characters"
     if key.choices and value not in key.choices:
         return quotation(value), suggestion(str(value), key.choices)
     if key.pattern and isinstance(value, str) and not re.fullmatch(key.pattern, value):
@@ -178,6 +180,7 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
     return quotation(value), f"Write {_expected_text(key)}{_hint_at_other_unit(key, value)}"
 
 
+CONTROL_CHARACTER = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # of no text; pages and tables cannot show it
 PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
 PREFIXES = (("m", 1e-3), ("k", 1e3))
 LARGEST_NUMBER = 1e300  # beyond it a whole number is no floating-point number

@@ -73,6 +73,8 @@ def open_registry(
     except duckdb.Error as error:
         problem = str(error).splitlines()[0].rstrip(".!")
         remedy = f"Name the folder that holds {DATABASE}. A damaged one is made again by: turnout registry relocate"
+        if "lock" in problem:  # DuckDB lets one process write, or any number read
+            remedy = "Another program has it open for writing: close it there, or open it there read-only"
         raise RegistryError(f"{file}: cannot be opened: {problem}. {remedy}.") from error
     if not Path(folder).is_dir():
         connection.close()

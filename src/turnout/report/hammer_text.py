@@ -228,12 +228,11 @@ def _gate_lines(rows: Mapping[str, Sequence[Mapping[str, Any]]], settings: Mappi
         return []
     row, receptance_settings = rows["receptances"][0], settings["receptance"]
     lowest = rows["models"][0]["coherence_minimum"]
-    limit_words = (
-        ""
-        if lowest is None
-        else f"its lower 95 % limit is {floor(1e3 * lowest) / 1e3:.3f} or more around the resonances; "
-    )
-    compared = "that limit" if row["gate"] == "limit" else "the coherence itself"
+    limit_words, compared = "", "its lower 95 % limit"
+    if lowest is not None:
+        limit_words = f"{compared} is {floor(1e3 * lowest) / 1e3:.3f} or more around the resonances; "
+        compared = "that limit"
+    compared = compared if row["gate"] == "limit" else "the coherence itself"
     lines = [
         _line("coherence", f"{limit_words}the gate needs {compared} at {receptance_settings.gate_level:g} or more")
     ]

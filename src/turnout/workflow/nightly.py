@@ -27,6 +27,7 @@ from turnout.workflow.state import VANISHED, load_state, states_below
 
 JOB_NAMES = "turnouts"
 EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeout(1)
+SIGNAL_BASE = 128  # exit code of a process that a signal ended, less the number of the signal, as of a shell
 PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
 MAX_TURNOUTS_SHOWN = 3  # turnouts named in the report
 MAX_EXCLUDED_SHOWN = 1  # entries of no unit quoted in the report
@@ -106,11 +107,12 @@ def nightly(
     Raises
     ------
     TurnoutError
-        If there is no such profile, or another run is active.
+        If there is no such profile, a folder cannot be written, or another run is active.
     """
     profile = profile_folder(profile)
     _require_profile(Path(profile))
     work.mkdir(exist_ok=True)
+    _require_writable(work)
     lock = FileLock(work / ".nightly.lock")
     try:
         with lock.acquire(timeout=0), _signals_raise():
@@ -118,12 +120,22 @@ def nightly(
             _clear(options, Path(profile).name)
             before, planned, started = _batches(work), _planned_units(work), time.time_ns()
             code = _run([*options, "--workflow-profile", profile, "--rerun-incomplete"], limit, work, quiet)
-            return _report(
-                code, before, planned, failure_reason(started) if code not in (0, EXIT_TIME_LIMIT) else "", work
-            )
+            reason = _reason(code, started, quiet)
+            return _report(SIGNAL_BASE - code if code < 0 else code, before, planned, reason, work)
     except Timeout:
         message = f"{work / '.nightly.lock'} is held: another nightly run is going on"
         raise TurnoutError(f"{message}. Wait for it, or end it.") from None
+
+
+def _reason(code: int, started: int, quiet: bool) -> str:
+    """Why Snakemake ended with this code, "" if it did its work; a negative code is minus the signal that ended it."""
+    if code in (0, EXIT_TIME_LIMIT):
+        return ""
+    if code < 0:
+        name = signal.Signals(-code).name
+        return f"Snakemake was ended by {name}, as by a lack of memory or a person: the next run continues"
+    place = "run again without --quiet to see its message" if quiet else "its message stands above"
+    return failure_reason(started) or f"Snakemake stopped before any job: {place}"
 
 
 def _require_profile(profile: Path) -> None:
@@ -134,6 +146,15 @@ def _require_profile(profile: Path) -> None:
         problem = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
         remedy = f"Write one of {', '.join(profiles)}, or the folder of your own"
         raise TurnoutError(f"{profile}, the profile: {problem}. {remedy}.")
+
+
+def _require_writable(work: Path) -> None:
+    """TurnoutError if the run could not store its results; a job would find out only after it has computed them."""
+    pages = WORKLIST.parent / "pages"
+    for folder in (work, WORKLIST.parent, GENERATION.parent, pages, Path("logs"), Path(".snakemake"), Path()):
+        if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
+            problem = f"{folder.resolve()}, the folder: it cannot be written, and nothing was computed"
+            raise TurnoutError(f"{problem}. Correct its permissions, or mount its disk for writing.")
 
 
 @contextmanager

@@ -16,7 +16,8 @@ FAILED_RULE = re.compile(
     r"^Error in rule (\w+):\n(?:    (?!jobid).*\n)*    jobid: (\d+)\n(?:    (?!log:).*\n)*(?:    log: (\S+))?", re.M
 )
 FINISHED_JOB = re.compile(r"^Finished jobid: (\d+) ", re.M)
-STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+)$", re.M)
+# Of a line that ends with a colon the next one is a part: it names the files.
+STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+(?:(?<=:)\n.+)?)$", re.M)
 EXCEPTION = re.compile(r"^[\w.]+(?:Error|Exception)(?:: .+)?$", re.M)  # the last line of a traceback
 MAX_REASON_LENGTH = 300  # characters of a message in the report
 
@@ -50,7 +51,7 @@ def failure_reason(since: int = 0) -> str:
         return _first_complaint()
     stopped = [match for text in texts if (match := STOP_MESSAGE.search(text))]
     if stopped:
-        return stopped[0][1].strip()[:MAX_REASON_LENGTH]
+        return " ".join(stopped[0][1].split())[:MAX_REASON_LENGTH]
     exceptions = [line for text in texts for line in EXCEPTION.findall(text)]
     return exceptions[-1][:MAX_REASON_LENGTH] if exceptions else f"see {written[-1][1]}" if texts else ""
 

@@ -74,6 +74,14 @@ WRONG = {
     "compare raw/W1/hammer/A7_1.csv --turnout W1 --out config": "config, --out: it is a folder",
     "simulate hammer --section A7 --impacts 100000000": "--impacts: 100000000. Write a whole number from 1 to 1000",
     "simulate passage --units 100000": "--units: 100000. Write a whole number from 1 to 50",
+    "nightly W1": "'W1' is no option. Options of Snakemake stand behind --, as in 'turnout nightly -- --config turn",
+    "nightly shards=2": "as in 'turnout nightly -- --config shards=2'",
+    "nightly -- --config nix=1": "--config, option: unknown option 'nix'",
+    "nightly -- --cores 1 --config day=2026-13-01 shards=2": "'2026-13-01' is no day of the calendar",
+    "nightly -- --config shards=0 --cores 1": "--config, shards: 0. Write a whole number from 1 to 4096",
+    "nightly -- --config=turnouts=W9": "config/turnouts.tsv, line 1, column 1: no turnout 'W9'. Allowed: W1",
+    "nightly -- -C strict=perhaps": "--config, strict: 'perhaps'. Write true or false",
+    "nightly -- --config configuration=nowhere": "nowhere/turnouts.tsv, the path: there is no such file",
 }
 
 
@@ -267,6 +275,19 @@ def test_a_night_without_a_project_writes_nothing(tmp_path, monkeypatch, capsys)
     assert main(["nightly"]) == 2
     assert "Run the command in the folder of a project" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_night_with_a_wrong_configuration_begins_nothing(project, capsys):
+    (project / "config" / "config.yaml").write_text("fleet: {shard: 3}\n")
+    assert main(["nightly"]) == 2
+    assert "config/config.yaml, line 1, column 9: unknown key 'shard'" in capsys.readouterr().err
+    assert not any((project / name).exists() for name in ("work", "logs", ".snakemake"))
+
+
+def test_the_folder_of_the_configuration_is_no_name_of_a_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["config", "show", "W1"]) == 2
+    assert "turnout config: config, the folder: there is no such folder" in capsys.readouterr().err
 
 
 def options_of(parser):

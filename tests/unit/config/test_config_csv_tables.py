@@ -47,6 +47,17 @@ def test_a_quote_that_is_not_closed_takes_no_other_row_with_it(tmp_path):
     assert len(errors) == 1 and "line 2, column 1: a double quote that is not closed in its line" in errors[0]
 
 
+@pytest.mark.parametrize("row", ["t1;;2025-01-01;tamping;;", "t1\t\t2025-01-01\ttamping"])
+def test_a_row_with_another_separator_is_said_to_have_it(tmp_path, row):
+    found, errors = events(tmp_path, f"{HEADER}{row}\nt2,,2025-01-02,tamping,,a; b\n")
+    separator = "semicolons" if ";" in row else "tabs"
+    assert errors == [
+        f"config/events.csv, line 2, column 1: {separator} between the columns. Put commas between the columns, and a "
+        "point before decimals."
+    ]
+    assert [note for *_, note in found] == ["a; b"]
+
+
 def test_letters_behind_a_closed_quote_are_an_error(tmp_path):
     found, errors = events(tmp_path, HEADER + 't2,,2025-11-05,tamping,,"machine" 09\n')
     assert not found and "line 2, column 1: ',' expected after '\"'. Write each row in one line" in errors[0]

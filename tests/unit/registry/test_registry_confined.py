@@ -2,6 +2,10 @@
 
 import csv
 import io
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from registry_rows import Bench, hammer_result
@@ -24,6 +28,32 @@ def registry(tmp_path_factory):
 
 def query(registry, sql, *more):
     return main(["query", sql, "--registry", str(registry), *more])
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(b"no Parquet")])
+def test_a_damaged_file_is_not_said_to_be_a_fault_of_the_query(registry, tmp_path, capsys, damage):
+    copy = tmp_path / "registry"
+    shutil.copytree(registry, copy)
+    assert main(["registry", "relocate", "--registry", str(copy)]) == 0
+    damage(next((copy / "modes").glob("year=*/*.parquet")))
+    assert query(copy, "from modes") == 2
+    assert "A file of the registry is damaged or absent: 'turnout registry check'" in capsys.readouterr().err
+    assert query(copy, "from mode") == 2
+    assert "'turnout query --list' names the tables, views and macros" in capsys.readouterr().err
+
+
+def test_a_registry_that_another_program_writes_is_not_said_to_be_damaged(registry, tmp_path, capsys):
+    shutil.copytree(registry, tmp_path / "registry")
+    file = tmp_path / "registry" / "registry.duckdb"
+    program = f"import duckdb\nheld = duckdb.connect({str(file)!r})\nprint('held', flush=True)\ninput()"
+    words = [sys.executable, "-c", program]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "held\n"
+        assert query(file.parent, "from modes") == 2
+        other.stdin.write("\n")
+    message = capsys.readouterr().err
+    assert "Another program has it open for writing: close it there, or open it there read-only." in message
+    assert "damaged" not in message
 
 
 @pytest.mark.parametrize(

@@ -178,6 +178,11 @@ def test_a_run_that_ended_in_a_traceback_says_its_exception_or_its_log(folder):
     assert failure_reason() == "turnout.errors.StateError: no state"
 
 
+def test_a_message_whose_first_line_ends_with_a_colon_has_its_second_one(folder):
+    write("run", "WorkflowError:\nWrite-protected output files for rule register:\n    results/registry/a\n    b\n")
+    assert failure_reason() == "Write-protected output files for rule register: results/registry/a"
+
+
 def write(name, text, later=0):
     log = Path(".snakemake/log") / f"{name}.snakemake.log"
     log.parent.mkdir(parents=True, exist_ok=True)

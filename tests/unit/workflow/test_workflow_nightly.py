@@ -62,7 +62,7 @@ def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
         "time.sleep(600)\n"
     )
     (tmp_path / "config").mkdir()
-    (tmp_path / "config/turnouts.tsv").touch()
+    (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\n")
     night = [sys.executable, "-m", "turnout.cli.main", "nightly"]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     run = subprocess.Popen(
@@ -124,6 +124,36 @@ def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, mo
     with pytest.raises(TurnoutError, match=f"{profile}, the profile: there is no such folder. Write one of {present}"):
         nightly([], profile)
     assert not (tmp_path / "work").exists()
+
+
+@pytest.mark.parametrize("folder", ["work", "results", "results/registry", "results/pages", "logs", ".snakemake", "."])
+def test_a_folder_that_cannot_be_written_is_named_before_anything_begins(tmp_path, monkeypatch, folder):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("open('begun', 'w')\n")
+    (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    locked = (tmp_path / folder).resolve()
+    access = os.access
+    # root may write into every folder, so no permission can be tested: the answer is that of a read-only disk
+    monkeypatch.setattr(module.os, "access", lambda path, mode: Path(path).resolve() != locked and access(path, mode))
+    with pytest.raises(TurnoutError, match=f"^{locked}, the folder: it cannot be written.* Correct its permissions"):
+        nightly([], "profiles/default")
+    assert not (tmp_path / "begun").exists()
+
+
+@pytest.mark.parametrize(
+    "program, quiet, code, reason",
+    [
+        ("raise SystemExit(2)", False, 2, "Snakemake stopped before any job: its message stands above"),
+        ("raise SystemExit(2)", True, 2, "run again without --quiet to see its message"),
+        ("import os\nos.kill(os.getpid(), 9)", False, 137, "Snakemake was ended by SIGKILL, as by a lack of memory"),
+        ("import os\nos.kill(os.getpid(), 15)", True, 143, "Snakemake was ended by SIGTERM"),
+    ],
+)
+def test_every_failed_night_has_a_reason(tmp_path, monkeypatch, program, quiet, code, reason):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text(program)
+    night = nightly([], "profiles/default", quiet=quiet)
+    assert night.code == code and f"failed with exit code {code}: " in str(night) and reason in night.reason
 
 
 def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monkeypatch):
