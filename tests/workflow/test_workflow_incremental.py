@@ -166,3 +166,4 @@ def test_work_files_that_were_cut_are_made_again_and_nothing_is_computed(fleet):
 def test_a_wrong_option_is_said_before_any_job(fleet, option, words):
     done = toy.run(fleet, option, check=False)
     assert done.returncode != 0 and words in done.stdout.replace("\n", " ")
+    assert "Traceback" not in done.stdout and not re.search(r'File ".*\.py"', done.stdout)

@@ -284,6 +284,15 @@ def test_a_night_with_a_wrong_configuration_begins_nothing(project, capsys):
     assert not any((project / name).exists() for name in ("work", "logs", ".snakemake"))
 
 
+@pytest.mark.parametrize("name", ["Switch\x00 1", "Switch\x07", "a\x1b[31mred", "a\x7f"])
+def test_a_name_with_a_control_character_is_an_error(project, capsys, name):
+    table = project / "config" / "turnouts.tsv"
+    table.write_text(f"turnout\tlayout\tname\nW1\ttommerup\t{name}\n")
+    assert main(["check"]) == 2
+    assert "config/turnouts.tsv, line 2, column 13: name is" in (message := capsys.readouterr().err)
+    assert "Write it without control characters" in message and name not in message
+
+
 def test_the_folder_of_the_configuration_is_no_name_of_a_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["config", "show", "W1"]) == 2

@@ -192,6 +192,26 @@ def test_the_records_of_one_file_that_fail_alike_have_one_row_of_the_quarantine(
     assert "<td>byte 81920</td>" in text and "more of" not in text
 
 
+@pytest.mark.parametrize(
+    ("kind", "section", "status"),
+    [
+        ("hammer", "t/A7", "not read, see quarantine"),
+        ("hammer", "t/A8", "not measured"),
+        ("hammer", None, "not measured"),
+        ("passage", "t/A7", "not measured"),
+    ],
+)
+def test_a_section_whose_files_cannot_be_read_is_not_called_unmeasured(kind, section, status):
+    row = {
+        "turnout_id": "t", "kind": kind, "section_id": section, "path": "t/A7_1.csv", "record": None, "place": "line 1",
+        "reason_code": "truncated", "found": "no line break", "remedy": "Copy it again", "n_alike": 1,
+    }  # fmt: skip
+    measured = SECTION | {"section_id": "t/A9", "label": "A9"}
+    tested = REJECTED | {"section_id": "t/A9"}  # without any test the page has no table of resonances
+    text = page(sections=[SECTION, measured], models=[tested], quarantine=[row])
+    assert text.count(f"<td>{status}</td>") == 1 and text.count("<td>rejected: too_few_impacts</td>") == 1
+
+
 def test_two_channels_of_one_record_have_a_row_each():
     row = {
         "turnout_id": "t", "kind": "passage", "path": "t/p.h5", "record": 0, "reason_code": "dead_channel",

@@ -15,7 +15,7 @@ from turnout.demo import scenario
 from turnout.demo.hammer import RATE, hammer_test
 from turnout.readers.writing import write
 from turnout.registry.intake import Arrival, gather
-from turnout.report.hammer_text import _reason_lines
+from turnout.report.hammer_text import _gate_lines, _reason_lines
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.scan import scan
 
@@ -361,3 +361,18 @@ def test_modes_that_are_not_used_are_listed_by_frequency_and_other_statements_fi
     lines = _reason_lines({"reason": None, "detail": detail})
     starts = [line.removeprefix("  detail").split()[0] for line in lines]
     assert starts == ["the", "82", "579", "1061"]
+
+
+@pytest.mark.parametrize("lowest", [None, 0.96])
+@pytest.mark.parametrize("gate", ["limit", "paper"])
+def test_the_line_of_the_coherence_names_the_limit_that_it_compares(lowest, gate):
+    receptance = {"gate": gate, "frequency_hz": [100.0], "passed": [True], "valid_to_hz": 900.0}
+    rows = {"receptances": [receptance], "models": [{"coherence_minimum": lowest}]}
+    settings = load_configuration("config").turnout("tommerup_s1").settings
+    (line, _) = _gate_lines(rows, settings)
+    compared = line.partition("the gate needs ")[2]
+    if gate == "paper":
+        assert compared.startswith("the coherence itself at ")
+    else:
+        assert compared.startswith("its lower 95 % limit at " if lowest is None else "that limit at ")
+        assert line.count("lower 95 % limit") == 1

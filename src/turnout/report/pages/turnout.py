@@ -59,6 +59,7 @@ def turnout_page(
     """
     models = {m["section_id"]: m for m in rows["models"]}
     states = _worst_states(rows["chart_states"])
+    unread = {q.get("section_id") for q in rows["quarantine"] if q["kind"] == "hammer"}
     return template.render(
         turnout=turnout,
         place=_position_words(turnout),
@@ -66,7 +67,10 @@ def turnout_page(
         diagram=diagram(rows["sections"], states) if rows["sections"] else "",
         findings=lines_of(rows["worklist"]),
         mismatches=mismatches_with_limits(rows["mismatches"], rows.get("limits", ())),
-        summary=[_summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s)) for s in rows["sections"]],
+        summary=[
+            _summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s), s["section_id"] in unread)
+            for s in rows["sections"]
+        ],
         sections=[_section(rows, s, models, states) for s in rows["sections"]],
         calibrated=calibrated_panels(rows.get("calibrated", [])),
         calibrated_visits=visits_in_words(rows.get("calibrated", [])),
@@ -160,9 +164,11 @@ def _latest(modes: Sequence[Mapping[str, Any]], band: str, model: Mapping[str, A
 
 
 def _summary(
-    section: Mapping[str, Any], model: Mapping[str, Any] | None, modes: Sequence[Mapping[str, Any]]
+    section: Mapping[str, Any], model: Mapping[str, Any] | None, modes: Sequence[Mapping[str, Any]], is_unread: bool
 ) -> dict[str, Any]:
-    row = {"label": section["label"], "panel": section["panel"] or "–", "n": 0, "when": "–", "status": "not measured"}
+    """Row of the table of resonances. ``is_unread``: files of a hammer test are there, and some are in quarantine."""
+    status = "not read, see quarantine" if is_unread else "not measured"
+    row = {"label": section["label"], "panel": section["panel"] or "–", "n": 0, "when": "–", "status": status}
     if model:
         row |= {"n": model["n_impacts_used"], "when": day(model["measured_at_utc"])}
         row["status"] = model["status"].replace("_", " ") + (f": {model['reason']}" if model["reason"] else "")
