@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from turnout.config.campaign_notes import NOTE_FILES
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import LongRecording, RawDescription, ReadResult, Recording
@@ -32,7 +33,8 @@ def require_file(path: str | Path) -> Path:
     """
     path = Path(path)
     if path.is_dir():
-        inside = sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith("."))
+        files = (p for p in path.rglob("*") if p.is_file() and not p.name.startswith("."))
+        inside = sorted(p for p in files if p.name not in NOTE_FILES)  # a table is no recording
         remedy = f"Name the files in it, such as {inside[0]}" if inside else "It holds no file: name another one"
         raise ReadError(path, "the path", "it is a folder", remedy)
     if not path.exists():

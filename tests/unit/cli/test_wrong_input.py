@@ -92,6 +92,14 @@ def test_the_message_says_what_to_do(project, capsys, line):
     assert WRONG[line] in message and "Traceback" not in message
 
 
+@pytest.mark.parametrize("command", ["hammer", "passage"])
+def test_no_table_is_proposed_as_a_recording(project, capsys, command):
+    for name in ("campaigns.csv", "trains.csv"):
+        (project / "raw" / "W1" / name).write_text("a,b\n")
+    assert main([command, "raw/W1", "--turnout", "W1"]) == 2
+    assert "Name the files in it, such as raw/W1/hammer/A7_1.csv." in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", ["passage", "compare"])
 def test_a_layout_without_passages_is_named(project, capsys, command):
     without_passages(project)
