@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from turnout.passage.sensor_envelopes import SensorEnvelopes
 
 GRID_STEP = 0.04  # m, step of the grid along the train
+MAX_COUNTS = 4  # of the peaks of one feature, those of the largest contrast
+WAVENUMBER = 1.1  # 1/m, of a standard rail on its foundation
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,9 @@ def along_train(
 
 
 def axle_candidates(
-    profile: np.ndarray, start: float, spacing: float, noise: float, feature: str = "", n: int = 4
+    profile: np.ndarray, start: float, spacing: float, noise: float, feature: str = ""
 ) -> list[AxleFinding]:
-    """Up to ``n`` counts of the peaks of ``profile`` (n,), the one with the largest contrast first.
+    """Up to ``MAX_COUNTS`` counts of the peaks of ``profile`` (n,), the one with the largest contrast first.
 
     Peaks are at least ``spacing`` metres from each other. The lesser of prominence and twice the height must exceed
     ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than 60
@@ -89,8 +91,6 @@ def axle_candidates(
         Least height of a peak. [-]
     feature : str
         Name of the feature.
-    n : int
-        Largest number of counts.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def axle_candidates(
     following = np.maximum(np.append(ranked[1:], 0.0), max(0.25 * noise, 1e-12))
     ratio = np.where((ranked >= noise) & (following < 0.6 * typical), ranked / following, 0.0)
     ratio[0] = 0.0
-    cuts = [k for k in np.argsort(-ratio, kind="stable")[:n] if ratio[k] > 0] or [n_sure - 1]
+    cuts = [k for k in np.argsort(-ratio, kind="stable")[:MAX_COUNTS] if ratio[k] > 0] or [n_sure - 1]
     positions = start + _refine_peaks(profile, peaks) * GRID_STEP
     return [
         AxleFinding(
@@ -143,19 +143,17 @@ def level_feature(stack: np.ndarray) -> np.ndarray:
     return _smooth(stack, 0.2) - _smooth(stack, 0.9)
 
 
-def deflection_feature(stack: np.ndarray, wavenumber: float = 1.1) -> np.ndarray:
+def deflection_feature(stack: np.ndarray) -> np.ndarray:
     r"""Low-frequency acceleration along the train, sharpened to one peak per wheel; its sign is found here.
 
     A wheel causes v² w'' of the rail on its foundation, :math:`w'' \propto e^{-k|x|} (\sin k|x| - \cos kx)`,
-    k near 1 per metre for standard rails on ballast. The regularised inverse of that kernel is applied, then a
-    Gaussian of 0.25 m. Wheels press in one direction: the sign is that of the larger skewness.
+    with k = ``WAVENUMBER``. The regularised inverse of that kernel is applied, then a Gaussian of 0.25 m. Wheels
+    press in one direction: the sign is that of the larger skewness.
 
     Parameters
     ----------
     stack : (..., n) array of float
         Slow acceleration along the train on a grid of ``GRID_STEP``. [m/s²]
-    wavenumber : float
-        k of the rail on its foundation. [1/m]
 
     Returns
     -------
@@ -163,7 +161,7 @@ def deflection_feature(stack: np.ndarray, wavenumber: float = 1.1) -> np.ndarray
         The feature on the same grid, positive at wheels. [m/s²]
     """
     x = np.arange(-4.0, 4.0 + GRID_STEP / 2, GRID_STEP)
-    kx = wavenumber * np.abs(x)
+    kx = WAVENUMBER * np.abs(x)
     kernel = np.exp(-kx) * (np.cos(kx) - np.sin(kx))
     n = int(2 ** np.ceil(np.log2(stack.shape[-1] + 2 * len(x))))
     response = np.fft.rfft(np.roll(np.pad(kernel, (0, n - len(kernel))), -(len(x) // 2)))
@@ -209,6 +207,7 @@ def scale_profile(profile: np.ndarray, inside: np.ndarray) -> tuple[np.ndarray, 
 FIT_REACH = 2.0  # m compared on either side of an axle
 CONTACT_ROUNDING = 0.12  # m: contact patch and sleepers round the cusp at a wheel
 MAX_SHIFT = 0.6  # m that an axle may move in the fit
+MAX_FIT_STEPS = 15
 MIN_SEPARATION = 3.5  # m: axles further from each other are fitted one by one
 GRID_STRIDE = 2  # every second point of the grid is compared
 
@@ -251,11 +250,11 @@ def fit_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets: np.n
     return new_offsets if np.all(np.diff(new_offsets) > 0.5) else offsets
 
 
-def _fit_positions(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int, passes: int = 15) -> np.ndarray:
+def _fit_positions(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int) -> np.ndarray:
     """(n,) positions by Levenberg and Marquardt from ``x``: positions, heights, logarithm of the decay length."""
     misfit, jacobian = _level_misfit(grid, level, x, n)
     cost, damping = misfit @ misfit, 1e-2
-    for _ in range(passes):
+    for _ in range(MAX_FIT_STEPS):
         normal = jacobian.T @ jacobian
         normal[np.diag_indices_from(normal)] *= 1.0 + damping
         normal[np.diag_indices_from(normal)] += 1e-9

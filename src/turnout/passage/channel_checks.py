@@ -75,11 +75,15 @@ def _channel_state(channel: Channel, samples: np.ndarray, rate: float) -> Channe
     return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), lost_at)
 
 
-def clipped_share(samples: np.ndarray, limit: float | None, run: int = 3) -> tuple[float, float]:
+MIN_CLIPPED_RUN = 3  # equal extreme samples in a row that count as clipped
+MIN_CONSTANT_TIME = 0.05  # s, shortest constant end that counts, and length of the start that it is compared with
+
+
+def clipped_share(samples: np.ndarray, limit: float | None) -> tuple[float, float]:
     """Share of samples at the limit of the channel, and that limit. [-], [m/s²]
 
-    The limit is the configured one (within 0.1 %). Without one it is an extreme value that is repeated ``run`` times
-    in a row, at least twice: noise does not do that, a saturated converter does.
+    The limit is the configured one (within 0.1 %). Without one it is an extreme value that is repeated
+    ``MIN_CLIPPED_RUN`` times in a row, at least twice: noise does not do that, a saturated converter does.
 
     Parameters
     ----------
@@ -87,8 +91,6 @@ def clipped_share(samples: np.ndarray, limit: float | None, run: int = 3) -> tup
         Acceleration. [m/s²]
     limit : float or None
         Range of the channel, None if it is not known. [m/s²]
-    run : int
-        Equal extreme samples in a row that count as clipped.
 
     Returns
     -------
@@ -111,11 +113,11 @@ def clipped_share(samples: np.ndarray, limit: float | None, run: int = 3) -> tup
     at_limit = np.abs(samples) >= top * (1 - 1e-6)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_limit.astype(int), [0]])))
     lengths = edges[1::2] - edges[::2]
-    clipped = np.sum(lengths >= run) >= 2
+    clipped = np.sum(lengths >= MIN_CLIPPED_RUN) >= 2
     return (float(at_limit.mean()), top) if clipped else (0.0, top)
 
 
-def silent_from(samples: np.ndarray, rate: float, block: float = 0.05) -> float | None:
+def silent_from(samples: np.ndarray, rate: float) -> float | None:
     """Time from which a channel is constant up to its end [s], None where it changes to the end.
 
     A sensor that had this value before the train as well, within one step of its converter, is quiet and not lost.
@@ -126,8 +128,6 @@ def silent_from(samples: np.ndarray, rate: float, block: float = 0.05) -> float 
         Acceleration. [m/s²]
     rate : float
         Sampling rate. [Hz]
-    block : float
-        Shortest constant end that counts, and length of the start that it is compared with. [s]
 
     Returns
     -------
@@ -142,9 +142,9 @@ def silent_from(samples: np.ndarray, rate: float, block: float = 0.05) -> float 
     """
     changes = np.flatnonzero(np.diff(samples))
     last = (changes[-1] + 1) / rate if changes.size else 0.0
-    if len(samples) / rate - last <= block:
+    if len(samples) / rate - last <= MIN_CONSTANT_TIME:
         return None
-    start = samples[: max(int(block * rate), 1)]
+    start = samples[: max(int(MIN_CONSTANT_TIME * rate), 1)]
     quiet = np.mean(np.abs(start - samples[-1]) < 1.5 * converter_step(samples)) > 0.9
     return None if changes.size and quiet else float(last)
 

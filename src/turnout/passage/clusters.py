@@ -12,6 +12,7 @@ import scipy
 if TYPE_CHECKING:
     from turnout.config.settings.passage import PassageSettings
 
+MIN_MEMBER_SHARE = 1e-4  # of a cluster's members that are farther away; a passage below it is outside
 MIN_SD = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
 
 
@@ -57,12 +58,10 @@ class Clusters:
         numbers = [_number(c.id) for c in self.clusters if c.type == train_type]
         return max([self.used.get(train_type, 0), *numbers])
 
-    def assign(
-        self, train_type: str | None, speed_kmh: float | None, axle_load_t: float | None, level: float = 1e-4
-    ) -> str | None:
+    def assign(self, train_type: str | None, speed_kmh: float | None, axle_load_t: float | None) -> str | None:
         """Id of the cluster that a passage most likely belongs to; None where it lies outside all clusters of its type.
 
-        Outside: only a share below ``level`` of a cluster's members would be so far from it.
+        Outside: only a share below ``MIN_MEMBER_SHARE`` of a cluster's members would be so far from it.
 
         Parameters
         ----------
@@ -72,8 +71,6 @@ class Clusters:
             Speed; None gives None. [km/h]
         axle_load_t : float or None
             Mean axle load; without it the speed alone is compared. [t]
-        level : float
-            Share of a cluster's members beyond which a passage is outside. [-]
 
         Returns
         -------
@@ -91,7 +88,7 @@ class Clusters:
             deviation = point[:n_dimension] - cluster.mean[:n_dimension]
             covariance = cluster.covariance[:n_dimension, :n_dimension]
             distance_squared = float(deviation @ np.linalg.solve(covariance, deviation))
-            if scipy.stats.chi2.sf(distance_squared, n_dimension) < level:
+            if scipy.stats.chi2.sf(distance_squared, n_dimension) < MIN_MEMBER_SHARE:
                 continue
             log_density = np.log(cluster.weight) - 0.5 * distance_squared - 0.5 * np.linalg.slogdet(covariance)[1]
             if log_density > highest_log:

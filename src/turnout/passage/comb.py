@@ -259,12 +259,13 @@ def teeth_of(profiles: Profiles, comb: Comb, start: float) -> tuple[np.ndarray, 
 
 SHAPE_STRIDES = (0.24, 0.12, 0.06, 0.03)  # m, by which axles are moved, coarse to fine
 MAX_BOGIE_WHEELBASE = 3.6  # m: axles of one bogie are also moved against each other
+MAX_MOVE = 0.6  # m, of an axle
 MIN_SHARE_GAIN = 1e-4  # least gain of the explained share by a move
 START_SHIFTS = np.arange(-2, 3) * COMB_STEP  # m by which the whole row may be shifted
 
 
 def fit_shape(
-    profiles: Profiles, vehicles: Sequence[Vehicle], positions: np.ndarray, start: float, reach: float = 0.6
+    profiles: Profiles, vehicles: Sequence[Vehicle], positions: np.ndarray, start: float
 ) -> tuple[np.ndarray, float, float]:
     """(positions, share before, share after): ``positions`` moved until the comb explains most, alike in all vehicles.
 
@@ -281,8 +282,6 @@ def fit_shape(
         Metres behind the first axle.
     start : float
         First axle behind the beginning of the audible part. [m]
-    reach : float
-        Largest move of an axle. [m]
 
     Returns
     -------
@@ -301,7 +300,7 @@ def fit_shape(
             previous = share_after
             for move in _shape_moves(vehicles, unique_keys):
                 for signed in (stride, -stride):
-                    trial = np.clip(change + signed * move, -reach, reach)
+                    trial = np.clip(change + signed * move, -MAX_MOVE, MAX_MOVE)
                     share = _best_share(profiles, positions + trial[key_index], start)
                     if share > share_after + MIN_SHARE_GAIN:
                         share_after, change = share, trial

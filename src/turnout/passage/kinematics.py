@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
     from turnout.config.settings.passage import PassageSettings
 
+MIN_PEAK_DISTANCE = 0.04  # of the slowness, between two peaks of a scan
+SLOWNESS_STEP = 0.008  # of the slowness, in a coarse scan
+REFINED_WIDTH = 0.03  # of the slowness, to either side in a fine scan
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -160,15 +164,13 @@ class Scan:
     slowness: np.ndarray
     correlation: np.ndarray
 
-    def peaks(self, n: int = 3, min_distance: float = 0.04) -> list[tuple[float, float]]:
-        """The ``n`` best (slowness, correlation), at least ``min_distance`` (relative) from each other.
+    def peaks(self, n: int = 3) -> list[tuple[float, float]]:
+        """The ``n`` best (slowness, correlation), at least ``MIN_PEAK_DISTANCE`` from each other.
 
         Parameters
         ----------
         n : int
             Largest number of peaks.
-        min_distance : float
-            Least relative distance between peaks. [-]
 
         Returns
         -------
@@ -181,7 +183,7 @@ class Scan:
             if not np.isfinite(remaining[k]):
                 break
             peaks.append((self._refined_peak(k), float(self.correlation[k])))
-            remaining[np.abs(self.slowness - self.slowness[k]) < min_distance * abs(self.slowness[k])] = -np.inf
+            remaining[np.abs(self.slowness - self.slowness[k]) < MIN_PEAK_DISTANCE * abs(self.slowness[k])] = -np.inf
         return peaks
 
     def _refined_peak(self, k: int) -> float:
@@ -194,15 +196,13 @@ class Scan:
         return float(self.slowness[k] + np.clip(shift, -1, 1) * step)
 
 
-def slowness_grid(settings: PassageSettings, relative: float = 0.008) -> np.ndarray:
-    """Signed slownesses between the slowest and the fastest train, with relative steps ``relative``. [s/m]
+def slowness_grid(settings: PassageSettings) -> np.ndarray:
+    """Signed slownesses between the slowest and the fastest train, with steps of ``SLOWNESS_STEP``. [s/m]
 
     Parameters
     ----------
     settings : PassageSettings
         Slowest and fastest train.
-    relative : float
-        Relative step. [-]
 
     Returns
     -------
@@ -210,7 +210,7 @@ def slowness_grid(settings: PassageSettings, relative: float = 0.008) -> np.ndar
         Slownesses, the negative ones first. [s/m]
     """
     slow, fast = KMH / settings.speed_minimum, KMH / settings.speed_maximum
-    positive = np.geomspace(fast, slow, int(np.log(slow / fast) / relative) + 2)
+    positive = np.geomspace(fast, slow, int(np.log(slow / fast) / SLOWNESS_STEP) + 2)
     return np.concatenate([-positive[::-1], positive])
 
 
@@ -272,9 +272,8 @@ def refine_slowness(
     step: float,
     positions: np.ndarray,
     near: float,
-    reach: float = 0.03,
 ) -> tuple[float, float]:
-    """Best slowness within ``reach`` (relative) of ``near`` and its correlation, from fine ``pair_correlations``.
+    """Best slowness within ``REFINED_WIDTH`` of ``near`` and its correlation, from fine ``pair_correlations``.
 
     Parameters
     ----------
@@ -286,8 +285,6 @@ def refine_slowness(
         Positions of the sensors. [m]
     near : float
         Slowness in the middle of the range. [s/m]
-    reach : float
-        Relative half width of the range. [-]
 
     Returns
     -------
@@ -296,8 +293,8 @@ def refine_slowness(
     """
     positions = np.asarray(positions, dtype=float)
     span = max(np.ptp(positions), 0.1)
-    n = int(np.clip(2 * reach * abs(near) * span / (0.5 * step), 21, 601)) | 1
-    slowness = near * np.linspace(1 - reach, 1 + reach, n)
+    n = int(np.clip(2 * REFINED_WIDTH * abs(near) * span / (0.5 * step), 21, 601)) | 1
+    slowness = near * np.linspace(1 - REFINED_WIDTH, 1 + REFINED_WIDTH, n)
     return Scan(slowness, stack_correlations(correlations, step, positions, slowness)).peaks(1)[0]
 
 

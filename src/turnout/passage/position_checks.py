@@ -25,6 +25,7 @@ MIN_CONSISTENT_SHARE, MIN_REPAIRED_SHARE = (
     0.85,
     0.95,
 )  # of the correlation with free shifts: below is inconsistent, above is consistent
+MAX_TRIED_SHIFT = 20.0  # m, of a sensor against the others, to either side
 SMOOTHING_TIME = 0.02  # s, smoothing of the levels
 
 
@@ -136,7 +137,7 @@ def inconsistent_positions(
     return findings, keep
 
 
-def half_shifts(envelopes: SensorEnvelopes, motion: Motion, reach: float = 20.0) -> np.ndarray:
+def half_shifts(envelopes: SensorEnvelopes, motion: Motion) -> np.ndarray:
     """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train.
 
     Parameters
@@ -145,8 +146,6 @@ def half_shifts(envelopes: SensorEnvelopes, motion: Motion, reach: float = 20.0)
         Envelopes of the sensors.
     motion : Motion
         Motion of the train.
-    reach : float
-        Largest shift that is tried, to either side. [m]
 
     Returns
     -------
@@ -159,7 +158,7 @@ def half_shifts(envelopes: SensorEnvelopes, motion: Motion, reach: float = 20.0)
     values = along_train(envelopes.levels.values, envelopes.levels.step, envelopes.positions, motion, start, stop)
     values = values - values.mean(axis=1, keepdims=True)
     n, shifts = values.shape[1], np.zeros((len(values), 2))
-    lags = np.arange(-int(reach / GRID_STEP), int(reach / GRID_STEP) + 1)
+    lags = np.arange(-int(MAX_TRIED_SHIFT / GRID_STEP), int(MAX_TRIED_SHIFT / GRID_STEP) + 1)
     for k, half in enumerate((slice(0, n // 2), slice(n // 2, n))):
         rows = values[:, half]
         size = 2 ** int(np.ceil(np.log2(2 * rows.shape[1])))

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # Hz. Between ballast and railpad resonance the rail's vibration decays fastest along the track, above them slowest.
 # Three bands, each with its own logarithm, so that no resonance masks the position of the wheel.
+EDGE_WIDTH = 0.2  # of the frequency of an edge, over which a band falls to zero
 BANDS = ((30.0, 120.0), (120.0, 400.0), (400.0, 900.0))
 
 
@@ -81,10 +82,10 @@ def band_powers(
     return powers
 
 
-def _edges(frequency: np.ndarray, low: float, high: float, width: float = 0.2) -> np.ndarray:
-    """Window that is 1 between ``low`` and ``high`` and falls to 0 over ``width`` of either edge."""
-    rise = np.clip((frequency / low - 1 + width) / width, 0, 1)
-    fall = np.clip((1 + width - frequency / high) / width, 0, 1)
+def _edges(frequency: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Window that is 1 between ``low`` and ``high`` and falls to 0 over ``EDGE_WIDTH`` of either edge."""
+    rise = np.clip((frequency / low - 1 + EDGE_WIDTH) / EDGE_WIDTH, 0, 1)
+    fall = np.clip((1 + EDGE_WIDTH - frequency / high) / EDGE_WIDTH, 0, 1)
     return np.sin(0.5 * np.pi * rise) ** 2 * np.sin(0.5 * np.pi * fall) ** 2
 
 

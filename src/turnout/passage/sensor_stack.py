@@ -69,14 +69,15 @@ def feature_profiles(envelopes: SensorEnvelopes, motion: Motion) -> tuple[dict, 
     return features, start
 
 
+MAX_FIRST_SHIFT = 2.0  # m, of a sensor in the first pass
 MAX_PASSES = 3  # of the alignment of the sensors
 MAX_COUNTS = 3  # counts of axles by templates, those of the largest contrast
 
 
-def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0) -> Motion:
+def align_sensors(envelopes: SensorEnvelopes, motion: Motion) -> Motion:
     """The motion with its speed corrected until all sensors' features coincide along the train.
 
-    Each sensor's shift against the mean of the others [m], up to ``reach``, is regressed on its position.
+    Each sensor's shift against the mean of the others [m], up to ``MAX_FIRST_SHIFT``, is regressed on its position.
 
     Parameters
     ----------
@@ -84,8 +85,6 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
         Envelopes of the sensors.
     motion : Motion
         First estimate.
-    reach : float
-        Largest shift of a sensor in the first pass. [m]
 
     Returns
     -------
@@ -96,6 +95,7 @@ def align_sensors(envelopes: SensorEnvelopes, motion: Motion, reach: float = 2.0
     travel = travel - travel.mean()
     if np.ptp(travel) < 0.3:
         return motion
+    reach = MAX_FIRST_SHIFT
     for _ in range(MAX_PASSES):
         shifts = _sensor_shifts(envelopes, motion, reach)
         # the slope is v/v' - 1: a train faster than assumed arrives early at later sensors

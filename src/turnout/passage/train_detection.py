@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+MIN_RANGE = 8.0  # of the level, over its scatter
 QUIET_BLOCK = 0.05  # s over which a level is averaged
 
 
@@ -48,10 +49,10 @@ def sensor_envelopes(samples: np.ndarray, rate: float, positions: np.ndarray, st
     return SensorEnvelopes(band_levels, slow, np.asarray(positions, float), bins[0] * step, (bins[-1] + 1) * step)
 
 
-def audible_bins(level: np.ndarray, step: float, min_ratio: float = 8.0) -> np.ndarray:
+def audible_bins(level: np.ndarray, step: float) -> np.ndarray:
     """(n_bin,) bool: the level (n_bin,) over 50 ms is above a seventh of its range.
 
-    All False where that range is below ``min_ratio`` times the scatter of neighbouring blocks, or below half a neper:
+    All False where that range is below ``MIN_RANGE`` times the scatter of neighbouring blocks, or below half a neper:
     then only noise was recorded.
 
     Parameters
@@ -60,8 +61,6 @@ def audible_bins(level: np.ndarray, step: float, min_ratio: float = 8.0) -> np.n
         Level of a sensor, or the mean of several. [nepers of power]
     step : float
         Length of a bin. [s]
-    min_ratio : float
-        Least range of the level over its scatter. [-]
 
     Returns
     -------
@@ -74,7 +73,7 @@ def audible_bins(level: np.ndarray, step: float, min_ratio: float = 8.0) -> np.n
     low, high = np.quantile(blocks, 0.05), blocks.max()
     quiet = np.sort(blocks)[: max(len(blocks) // 3, 2)]
     scatter = np.median(np.abs(np.diff(blocks[np.isin(blocks, quiet)]))) / 0.954 if len(quiet) > 3 else 0.0
-    if high - low < max(min_ratio * scatter, 0.5):
+    if high - low < max(MIN_RANGE * scatter, 0.5):
         return np.zeros(len(level), dtype=bool)
     return smooth > low + (high - low) / 7.0
 

@@ -16,18 +16,19 @@ from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, N_TAPS, Profiles
 if TYPE_CHECKING:
     from turnout.passage.axle_patterns import Vehicle
 
+FIRST_AXLE_REACH = 30.0  # m, largest distance of the first axle from the expected one
 LENGTH_SLACK = 1  # grid steps that a vehicle may deviate: rounding of lengths, error of the speed
 
 
 def likeliest_row(
-    profiles: Profiles, teeth: np.ndarray, pattern: Pattern, first: float, reach: float = 30.0
+    profiles: Profiles, teeth: np.ndarray, pattern: Pattern, first: float
 ) -> tuple[tuple[Vehicle, ...], float] | None:
     r"""(row of vehicles, start [m]) of ``pattern`` with the smallest residual; None where there is none.
 
     .. math:: \|y - \sum_j k(s - d_j)\|^2 = \|y\|^2 - \sum_j \Bigl(2 m(d_j) - \sum_l a(d_j - d_l)\Bigr)
 
     with m the correlation of profile and tooth and a that of the tooth with itself: terms of a vehicle, and of a
-    vehicle and the one before it. The first axle is sought within ``reach`` metres of ``first``, both behind the
+    vehicle and the one before it. The first axle is sought within ``FIRST_AXLE_REACH`` of ``first``, both behind the
     beginning of the audible part. ``teeth`` (n_sensor, N_TAPS), ``profiles`` of one motion.
 
     Parameters
@@ -40,8 +41,6 @@ def likeliest_row(
         Axle pattern of a type of train.
     first : float
         Expected first axle, behind the beginning of the audible part. [m]
-    reach : float
-        Largest distance of the first axle from ``first``. [m]
 
     Returns
     -------
@@ -57,11 +56,12 @@ def likeliest_row(
         for v in group.vehicles:
             gains[v.name] = _vehicle_gain(match, v, overlaps)
     layers: dict[tuple, dict] = {}
+    reach = int(FIRST_AXLE_REACH / COMB_STEP)
     for node in pattern.next_vehicles(0, 0):
         for v in pattern.groups[node[0]].vehicles:
             gain = np.full(n, -np.inf)
             index = round((first + LEAD_LENGTH - v.axles[0]) / COMB_STEP)
-            inside = slice(max(index - int(reach / COMB_STEP), 0), max(index + int(reach / COMB_STEP) + 1, 0))
+            inside = slice(max(index - reach, 0), max(index + reach + 1, 0))
             gain[inside] = gains[v.name][inside]
             layers.setdefault(node, {})[v.name] = (gain, ([None], np.zeros(n, int), np.zeros(n, int)), v)
     best_end: tuple[float, tuple | None] = (-np.inf, None)

@@ -57,8 +57,8 @@ def winkler_receptance(
     return 1.0 / (8.0 * bending_stiffness * beta**3)
 
 
-def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track, support: int = 0) -> np.ndarray:
-    """(n,) complex dynamic stiffness under the rail of one support of ``track`` [N/m].
+def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track) -> np.ndarray:
+    """(n,) complex dynamic stiffness under the rail of the first support of ``track`` [N/m].
 
     Parameters
     ----------
@@ -66,8 +66,6 @@ def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track, sup
         Frequencies. [Hz]
     track : Track
         The track.
-    support : int
-        Number of the support.
 
     Returns
     -------
@@ -77,8 +75,8 @@ def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track, sup
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
 
     def spring(name: str) -> np.ndarray:
-        k, c = getattr(track, f"{name}_stiffness")[support], getattr(track, f"{name}_damping")[support]
-        loss = getattr(track, f"{name}_loss_factor")[support] if name != "subgrade" else 0.0
+        k, c = getattr(track, f"{name}_stiffness")[0], getattr(track, f"{name}_damping")[0]
+        loss = getattr(track, f"{name}_loss_factor")[0] if name != "subgrade" else 0.0
         return k * (1.0 + 1j * loss) + 1j * omega * c
 
     pad = spring("pad")
@@ -86,9 +84,9 @@ def support_stiffness(frequency: np.ndarray | Sequence[float], track: Track, sup
         return pad
     below = spring("ballast")
     if track.layers == 3:
-        ground = spring("subgrade") - omega**2 * track.ballast_mass[support]
+        ground = spring("subgrade") - omega**2 * track.ballast_mass[0]
         below = below * ground / (below + ground)
-    below = below - omega**2 * track.sleeper_mass[support]
+    below = below - omega**2 * track.sleeper_mass[0]
     return pad * below / (pad + below)
 
 

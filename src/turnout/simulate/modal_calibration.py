@@ -29,6 +29,9 @@ BOUNDS = {
     "ballast_stiffness": (5e6, 1e9),
     "ballast_damping": (1e3, 600e3),
 }
+N_IMPACTS = 2  # of a simulated test
+HALF_LENGTH = 20.0  # m of track on both sides of the impacts
+MAX_EVALUATIONS = 14  # of the misfit in a fit; each has a gradient by differences
 REPEATABLE_HAMMER = Hammer(velocity_spread=0.05, position_spread=0.0)
 
 
@@ -84,8 +87,6 @@ def section_modes(
     turnout: TurnoutTrack,
     location: str | float,
     modes_of: Callable[[tuple[Recording, ...]], Modes],
-    n_impacts: int = 2,
-    half_length: float = 20.0,
 ) -> Modes:
     """Modes of a simulated test at ``location`` by ``modes_of``: band -> (frequency [Hz], damping).
 
@@ -97,19 +98,15 @@ def section_modes(
         Position of the impacts [m], or the name of a location.
     modes_of : callable
         Recordings -> modes by band.
-    n_impacts : int
-        Impacts of the simulated test.
-    half_length : float
-        Length of track on both sides of the impacts. [m]
 
     Returns
     -------
     mapping
         Modes by band; bands without a mode are missing.
     """
-    prepared = prepare_hammer(turnout, location, half_length=half_length)
+    prepared = prepare_hammer(turnout, location, half_length=HALF_LENGTH)
     recordings = simulate_hammer(
-        turnout, location, REPEATABLE_HAMMER, n_impacts=n_impacts, duration=0.15, prepared=prepared
+        turnout, location, REPEATABLE_HAMMER, n_impacts=N_IMPACTS, duration=0.15, prepared=prepared
     )
     return modes_of(recordings)
 
@@ -119,8 +116,6 @@ def fit_modes(
     location: str,
     targets: Modes,
     modes_of: Callable[[tuple[Recording, ...]], Modes],
-    section: str | None = None,
-    evaluations: int = 14,
 ) -> ModeFit:
     """``ModeFit`` of one section; the rest of the turnout does not change.
 
@@ -129,22 +124,17 @@ def fit_modes(
     turnout : TurnoutTrack
         Its values are the start of the fit.
     location : str
-        Named location of the hammer test.
+        Named location of the hammer test. The section of this name is changed.
     targets : dict
         "ballast" and, where known, "railpad" -> (frequency [Hz], damping ratio).
     modes_of : callable
         Recordings -> a dict like ``targets``; bands without a mode are missing.
-    section : str
-        Section whose supports are changed, by default the one with the name of the location.
-    evaluations : int
-        Largest number of evaluations of the least-squares fit; each costs a gradient by differences.
 
     Returns
     -------
     ModeFit
         Fitted values, and the modes that the model has with them.
     """
-    section = section or location
     position, track = resolve_location(turnout, location)
     j = track.nearest_support(position)
     start = np.log([getattr(track, name)[j] for name in FREE_PARAMETERS])
@@ -152,7 +142,7 @@ def fit_modes(
 
     def residual(logs: np.ndarray) -> np.ndarray:
         modes = section_modes(
-            with_section(turnout, section, **dict(zip(FREE_PARAMETERS, np.exp(logs)))), location, modes_of
+            with_section(turnout, location, **dict(zip(FREE_PARAMETERS, np.exp(logs)))), location, modes_of
         )
         misfit = []
         for band, (frequency, damping) in targets.items():
@@ -161,7 +151,7 @@ def fit_modes(
         return np.concatenate([misfit, (logs - start) / PRIOR_SD])
 
     inside = np.clip(start, low + 1e-3, high - 1e-3)
-    solution = least_squares(residual, inside, diff_step=0.01, bounds=(low, high), max_nfev=evaluations)
+    solution = least_squares(residual, inside, diff_step=0.01, bounds=(low, high), max_nfev=MAX_EVALUATIONS)
     values = dict(zip(FREE_PARAMETERS, (float(v) for v in np.exp(solution.x))))
-    modes = section_modes(with_section(turnout, section, **values), location, modes_of)
-    return ModeFit(section, values, targets, modes, int(solution.nfev))
+    modes = section_modes(with_section(turnout, location, **values), location, modes_of)
+    return ModeFit(location, values, targets, modes, int(solution.nfev))

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 # Limit curve of ISO 3095:2013 in one-third octave bands from 2 m down to 3.15 mm [dB re 1 µm], the class "well
 # maintained and very smooth" of Directive (EU) 2015/996; between the bands the level is linear in the logarithm.
+SHORTEST_WAVE, LONGEST_WAVE = 0.02, 3.0  # m: the contact patch, about 15 mm, bridges shorter waves
+STEP = 0.005  # m between two values of a dip
+FADE_LENGTH = 3.0  # m over which roughness fades in and out
 WAVELENGTH = 2.0 * 10.0 ** (-0.1 * np.arange(29))
 LONG_WAVE_LEVELS = (
     17.1,
@@ -72,10 +75,6 @@ def roughness(
     end: float,
     seed: int | Sequence[int],
     offset: float = 0.0,
-    shortest: float = 0.02,
-    longest: float = 3.0,
-    step: float = 0.005,
-    fade: float = 3.0,
 ) -> Sampled:
     """A realisation of roughness between two positions, as a path.
 
@@ -84,22 +83,16 @@ def roughness(
     Parameters
     ----------
     start, end : float
-        Positions [m]; the roughness fades in and out over ``fade`` metres.
+        Positions [m]; the roughness fades in and out over ``FADE_LENGTH``.
     seed : int or sequence of int
         Seed of numpy's default generator: the same seed gives the same rail.
     offset : float
         Level above the limit curve. [dB]
-    shortest, longest : float
-        Range of wavelengths [m]. Waves shorter than the contact patch, about 15 mm, do not lift a wheel.
-    step : float
-        Distance of two values of the dip. [m]
-    fade : float
-        Length over which the roughness fades in and out. [m]
 
     Returns
     -------
     Sampled
-        Dip every ``step`` [m].
+        Dip every ``STEP`` [m].
 
     References
     ----------
@@ -107,15 +100,15 @@ def roughness(
     NoiseModelling; synthesis by random phases, Wiener-Khinchin.
     """
     rng = np.random.default_rng(seed)
-    n = int(np.ceil((end - start) / step)) + 1
-    frequency = np.fft.rfftfreq(n, step)
-    inside = (frequency >= 1.0 / longest) & (frequency <= 1.0 / shortest)
+    n = int(np.ceil((end - start) / STEP)) + 1
+    frequency = np.fft.rfftfreq(n, STEP)
+    inside = (frequency >= 1.0 / LONGEST_WAVE) & (frequency <= 1.0 / SHORTEST_WAVE)
     density = np.zeros(frequency.size)
     width = (2.0 ** (1 / 6) - 2.0 ** (-1 / 6)) * frequency[inside]
     density[inside] = 1e-12 * 10.0 ** (level(1.0 / frequency[inside], offset) / 10.0) / width
     noise = rng.normal(size=frequency.size) + 1j * rng.normal(size=frequency.size)
-    spectrum = noise * np.sqrt(density * n / (4.0 * step))
+    spectrum = noise * np.sqrt(density * n / (4.0 * STEP))
     dip = np.fft.irfft(spectrum, n)
-    distance = step * np.arange(n)
-    edge = np.clip(np.minimum(distance, distance[-1] - distance) / fade, 0.0, 1.0)
-    return Sampled(start, step, dip * edge * edge * (3.0 - 2.0 * edge))
+    distance = STEP * np.arange(n)
+    edge = np.clip(np.minimum(distance, distance[-1] - distance) / FADE_LENGTH, 0.0, 1.0)
+    return Sampled(start, STEP, dip * edge * edge * (3.0 - 2.0 * edge))

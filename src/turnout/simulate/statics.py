@@ -50,13 +50,15 @@ def motion_at_rest(prepared: Prepared, ports: PortArrays, vehicle: Vehicle | Non
     )
 
 
+TOLERANCE = 1e-7  # N, largest residual of an equilibrium; it grows with the largest load above 100 kN
+
+
 def equilibrium(
     prepared: Prepared,
     vehicle: Vehicle,
     ports: PortArrays,
     initial_ports: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     stand_in_stiffness: float,
-    tolerance: float = 1e-7,
 ) -> Motion:
     """Motion in static equilibrium under the weight of ``vehicle``, all velocities 0.
 
@@ -74,8 +76,6 @@ def equilibrium(
         Rows, weights, local compliance, stand-in share and dip of every port at time 0.
     stand_in_stiffness : float
         Stiffness of the stand-in track. [N/m]
-    tolerance : float
-        Largest residual; it grows with the largest load above 100 kN. [N]
 
     Returns
     -------
@@ -85,7 +85,7 @@ def equilibrium(
     Raises
     ------
     SimulationError
-        If the residual is not below the tolerance after 50 steps.
+        If the residual is not below ``TOLERANCE`` after 50 steps.
     """
     rows, weights, local, share, dip = initial_ports
     n_port = ports.body.size
@@ -110,7 +110,7 @@ def equilibrium(
         d = touches.T @ wheel_z - flexibility @ force - dip
         f, slope = _law_forces(ports, d)
         residual = np.concatenate([force - f, stiff @ wheel_z - load + touches @ force])
-        if np.max(np.abs(residual)) < tolerance * max(1.0, np.max(np.abs(load), initial=0.0) / 1e5):
+        if np.max(np.abs(residual)) < TOLERANCE * max(1.0, np.max(np.abs(load), initial=0.0) / 1e5):
             return _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d)
         jacobian = np.zeros((n, n))
         jacobian[:n_port, :n_port] = np.eye(n_port) + slope[:, None] * flexibility

@@ -318,10 +318,12 @@ def _check_length(path_name: str, position: float, length: float) -> None:
         raise SimulationError(f"{path_name} at {position:.3f} m: a length of {length!r} m is none.")
 
 
-def check_path(
-    path_parts: Sequence[PathPart], start: float, end: float, step: float = 0.005, limit: float = 1e-3
-) -> None:
-    """Reject a path with a jump of more than ``limit`` [m] that remains on a grid 2000 times finer.
+CHECK_STEP = 0.005  # m between the positions that are compared
+MAX_CHECK_JUMP = 1e-3  # m, largest jump between two of them that is not examined further
+
+
+def check_path(path_parts: Sequence[PathPart], start: float, end: float) -> None:
+    """Reject a path with a jump of more than ``MAX_CHECK_JUMP`` that remains on a grid 2000 times finer.
 
     Parameters
     ----------
@@ -331,23 +333,19 @@ def check_path(
         First position. [m]
     end : float
         Last position. [m]
-    step : float
-        Distance of the positions that are compared. [m]
-    limit : float
-        Largest jump between two of them that is not examined further. [m]
 
     Raises
     ------
     SimulationError
         For a jump, and for a dip that is not a number.
     """
-    x = np.arange(start, end + step, step)
+    x = np.arange(start, end + CHECK_STEP, CHECK_STEP)
     for path_part in path_parts:
         p = path_part(x, 0)
         jumps = np.abs(np.diff(p))
         if not np.all(np.isfinite(p)):
             raise SimulationError(f"path {path_part!r}: not a number at {x[~np.isfinite(p)][0]:.3f} m.")
-        for k in np.flatnonzero(jumps > limit)[:50]:
+        for k in np.flatnonzero(jumps > MAX_CHECK_JUMP)[:50]:
             fine = np.linspace(x[k], x[k + 1], 2001)
             jump = np.max(np.abs(np.diff(path_part(fine, 0))))
             if jump > 0.5 * jumps[k]:

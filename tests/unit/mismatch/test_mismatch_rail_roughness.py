@@ -96,6 +96,18 @@ def test_the_waves_next_to_the_shortest_free_one_do_not_show(slow_train):
     assert change @ change < 0.1
 
 
+@pytest.mark.parametrize(("centre", "offset"), [(0.8, 0.0), (0.4, 6.0)])
+def test_the_waves_of_a_third_octave_have_together_the_power_of_the_limit_curve(centre, offset):
+    """ISO 3095: 10^(L / 10) µm², here the mean over the octave. Cosine and sine of one standard deviation each are a
+    wave of this variance. 0.5 %: whole waves in a period of 2 km, and the width of the band for its logarithm."""
+    length, edge = 2000.0, 2.0 ** (1 / 6)
+    orders = np.arange(np.ceil(length / (centre * edge)), length * edge / centre)
+    power = np.sum(amplitude_sd(length / orders, length, offset) ** 2)
+    wavelengths = np.geomspace(centre / edge, centre * edge, 20001)
+    expected = 1e-12 * np.mean(10.0 ** ((level(wavelengths, 0.0) + offset) / 10.0))
+    assert power == pytest.approx(expected, rel=5e-3)
+
+
 def _whitened_change(passage, wavelength):
     """(n,) what a wave of one prior standard deviation all along the free waves changes in a passage, simulated."""
     case, values, seen = passage

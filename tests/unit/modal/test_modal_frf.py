@@ -51,19 +51,23 @@ def damped_modes(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_receptance_mobility_and_accelerance_give_the_same_modes(seed):
+    """The local polynomial misses part of the slope of the neighbours within a half-width: a share like the damping.
+
+    The bias is a share of the half-width, zeta, times a factor below 0.02 in frequency, 4 in damping and 6 in residue.
+    """
     fn, zeta, weight, f, receptance = damped_modes(seed)
     omega = 2j * np.pi * f
     found = [modes_of_frf(f, receptance * omega**k).modes for k in (0, 1, 2)]
     for modes in found:
-        assert [m.frequency.mean for m in modes] == pytest.approx(fn, rel=2e-3)
-        assert [m.damping.mean for m in modes] == pytest.approx(zeta, rel=0.15)
+        assert np.all(np.abs(np.array([m.frequency.mean for m in modes]) / fn - 1.0) < 0.02 * zeta)
+        assert [m.damping.mean for m in modes] == pytest.approx(zeta, rel=4.0 * zeta.max())
         assert [m.frequency.mean for m in modes] == pytest.approx([m.frequency.mean for m in found[0]], rel=1e-7)
     # Near its pole s, w / (fn² - f² + 2j zeta fn f) is R / (i omega - s) with R = -j pi w / fd and fd damped.
     expected = -1j * np.pi * weight / (fn * np.sqrt(1.0 - zeta**2))
     for k, modes in enumerate(found):
         pole = 2 * np.pi * fn * (-zeta + 1j * np.sqrt(1.0 - zeta**2))
         residue = np.array([m.residue[0] for m in modes]) / pole**k
-        assert residue == pytest.approx(expected, rel=0.3)
+        assert residue == pytest.approx(expected, rel=6.0 * zeta.max())
 
 
 def test_a_response_that_is_zero_at_zero_hertz_has_its_modes():
