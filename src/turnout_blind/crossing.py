@@ -48,12 +48,12 @@ class Crossing:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Positions. [m]
 
         Returns
         -------
-        array
+        (n,) array of float
             Dip, down positive. [m]
         """
         distance = np.asarray(x) - self.nose
@@ -66,13 +66,13 @@ class Crossing:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Positions. [m]
 
         Returns
         -------
-        two arrays of float
-            Factors of bending stiffness and mass.
+        two (n,) arrays of float
+            Factors of bending stiffness and mass. [-]
         """
         start, end = self.ends
         casting_share = np.clip(np.minimum(x - start, end - x) / RAMP_LENGTH + 0.5, 0.0, 1.0)

@@ -429,8 +429,9 @@ def march(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
     """March ``n_step`` steps.
 
-    Velocities are those half a step after each whole step. The state is (w, v, turn, q, moment, sleeper displacement,
-    sleeper velocity).
+    Velocities are those half a step after each whole step. The state is deflection w [m], its
+    velocity v [m/s], rotational velocity turn [rad/s], shear force q [N] and moment [N m] of the rail, displacement [m]
+    and velocity [m/s] of the sleepers.
 
     Parameters
     ----------
@@ -465,9 +466,14 @@ def march(
 
     Returns
     -------
-    (array, array, array, tuple of arrays)
-        Velocities (n_step, n_sensor) [m/s], hammer force (n_step,) [N], wheel forces (n_step // every + 1, n_wheel)
-        [N], last state.
+    velocity : (n_step, n_sensor) array of float
+        Of the rail at the sensors. [m/s]
+    hammer_force : (n_step,) array of float
+        [N]
+    wheel_force : (n_step // every + 1, n_wheel) array of float
+        [N]
+    state : tuple of arrays
+        The last state: (n_node,) w, v and moment, (n_node - 1,) turn and q, (n_support,) of the sleepers.
     """
     n = beam.rate.size
     w, v, q, moment, f = np.zeros(n), np.zeros(n), np.zeros(n - 1), np.zeros(n), np.zeros(n)

@@ -6,10 +6,11 @@ import numpy as np
 
 
 class Beam(NamedTuple):
-    """Rail on its grid: constants, or arrays where its section changes.
+    """Rail on its grid of ``step`` [m]: constants, or arrays where its section changes.
 
-    ``bending`` and ``mass`` belong to nodes, ``shear`` and ``rotary`` to the intervals between them. ``rate`` and
-    ``rate_between`` [1/s] are damping rates of the nodes and of the rotations between them.
+    ``bending`` [N m²] and ``mass`` [kg/m] belong to nodes, (n_node,). ``shear`` [N] and ``rotary`` [kg m] belong to the
+    intervals between them, (n_node - 1,). ``rate`` (n_node,) and ``rate_between`` (n_node - 1,) [1/s] are damping rates
+    of the nodes and of the rotations between them.
     """
 
     step: float
@@ -22,13 +23,14 @@ class Beam(NamedTuple):
 
 
 class Supports(NamedTuple):
-    """Supports, (n,) each; ``first`` and ``weights`` (n, 4) are their nodes on the grid.
+    """Supports, arrays (n_support,) unless noted.
 
-    ``lift``: pad stiffness in uplift over that in compression. ``gap`` [m] under the sleeper; below 0 there is none and
-    the ballast acts in both directions. ``seated``: share of the bed without a gap. ``close`` [m]: compression over
-    which the gap closes. ``hardening`` [1/m] and ``drift`` [1/s] of the ballast stiffness. ``shear`` and
-    ``shear_damping`` act between neighbouring sleepers. ``branch_share`` (of the pad stiffness) and ``branch_rate``
-    [1/s] describe Maxwell elements.
+    ``first`` and ``weights`` (n_support, 4) are their nodes on the grid. Stiffnesses in N/m, dampings in N s/m,
+    ``mass`` of the sleepers [kg]. ``lift``: pad stiffness in uplift over that in compression. ``gap`` [m] under the
+    sleeper; below 0 there is none and the ballast acts in both directions. ``seated``: share of the bed without a gap.
+    ``close`` [m]: compression over which the gap closes. ``hardening`` [1/m] and ``drift`` [1/s] of the ballast
+    stiffness. ``shear`` and ``shear_damping`` act between neighbouring sleepers. ``branch_share`` (of the pad
+    stiffness) and ``branch_rate`` [1/s], (n_branch,) each, describe Maxwell elements.
     """
 
     first: np.ndarray
@@ -53,10 +55,11 @@ class Supports(NamedTuple):
 class Blade(NamedTuple):
     """Second rail from node ``start`` of the grid on, its first node free; no values: none.
 
-    ``bending`` and ``mass`` belong to its nodes, ``shear`` and ``rotary`` to the intervals between them, as the rates.
-    ``first`` and ``weights`` (n, 4) are the nodes above the chairs, ``support`` their supports. A ``gap`` [m] below 0
-    is a fastening; others press only, with a preload ``load`` [N] if they are closed. Wheels change to it between
-    ``change_start`` and ``change_end`` [m].
+    ``bending``, ``mass`` and ``rate`` belong to its nodes, (n_node,). ``shear``, ``rotary`` and ``rate_between`` belong
+    to the intervals between them, (n_node - 1,). Units as of ``Beam``. Chairs have arrays (n_chair,): ``first`` and
+    ``weights`` (n_chair, 4) are the nodes above them, ``support`` their supports, ``stiffness`` [N/m] and ``damping``
+    [N s/m]. A ``gap`` [m] below 0 is a fastening; others press only, with a preload ``load`` [N] if closed. Wheels
+    change to it between ``change_start`` and ``change_end`` [m].
     """
 
     start: int
@@ -88,7 +91,11 @@ def no_blade() -> Blade:
 
 
 class AttachedMasses(NamedTuple):
-    """Masses attached to the rail by a spring, with stops of stiffness ``stop`` at ``play`` [m] on both sides."""
+    """Masses attached to the rail by a spring, with stops of stiffness ``stop`` at ``play`` [m] on both sides.
+
+    Arrays (n_mass,): ``mass`` [kg], ``stiffness`` and ``stop`` [N/m], ``damping`` [N s/m]. ``first`` and ``weights``
+    (n_mass, 4) are their nodes on the grid.
+    """
 
     first: np.ndarray
     weights: np.ndarray
@@ -100,7 +107,11 @@ class AttachedMasses(NamedTuple):
 
 
 class Cars(NamedTuple):
-    """(n,) per car, for one rail: body, two bogies, four wheels; masses [kg], inertias [kg m²], suspension."""
+    """Cars for one rail, arrays (n_car,): body, two bogies, four wheels.
+
+    Masses [kg], inertias [kg m²], stiffness [N/m] and damping [N s/m] of the suspension at one wheel or bogie, half
+    distances [m] of the wheels of a bogie and of its pivots.
+    """
 
     body: np.ndarray
     body_inertia: np.ndarray
@@ -115,11 +126,11 @@ class Cars(NamedTuple):
 
 
 class Wheels(NamedTuple):
-    """(4 n_car,) mass, static load [N] and distance behind the first wheel [m].
+    """Wheels, arrays (4 n_car,): ``mass`` [kg], static ``load`` [N], distance behind the first [m].
 
-    ``path`` (n, m) is the surface under each wheel, from ``path_start`` in steps of ``path_step`` [m],
-    ``blade_path`` that of a second rail. ``stiffness`` is
-    the Hertz constant [N/m^1.5], ``local`` a compliance of the rail [m/N].
+    ``path`` (4 n_car, m) is the surface under each wheel [m], from ``path_start`` in steps of ``path_step`` [m],
+    ``blade_path`` (4 n_car, m) that of a second rail. ``stiffness`` is the Hertz constant [N/m^1.5], ``local`` a
+    compliance of the rail [m/N].
     """
 
     mass: np.ndarray
@@ -149,7 +160,11 @@ class WheelMotion(NamedTuple):
 
 
 class Hammer(NamedTuple):
-    """Hammer with ``velocities`` and ``times`` of its impacts and tip force k d^1.5 (1 + loss d'). ``mass`` 0: none."""
+    """Hammer of ``mass`` [kg], 0 for none, with tip force k d^1.5 (1 + loss d').
+
+    ``velocities`` [m/s] and ``times`` [s] of its impacts, (n_impact,) each. ``first`` and ``weights`` (4,) are its
+    nodes on the grid, ``tip`` is k [N/m^1.5], ``loss`` [s/m].
+    """
 
     first: int
     weights: np.ndarray

@@ -45,12 +45,12 @@ def patch_share(wavelength: ArrayLike) -> np.ndarray:
 
     Parameters
     ----------
-    wavelength : float or array
+    wavelength : float or (...) array of float
         Wavelength. [m]
 
     Returns
     -------
-    array
+    (...) array of float
         Share, 0 to 1.
     """
     return np.exp(-((2.0 * np.pi * CONTACT_HALF_LENGTH / np.asarray(wavelength)) ** 2))

@@ -58,12 +58,12 @@ class Switch:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Positions. [m]
 
         Returns
         -------
-        array
+        (n,) array of float
             Dip, down positive. [m]
         """
         return self.depth * np.clip(1.0 - (x - self.toe) / self.length, 0.0, 1.0) ** BLADE_POWER
@@ -73,12 +73,12 @@ class Switch:
 
         Parameters
         ----------
-        x : array of float
+        x : (n,) array of float
             Positions. [m]
 
         Returns
         -------
-        array
+        (n,) array of float
             Dip, down positive. [m]
         """
         return self.fall * np.clip((x - self.fall_start) / self.fall_length, 0.0, 1.0) ** STOCK_POWER
@@ -88,8 +88,8 @@ class Switch:
 class TrueBlade:
     """State of a blade: ``supports`` (n,) of the track under it, each with ``stiffness``, ``damping`` and ``gap``.
 
-    A ``gap`` of -1 marks a fastening. ``surface`` is a list of functions of position that lower its top. ``wheels``:
-    (train, axle from 1) -> factor and shift [m] of the fall on the stock rail.
+    These are arrays (n,) in N/m, N s/m and m. A ``gap`` of -1 marks a fastening. ``surface`` is a list of functions of
+    position that lower its top. ``wheels``: (train, axle from 1) -> factor and shift [m] of the fall on the stock rail.
     """
 
     switch: Switch

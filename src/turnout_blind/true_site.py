@@ -27,13 +27,14 @@ def _empty_array() -> np.ndarray:
 class World:
     """The true track, wheels and sensors: arrays (n_support,) unless noted, SI units. An effect changes a ``copy()``.
 
-    ``pad`` is the stiffness at the ``reference`` temperature; ``softening``, a function of kelvin above it, multiplies
-    it. ``profile`` is None, or at a crossing (bending, mass) of every node as factors on the values of the rail.
-    ``surface`` is a list of functions of position [m] that give dips of the rail [m]. ``treads`` maps (train, axle from
-    1) to functions of position, phase and radius. ``attached_masses`` holds (position, mass, stiffness, damping, play,
-    stop). ``channels`` maps a sensor to functions (recording type, rng) -> (function (signal, rate) -> signal).
-    ``passage_noise`` is a list of functions (time, sensor positions, k, rng) -> accelerations (n_sensor, n) of another
-    source. ``blade`` is that of a switch, None without one.
+    ``branch_share`` and ``branch_rate`` are (n_branch,). ``pad`` is the stiffness at the ``reference`` temperature;
+    ``softening``, a function of kelvin above it, multiplies it. ``profile`` is None, or at a crossing (bending, mass)
+    of every node as factors on the values of the rail. ``surface`` is a list of functions of position [m] that give
+    dips of the rail [m]. ``treads`` maps (train, axle from 1) to functions of position, phase and radius.
+    ``attached_masses`` holds (position, mass, stiffness, damping, play, stop). ``channels`` maps a sensor to functions
+    (recording type, rng) -> (function (signal, rate) -> signal). ``passage_noise`` is a list of functions (time, sensor
+    positions, k, rng) -> accelerations (n_sensor, n) of another source. ``blade`` is that of a switch, None without
+    one.
     """
 
     grid: Grid

@@ -23,7 +23,7 @@ def dip_depth(x: ArrayLike, position: float, depth: float, length: float, share:
 
     Parameters
     ----------
-    x : array of float
+    x : (n,) array of float
         Positions. [m]
     position : float
         Position of the lowest point. [m]
@@ -36,7 +36,7 @@ def dip_depth(x: ArrayLike, position: float, depth: float, length: float, share:
 
     Returns
     -------
-    array
+    (n,) array of float
         Depth, down positive. [m]
     """
     distance = np.asarray(x) - position

@@ -30,7 +30,7 @@ def wear_depth(x: ArrayLike, position: float, depth: float, length: float, share
 
     Parameters
     ----------
-    x : array of float
+    x : (n,) array of float
         Positions. [m]
     position : float
         Position of the tip. [m]
@@ -43,7 +43,7 @@ def wear_depth(x: ArrayLike, position: float, depth: float, length: float, share
 
     Returns
     -------
-    array
+    (n,) array of float
         Loss of height, down positive. [m]
     """
     distance = np.asarray(x) - position

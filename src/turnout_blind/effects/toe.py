@@ -25,7 +25,7 @@ def lost_height(x: ArrayLike, position: float, depth: float, length: float) -> n
 
     Parameters
     ----------
-    x : array of float
+    x : (n,) array of float
         Positions. [m]
     position : float
         Middle. [m]
@@ -36,7 +36,7 @@ def lost_height(x: ArrayLike, position: float, depth: float, length: float) -> n
 
     Returns
     -------
-    array
+    (n,) array of float
         [m]
     """
     distance = np.abs(np.asarray(x) - position)
