@@ -16,7 +16,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import above_zero, add_use, at_least_one
+from turnout.cli.option_types import above_zero, at_least_one
+from turnout.cli.options import add_use
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

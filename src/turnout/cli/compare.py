@@ -13,7 +13,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout, finite_number, whole_number
+from turnout.cli.option_types import finite_number, whole_number
+from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout
 
 if TYPE_CHECKING:
     from turnout.stages.compare import PassageComparison

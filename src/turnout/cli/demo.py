@@ -9,7 +9,8 @@ gives the same samples. The configuration that comes with the program (config/) 
 
 import argparse
 
-from turnout.cli.options import add_cores, whole_number
+from turnout.cli.option_types import whole_number
+from turnout.cli.options import add_cores
 
 GROUP = "Examples"
 HELP = "make a demonstration fleet and run the whole workflow on it"

@@ -17,6 +17,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from turnout.cli.option_types import zero_or_more
 from turnout.cli.options import (
     add_configuration,
     add_pages,
@@ -27,7 +28,6 @@ from turnout.cli.options import (
     add_turnout,
     add_use,
     add_work,
-    zero_or_more,
 )
 from turnout.counts import count_of
 

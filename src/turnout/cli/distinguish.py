@@ -10,7 +10,8 @@ distinguished. A name needs 12 in the column "none" and 6 against each rival.
 
 import argparse
 
-from turnout.cli.options import RAIL_TEMPERATURE, SPEED, add_configuration, add_former, add_track, finite_number
+from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number
+from turnout.cli.options import add_configuration, add_former, add_track
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"

@@ -15,7 +15,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from turnout.cli.options import above_zero, add_result, add_use
+from turnout.cli.option_types import above_zero
+from turnout.cli.options import add_result, add_use
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

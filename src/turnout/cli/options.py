@@ -1,12 +1,12 @@
-"""Options that several commands share, each declared once, and types of option values."""
+"""Options that several commands share, each declared once."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import sys
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from turnout.cli.option_types import at_least_one
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -14,159 +14,6 @@ if TYPE_CHECKING:
 
 RAW_HELP = "raw root, the folder of all recordings"
 TRACK_HELP = "file in config/tracks, or its path (default: the turnout's own, else tommerup)"
-
-
-def at_least_one(text: str) -> int:
-    """The number of ``text``, 1 or more; argparse.ArgumentTypeError otherwise.
-
-    Parameters
-    ----------
-    text : str
-        Value of an option.
-
-    Returns
-    -------
-    int
-        The number.
-
-    Examples
-    --------
-    >>> at_least_one("4")
-    4
-    """
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
-    return number
-
-
-def whole_number(text: str) -> int:
-    """The whole number of ``text``; argparse.ArgumentTypeError otherwise.
-
-    Parameters
-    ----------
-    text : str
-        Value of an option.
-
-    Returns
-    -------
-    int
-        The number.
-
-    Examples
-    --------
-    >>> whole_number("-3")
-    -3
-    """
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
-
-
-def above_zero(text: str) -> float:
-    """The number of ``text``, above 0; argparse.ArgumentTypeError otherwise.
-
-    Parameters
-    ----------
-    text : str
-        Value of an option.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Examples
-    --------
-    >>> above_zero("160")
-    160.0
-    """
-    return finite_number(text, lower_limit=0.0)
-
-
-def zero_or_more(text: str) -> float:
-    """The finite number of ``text``, 0 or more; argparse.ArgumentTypeError otherwise.
-
-    Parameters
-    ----------
-    text : str
-        Value of an option.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Examples
-    --------
-    >>> zero_or_more("0")
-    0.0
-    """
-    number = finite_number(text)
-    if number < 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not 0 or more")
-    return number
-
-
-def finite_number(text: str, lower_limit: float = -math.inf) -> float:
-    """The finite number of ``text``; argparse.ArgumentTypeError otherwise.
-
-    Parameters
-    ----------
-    text : str
-        Value of an option.
-    lower_limit : float
-        The number has to be above it.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Examples
-    --------
-    >>> finite_number("-12.5")
-    -12.5
-    """
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not lower_limit < number < math.inf:
-        limit = "" if lower_limit == -math.inf else f" above {lower_limit:g}"
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number{limit}")
-    return number
-
-
-@dataclass(frozen=True)
-class NumberBetween:
-    """Type of an option: a number from ``lowest`` to ``highest`` in ``unit``; argparse.ArgumentTypeError otherwise.
-
-    Examples
-    --------
-    >>> NumberBetween(1.0, 500.0, "km/h")("160")
-    160.0
-    """
-
-    lowest: float
-    highest: float
-    unit: str
-
-    def __call__(self, text: str) -> float:
-        number = finite_number(text)
-        if not self.lowest <= number <= self.highest:
-            raise argparse.ArgumentTypeError(
-                f"{text!r} is not a number from {self.lowest:g} to {self.highest:g} {self.unit}"
-            )
-        return number
-
-
-SPEED = NumberBetween(1.0, 500.0, "km/h")
-RAIL_TEMPERATURE = NumberBetween(-50.0, 80.0, "°C")
 
 
 def add_configuration(

@@ -17,7 +17,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import above_zero, add_registry, whole_number
+from turnout.cli.option_types import above_zero, whole_number
+from turnout.cli.options import add_registry
 
 if TYPE_CHECKING:
     from typing import Any

@@ -11,7 +11,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_use, add_work, at_least_one
+from turnout.cli.option_types import at_least_one
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_use, add_work
 from turnout.counts import count_of
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_csv, add_registry, add_result, at_least_one
+from turnout.cli.option_types import at_least_one
+from turnout.cli.options import add_csv, add_registry, add_result
 from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:

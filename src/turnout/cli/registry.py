@@ -13,7 +13,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_registry, at_least_one
+from turnout.cli.option_types import at_least_one
+from turnout.cli.options import add_registry
 from turnout.counts import count_of
 
 if TYPE_CHECKING:

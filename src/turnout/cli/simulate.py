@@ -11,17 +11,8 @@ and force of each impact, or the forces of the wheels.
 
 import argparse
 
-from turnout.cli.options import (
-    RAIL_TEMPERATURE,
-    SPEED,
-    add_configuration,
-    add_former,
-    add_raw,
-    add_track,
-    add_turnout,
-    finite_number,
-    whole_number,
-)
+from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number, whole_number
+from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout
 
 GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"

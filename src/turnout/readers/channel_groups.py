@@ -12,7 +12,7 @@ from turnout.readers.metadata_names import ATTRIBUTES_MARK, TIME_NAMES
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.scale_words import is_scale_name
 from turnout.readers.stated_scales import scale_text
-from turnout.readers.stated_units import is_unit_name
+from turnout.readers.unit_names import is_unit_name
 
 STATED_SCALES = "(scales)"  # pairs (channel, statement about its scale) that a reader adds to the variables
 # Names that say nothing about what a vector is, so that its channel is named by the group.

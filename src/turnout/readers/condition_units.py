@@ -11,9 +11,10 @@ from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import CONDITION_QUANTITIES, TEMPERATURES
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import number_and_unit
-from turnout.readers.stated_units import conditions_of_unit, known_unit
+from turnout.readers.stated_units import known_unit
 from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
+from turnout.readers.unit_names import conditions_of_unit
 
 # Notations of units of temperature: "°C", "ºC", "oC", "deg. C", "degrees Celsius", "c".
 TEMPERATURE_UNIT = re.compile(

@@ -41,8 +41,8 @@ from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_sensitivities import is_sensitivity_name
-from turnout.readers.stated_units import is_unit_name
 from turnout.readers.time_texts import is_day, looks_dated
+from turnout.readers.unit_names import is_unit_name
 
 HEAD_LINE = re.compile(rf"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*(?:{COLON}|[=,;\t])\s*(.*)$")
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}

@@ -4,7 +4,6 @@ import io
 import re
 from collections.abc import Sequence
 from mmap import mmap
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ from pyarrow import csv
 from turnout.readers.clock_texts import is_clock_or_date, with_dates, with_durations
 from turnout.readers.csv_cells import (
     MISSING_VALUES,
-    MarkStatistics,
     cell_errors,
     cells_of,
     check_thousands,
@@ -22,8 +20,9 @@ from turnout.readers.csv_cells import (
     first_cells,
 )
 from turnout.readers.csv_header import entries_of_lines
+from turnout.readers.csv_row_reader import N_SUMMARY_ROWS, RowReader
 from turnout.readers.entries import Entry
-from turnout.readers.lazy import Column, LazyColumn
+from turnout.readers.lazy import Column
 from turnout.readers.source import Source
 
 
@@ -137,9 +136,6 @@ def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) 
     return end
 
 
-N_SUMMARY_ROWS = 6  # rows at the end, among which those of the least and the largest numbers are looked for
-
-
 def _check_summary(columns: Sequence[Column], first_line: int, source: Source) -> None:
     """ReadError if a row at the end holds the least, and one the largest number that each column has above it.
 
@@ -240,145 +236,6 @@ def lazy_columns(
 
 def line_number(data: bytes | mmap, offset: int) -> int:
     return data[:offset].count(b"\n")
-
-
-class FilePart(io.RawIOBase):
-    """Bytes of a file from ``start`` up to ``stop`` as a file of their own, which is read from its beginning.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    start, stop : int
-        First byte, and that behind the last one.
-    """
-
-    def __init__(self, path: Path, start: int, stop: int):
-        self.file, self.n_left = path.open("rb"), stop - start
-        self.file.seek(start)
-
-    def readable(self) -> bool:
-        """Whether it can be read.
-
-        Returns
-        -------
-        bool
-            Always.
-        """
-        return True
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Further bytes.
-
-        Parameters
-        ----------
-        size : int or None
-            At most so many; all if it is negative or None.
-
-        Returns
-        -------
-        bytes
-            Empty at the end of the part.
-        """
-        data = self.file.read(self.n_left if size is None or size < 0 else min(size, self.n_left))
-        self.n_left -= len(data)
-        return data
-
-    def close(self) -> None:
-        """Close the file."""
-        self.file.close()
-        super().close()
-
-
-class RowReader:
-    """Reads the rows of a text file in order; a request for earlier rows starts again at the beginning.
-
-    Parameters
-    ----------
-    path : Path
-        The text file.
-    offset : int
-        Byte at which the numbers begin.
-    end : int
-        Byte behind them.
-    options : dict of str to any
-        Options of ``pyarrow.csv.open_csv``.
-    """
-
-    def __init__(self, path: Path, offset: int, end: int, options: dict[str, Any]):
-        self.path, self.offset, self.end, self.options = path, offset, end, options
-        self.n_row, self.begin = 0, 0
-        self.marks: list[MarkStatistics] = []
-        self.low = self.high = self.last_rows = np.empty((0, 0))
-        self.batches: list[pa.RecordBatch] = []
-        self.reader: csv.CSVStreamingReader | None = None
-
-    def scan(self, time: int | None) -> np.ndarray | None:
-        """Count the rows, collect marks and extremes of each column, and read the time column.
-
-        Parameters
-        ----------
-        time : int or None
-            Number of the time column, from 0; None: there is none.
-
-        Returns
-        -------
-        (n_row,) array or None
-            The time as it is written; None without a time column.
-        """
-        values = []
-        for batch in self._open():
-            self.n_row += batch.num_rows
-            self.marks = self.marks or [MarkStatistics() for _ in batch.columns]
-            for statistics, column in zip(self.marks, batch.columns):
-                statistics.add(column.to_numpy(zero_copy_only=False))
-            self._add_extremes(np.column_stack([column.to_numpy(zero_copy_only=False) for column in batch.columns]))
-            if time is not None:
-                values.append(batch.column(time).to_numpy(zero_copy_only=False))
-        return None if time is None else np.concatenate(values)
-
-    def _add_extremes(self, rows: np.ndarray) -> None:
-        """Extend the least and largest numbers above the last rows by those of further rows."""
-        rows = np.concatenate([self.last_rows, rows]) if self.last_rows.size else rows
-        above, self.last_rows = rows[:-N_SUMMARY_ROWS], rows[-N_SUMMARY_ROWS:]
-        if len(above):
-            self.low = np.min([*self.low[-1:], above.min(axis=0)], axis=0)[None]
-            self.high = np.max([*self.high[-1:], above.max(axis=0)], axis=0)[None]
-
-    @property
-    def may_have_summary(self) -> bool:
-        """Whether one of the last rows holds the least, and one the largest number of each column."""
-        return all(bool((self.last_rows == extreme).all(axis=1).any()) for extreme in (self.low, self.high))
-
-    def column(self, i: int) -> LazyColumn:
-        """Column number ``i``.
-
-        Parameters
-        ----------
-        i : int
-            Number of the column, from 0.
-
-        Returns
-        -------
-        LazyColumn
-            Its numbers, read when it is sliced.
-        """
-        return LazyColumn(lambda start, stop: self._read_rows(i, start, stop), self.n_row, np.dtype(float))
-
-    def _open(self) -> csv.CSVStreamingReader:
-        return csv.open_csv(FilePart(self.path, self.offset, self.end), **self.options)
-
-    def _read_rows(self, i: int, start: int, stop: int) -> np.ndarray:
-        if self.reader is None or start < self.begin:
-            self.reader, self.begin, self.batches = self._open(), 0, []
-        end = self.begin + sum(batch.num_rows for batch in self.batches)
-        while end < stop:
-            self.batches.append(self.reader.read_next_batch())
-            end += self.batches[-1].num_rows
-            while self.begin + self.batches[0].num_rows <= start:
-                self.begin += self.batches.pop(0).num_rows
-        table = pa.Table.from_batches(self.batches).slice(start - self.begin, stop - start)
-        return table.column(i).to_numpy()
 
 
 SIZE_OF_FIRST_ROWS = 2**13  # bytes in which a decimal comma is looked for

@@ -28,9 +28,10 @@ from turnout.readers.scale_words import (
 )
 from turnout.readers.source import CONDITIONS, SIMULATED_CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
-from turnout.readers.stated_units import UNIT_WORD, is_unit_of_other, known_unit
+from turnout.readers.stated_units import known_unit
 from turnout.readers.statements import USUAL_RATES, statements_of_value
 from turnout.readers.time_texts import looks_dated
+from turnout.readers.unit_names import UNIT_WORD, is_unit_of_other
 from turnout.units import Conversion
 
 RATE, SCALE, UNIT, DURATION = "sampling rate", "scale", "unit", "duration"

@@ -35,7 +35,7 @@ from turnout.readers.matlab_objects import (
 from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
-from turnout.readers.stated_units import is_unit_name
+from turnout.readers.unit_names import is_unit_name
 
 SPARSE_MATRIX = UnreadObject(
     "sparse matrix", "Store it with all its zeros in MATLAB before saving, x = full(x)", is_matlab=False

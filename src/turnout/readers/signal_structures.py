@@ -15,7 +15,7 @@ from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.sample_variables import Attributes, matrices, vectors
 from turnout.readers.source import COPY_AGAIN, Source
-from turnout.readers.stated_units import is_unit_name
+from turnout.readers.unit_names import is_unit_name
 
 X_AXIS = re.compile(r"x_?(?:values?|axis)|abscissa", re.IGNORECASE)
 Y_AXIS = re.compile(r"y_?(?:values?|axis)|ordinate", re.IGNORECASE)

@@ -83,7 +83,7 @@ def test_each_notation_gives_rate_and_start_in_every_format(notation, format, tm
 
 @pytest.mark.parametrize("separator", [";", " "])
 @pytest.mark.parametrize("day", ["%Y-%j", "%d-%b-%Y", "%G-W%V-%u", "%d.%m.%Y"])
-@pytest.mark.parametrize("start", [START, datetime(2026, 12, 31, 23, 59, 59, 999000)])
+@pytest.mark.parametrize("start", [START, datetime(2025, 12, 31, 23, 59, 59, 999000)])
 def test_a_day_beside_the_time_of_day_may_have_any_notation(day, separator, start, tmp_path):
     stamps = [start + timedelta(microseconds=50 * k) for k in range(N)]
     cells = [[stamp.strftime(day), stamp.strftime("%H:%M:%S.%f")] for stamp in stamps]
