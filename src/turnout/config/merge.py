@@ -5,7 +5,7 @@ A ``Variant`` is a layout changed by the technical columns of a row; several tur
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -122,9 +122,11 @@ def hammer(tree: Branch) -> HammerConfig | None:
             merge_branches(tree["hammer"], section["hammer"]) if "hammer" in section else tree["hammer"]
         )
         position = float(section["position"].value)
-        descriptions[label] = description(values, "hammer", {name: position for name in values["channels"]})
         for role, names in roles.items():
             names[label] = values.get(role)
+        required = (values["force"], values["response"])
+        of_files = description(values, "hammer", {name: position for name in values["channels"]})
+        descriptions[label] = replace(of_files, required=required)
     roles_by_section = {role: Frozen(names) for role, names in roles.items()}
     return HammerConfig(plain_values(tree["hammer"])["files"], Frozen(descriptions), **roles_by_section)
 

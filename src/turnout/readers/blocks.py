@@ -187,7 +187,7 @@ def channel_error(
         remedy = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
         return source.error(place, problem, remedy, reason="not_finite")
     if constant and channel.quantity != "temperature":
-        problem = f"all {n_sample} samples are {value:.6g}: the channel is dead"
+        problem = f"all {n_sample} samples are {value + 0.0:.6g}: the channel is dead"
         remedy = "Check the sensor, its cable and 'source' of this channel in the layout"
         return source.error(place, problem, remedy, reason="dead_channel")
     if hold > 1 and channel.quantity in ("force", "acceleration"):

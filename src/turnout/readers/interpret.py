@@ -3,7 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
@@ -264,11 +264,11 @@ class _Conversion:
         from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
         statistics = from_record(block_reader, n_sample) if is_long else from_samples(samples)
         faults = _faults(record, channel_maps, statistics, n_sample, where, source)
-        if faults and (description.kind != "passage" or len(faults) == len(channel_maps)):
-            raise next(iter(faults.values()))
+        usable = [i for i in range(len(channel_maps)) if i not in faults]
+        if fault := _decisive_fault(description, channel_maps, faults):
+            raise fault
         if repeat := None if is_long else repeat_error(samples, where, source):
             raise repeat
-        usable = [i for i in range(len(channel_maps)) if i not in faults]
         fields: dict[str, Any] = {
             "rate": rate,
             "channels": tuple(channel_maps[i].channel for i in usable),
@@ -316,6 +316,17 @@ def repeat_error(samples: np.ndarray, where: str, source: Source) -> ReadError |
     start, copy, n = block
     problem = f"its samples {copy} to {copy + n - 1} repeat the samples {start} to {start + n - 1} to the last digit"
     return source.error(where, problem, REPEAT_REMEDY, reason="duplicate")
+
+
+def _decisive_fault(
+    description: RawDescription, channel_maps: Sequence[ChannelMapping], faults: Mapping[int, ReadError]
+) -> ReadError | None:
+    """The fault that makes a record useless: of a channel that is needed, or where no response is left."""
+    channels = [c.channel for c in channel_maps]
+    forces = {c.name for c in channels if c.quantity == "force"} if description.kind == "hammer" else set()
+    decisive = [e for i, e in faults.items() if channels[i].name in forces | set(description.required)]
+    others = {c.name for i, c in enumerate(channels) if i not in faults} - forces
+    return next(iter(decisive if others else [*decisive, *faults.values()]), None)
 
 
 def _faults(

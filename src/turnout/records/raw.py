@@ -39,6 +39,8 @@ class RawDescription:
     ``n_samples`` (per record) are None if not stated. ``channels`` become the rows of the recordings, in
     this order. ``time_zone`` is the zone of the file's time stamps (IANA name).
     ``checked_entries`` are names of entries of the metadata that state neither rate nor scale nor unit of the samples.
+    ``required`` are names of channels without which a record has no use. Any other channel may fail and costs itself
+    only. A hammer test needs its force and one response in any case.
     """
 
     channels: tuple[RawChannel, ...]
@@ -49,3 +51,4 @@ class RawDescription:
     n_samples: int | None = None
     time_zone: str = "UTC"
     checked_entries: tuple[str, ...] = ()
+    required: tuple[str, ...] = ()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -43,10 +44,14 @@ UNUSABLE_REASONS = ("clipped", "dead_channel", "not_finite", "sensor_lost", "cha
 
 @dataclass(frozen=True)
 class Note:
-    """Why something was not used or is doubted: ``text``, and the name of the ``passage`` if it concerns one."""
+    """Why something was not used or is doubted: ``text``, and the name of the ``passage`` if it concerns one.
+
+    ``fault`` is the reason code of a fault in a file and the channel, "" for all: records may share a fault.
+    """
 
     text: str
     passage: str | None = None
+    fault: tuple[str, str] | None = None
 
     def __str__(self) -> str:
         return self.text if self.passage is None else f"passage {self.passage}: {self.text}"
@@ -106,7 +111,21 @@ def gather_inputs(
         elif unit.kind == "passage" and turnout.passages is not None:
             tables = passage_tables.get(unit_id(unit)) or _analyse_passages(unit, turnout, raw_root)
             _add_passages(unit, turnout, raw_root, track, tables, inputs)
+    inputs.notes = _once_per_fault(inputs.notes)
     return inputs
+
+
+def _once_per_fault(notes: Sequence[Note]) -> list[Note]:
+    """The first note of each fault, with the number of other records that have it, and all notes without one."""
+    counts, merged = Counter(note.fault for note in notes), dict[Any, Note]()
+    for i, note in enumerate(notes):
+        merged.setdefault(note.fault or i, note)
+    return [
+        replace(n, text=f"{n.text} Other records with this fault: {counts[n.fault] - 1}.")
+        if n.fault is not None and counts[n.fault] > 1
+        else n
+        for n in merged.values()
+    ]
 
 
 def _recordings(
@@ -117,9 +136,9 @@ def _recordings(
         try:
             result = read(path, raw_root, description, longest)
         except ReadError as error:
-            notes.append(Note(str(error)))
+            notes.append(_note_of(error))
             continue
-        notes += [Note(str(e)) for e in result.errors]
+        notes += [_note_of(e) for e in result.errors]
         records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
         yield from sorted(records, key=lambda r: r.record)
 
@@ -129,7 +148,9 @@ def _add_test(
 ) -> None:
     section, day, hammer = str(unit.section), str(unit.campaign), turnout.hammer
     assert hammer is not None
-    records = _recordings(unit, hammer.descriptions[section], raw_root, inputs.notes)
+    # any response will do: that of the section is not needed
+    description = replace(hammer.descriptions[section], required=(hammer.force[section],))
+    records = _recordings(unit, description, raw_root, inputs.notes)
     recordings = tuple(r for r in records if isinstance(r, Recording))  # without a limit none is a long one
     if not recordings:
         return
@@ -276,7 +297,12 @@ def _trains(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, notes: lis
             for train_recording, *_ in trains_in(recording, settings):
                 yield without_pulses(train_recording, sensors)[0]
         except ReadError as error:
-            notes.append(Note(str(error)))
+            notes.append(_note_of(error))
+
+
+def _note_of(error: Exception) -> Note:
+    fault = (error.reason, error.where.partition(", channel ")[2]) if isinstance(error, ReadError) else None
+    return Note(str(error), fault=fault)
 
 
 def _thin_out(passages: list[PassageInput]) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.errors import SimulationError
+from turnout.hammer_test import find_impacts
 from turnout.mismatch.turnout.priors import TRACK
-from turnout.records import Recording
+from turnout.records import Impact, Recording
 from turnout.simulate.sensor import Sensor
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
@@ -31,6 +32,22 @@ class HammerInput:
     visit: str = ""
     conditions: Mapping[str, Any] = field(default_factory=dict)
     impact_settings: ReceptanceSettings | None = None
+
+    def accepted_impacts(self, response: str) -> list[Impact]:
+        """Accepted impacts of the recordings that have the channel ``response``; none where no recording has it.
+
+        Parameters
+        ----------
+        response : str
+            Name of a channel of acceleration.
+
+        Returns
+        -------
+        list of Impact
+            In the order of the recordings.
+        """
+        recordings = [r for r in self.recordings if response in [c.name for c in r.channels]]
+        return [i for i in find_impacts(recordings, self.force, response, self.impact_settings) if i.accepted]
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.hammer_test import find_impacts
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.matrix_cache import matrices_of
 from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
@@ -171,9 +170,7 @@ def typical_impact(pair: FrfPair) -> Impact:
     -------
     Impact
     """
-    test = pair.test
-    impacts = find_impacts(test.recordings, test.force, pair.channel, test.impact_settings)
-    accepted = sorted((i for i in impacts if i.accepted), key=lambda i: i.peak)
+    accepted = sorted(pair.test.accepted_impacts(pair.channel), key=lambda i: i.peak)
     return accepted[len(accepted) // 2]
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.hammer_test import find_impacts
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.priors import RECEPTANCE
@@ -77,10 +76,7 @@ def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float
     """
     pairs = []
     for sensor in sensors:
-        if not any(c.name == sensor.name for r in test.recordings for c in r.channels):
-            continue
-        impacts = find_impacts(test.recordings, test.force, sensor.name, test.impact_settings)
-        accepted = [i for i in impacts if i.accepted]
+        accepted = test.accepted_impacts(sensor.name)
         if len(accepted) < RECEPTANCE.min_impacts:
             continue
         h, spread = _receptance_and_error(accepted)

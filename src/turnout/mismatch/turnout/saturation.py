@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.hammer_test import find_impacts
 from turnout.mismatch.turnout.priors import PASSAGE, SATURATION
 
 if TYPE_CHECKING:
@@ -62,8 +61,7 @@ def _peaks(test: HammerInput, name: str) -> tuple[np.ndarray, np.ndarray] | None
 
     None where they are too few. Impacts that reach the range stated in the file are not accepted.
     """
-    recordings = [r for r in test.recordings if any(c.name == name for c in r.channels)]
-    impacts = [i for i in find_impacts(recordings, test.force, name, test.impact_settings) if i.accepted]
+    impacts = test.accepted_impacts(name)
     if len(impacts) < SATURATION.min_impacts:
         return None
     sides = [[np.max(sign * i.acceleration) for i in impacts] for sign in (1.0, -1.0)]
