@@ -51,7 +51,7 @@ class AttachedResonator(PhysicsTerm):
     min_significance = 1.0
     parameters = (
         Parameter("mass", "kg", 0.0, (0.0, 150.0), "mass attached to the rail", SOURCE),
-        Parameter("frequency", "Hz", 300.0, (40.0, 1200.0), "its resonance on a fixed rail", SOURCE),
+        Parameter("frequency", "Hz", 300.0, (40.0, 850.0), "its resonance on a fixed rail, within the lines", SOURCE),
         Parameter("damping", "-", 0.03, (0.005, 0.3), "its damping ratio", SOURCE),
     )
 

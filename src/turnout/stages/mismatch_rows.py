@@ -87,15 +87,15 @@ def finding_tables(
 def _sentence(diagnosis: Diagnosis, case: TrackCase, row: Mapping[str, Any], n_recorded: int) -> str:
     """The finding in words, with what follows from the values of the fit and what these recordings cannot show."""
     surface = (surface_sentence(s) for s in surface_estimates(case, diagnosis.fit))
+    channels = [f"{note}." for faults in case.data.layout_faults for note in faults.sentences()]
     values = [*filter(None, surface), *sentences_on_values(case.nuisances, diagnosis.fit)]
     if row["verdict"] != "none":
-        return " ".join([headline(row), *values])
+        return " ".join([headline(row), *channels, *values])
     possible = sentence_on_possible_effect(diagnosis.verdict, case, row)
     limits = requirements_in_words(case.unmet_requirements)
     agreement = agreement_sentence(headline(row), bool(values))
-    return " ".join(
-        [scope_of_agreement(agreement, row["n_passages"], n_recorded), *filter(None, [*values, possible, limits])]
-    )
+    agreement = scope_of_agreement(agreement, row["n_passages"], n_recorded)
+    return " ".join([agreement, *channels, *filter(None, [*values, possible, limits])])
 
 
 def _identity(group: Group, about: Mapping[str, Any], case: TrackCase) -> dict[str, Any]:

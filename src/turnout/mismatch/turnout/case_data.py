@@ -12,9 +12,11 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
+from turnout.mismatch.turnout.channel_identity import ChannelFaults, exchanged_channels
 from turnout.mismatch.turnout.disturbances import Disturbance
+from turnout.mismatch.turnout.impact_positions import MisplacedTests, misplaced_tests
 from turnout.mismatch.turnout.observed_passages import observe_passages
-from turnout.mismatch.turnout.observed_tests import fit_hammer_start, observe_tests
+from turnout.mismatch.turnout.observed_tests import compare_channels, fit_hammer_start, observe_tests
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
@@ -50,6 +52,8 @@ class CaseData:
         Passages in which another source shakes the sensors.
     notes : tuple of str
         What is not used, and why.
+    layout_faults : tuple of ChannelFaults or MisplacedTests
+        Channels and impacts that are not where the layout states, as corrected in the campaign.
     """
 
     campaign: CampaignInput
@@ -64,6 +68,7 @@ class CaseData:
     unmatched: tuple[PassageInput, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
+    layout_faults: tuple[ChannelFaults | MisplacedTests, ...] = ()
 
     @property
     def mismatched_trains(self) -> tuple[str, ...]:
@@ -133,11 +138,16 @@ class CaseData:
         return raw_peak(self.campaign, channel) or self.band_peak(channel)
 
 
-def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track1D) -> tuple[CaseData, Predictor]:
+def case_data(
+    campaign: CampaignInput,
+    settings: MismatchSettings,
+    solver: Track1D,
+    corrected: tuple[ChannelFaults | MisplacedTests, ...] = (),
+) -> tuple[CaseData, Predictor]:
     """Observations of a campaign, and the predictor of its recordings.
 
-    The rail is first fitted to the hammer tests. On that rail passages are simulated, to align the recorded ones and
-    to compute their errors.
+    Channels and impacts that are not where the layout states are corrected first. Then the rail is fitted to the hammer
+    tests. On that rail passages are simulated, to align the recorded ones and to compute their errors.
 
     Parameters
     ----------
@@ -145,6 +155,8 @@ def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track
     settings : MismatchSettings
     solver : Track1D
         Settings of the simulation of passages.
+    corrected : tuple of ChannelFaults or MisplacedTests
+        Faults that have been corrected in the campaign.
 
     Returns
     -------
@@ -157,14 +169,23 @@ def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track
     SimulationError
         No recording can be used, or all of them are reserved.
     """
+    as_filed, is_corrected = campaign, {faults.kind for faults in corrected}
     saturated = saturated_channels(campaign, settings.threshold)
     campaign = without_saturated(campaign, saturated)
     site = site_of(campaign)
     tests = observe_tests(campaign, settings.pair_tolerance, saturated)
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
+    for faults in (
+        misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
+        exchanged_channels("hammer tests", compare_channels(predictor, tests)),
+    ):
+        if faults and faults.kind not in is_corrected:
+            return case_data(faults.corrected(as_filed), settings, solver, (*corrected, faults))
     predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
     passages = observe_passages(campaign, settings.materiality, predictor, start_values)
+    if (exchanged := passages.channel_faults) and exchanged.kind not in is_corrected:
+        return case_data(exchanged.corrected(as_filed), settings, solver, (*corrected, exchanged))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:
@@ -182,6 +203,7 @@ def case_data(campaign: CampaignInput, settings: MismatchSettings, solver: Track
         passages.unmatched,
         passages.disturbed,
         notes,
+        corrected,
     )
     if not data.observations:
         raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")

@@ -11,6 +11,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import passage_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
+from turnout.mismatch.turnout.channel_identity import ChannelFaults, channel_faults
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
 from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
@@ -24,7 +25,8 @@ from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 class ObservedPassages:
     """Passages as ``observations`` (name, Observation), with those that are not used, and notes.
 
-    ``surface_values`` are the nuisances of the running surface with which they were aligned.
+    ``surface_values`` are the nuisances of the running surface with which they were aligned. ``channel_faults`` are
+    channels that do not record their sensor; nothing else holds where there are any.
     """
 
     aligned: Mapping[str, AlignedPassage]
@@ -33,6 +35,7 @@ class ObservedPassages:
     disturbed: tuple[Disturbance, ...]
     surface_values: Mapping[str, float]
     notes: tuple[str, ...]
+    channel_faults: ChannelFaults
 
 
 def observe_passages(
@@ -55,7 +58,7 @@ def observe_passages(
     ObservedPassages
     """
     if not campaign.passages:
-        return ObservedPassages({}, (), (), (), {}, ())
+        return ObservedPassages({}, (), (), (), {}, (), channel_faults("passages", ()))
     aligner = PassageAligner(campaign, predictor)
     values = {**{n.name: 0.0 for n in predictor.site.nuisances()}, **start_values}
     surface_values = fit_surface(aligner, values)
@@ -89,6 +92,7 @@ def observe_passages(
         disturbed,
         surface_values,
         tuple(notes),
+        channel_faults("passages", list(filter(None, map(aligner.comparison, campaign.passages)))),
     )
 
 

@@ -14,6 +14,7 @@ from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
+from turnout.mismatch.turnout.channel_identity import Comparison
 from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.predictions import Values
@@ -116,6 +117,7 @@ class PassageAligner:
     def __init__(self, campaign: CampaignInput, predictor: Predictor):
         self.campaign, self.predictor = campaign, predictor
         self._low_passed: dict[str, np.ndarray] = {}
+        self._simulated: dict[str, np.ndarray] = {}
 
     def align(self, values: Values, passage: PassageInput) -> tuple[float, float, float]:
         """``align`` of a passage with its simulation at ``values``; SimulationError if it cannot be simulated.
@@ -137,7 +139,33 @@ class PassageAligner:
         signals = simulator(passage, passage.vehicle, passage.speed, sensors, surfaces=surfaces)
         if passage.name not in self._low_passed:
             self._low_passed[passage.name] = low_pass(passage.recording, sensors)
-        return align(passage, self._low_passed[passage.name], signals, self.predictor.solver.rate)
+        rate = self.predictor.solver.rate
+        self._simulated[passage.name] = limit_band(signals, rate, high=ALIGNMENT.band_end)
+        return align(passage, self._low_passed[passage.name], signals, rate)
+
+    def comparison(self, passage: PassageInput) -> Comparison | None:
+        """Correlation of each channel of a passage with the simulation at each of its sensors, as aligned last.
+
+        Parameters
+        ----------
+        passage : PassageInput
+            A train passage.
+
+        Returns
+        -------
+        Comparison or None
+            None for a passage that could not be simulated.
+        """
+        if passage.name not in self._simulated:
+            return None
+        names = tuple(s.name for s in self.campaign.sensors_of(passage))
+        data, low = self._low_passed[passage.name], self._simulated[passage.name]
+        model_time = np.arange(0.0, low.shape[-1] / self.predictor.solver.rate, ALIGNMENT.sample_step)
+        model = read_at(low, self.predictor.solver.rate, model_time)
+        size = next_fast_len(data.shape[1] + model_time.size, real=True)
+        data, model = (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-12) for x in (data, model))
+        spectra = np.fft.rfft(data, size)[:, None] * np.fft.rfft(model, size).conj()
+        return Comparison(names, names, np.fft.irfft(spectra, size))
 
     def correlation(self, values: Values, passage: PassageInput) -> float:
         """Correlation of a passage with its simulation, 0 if it cannot be simulated.

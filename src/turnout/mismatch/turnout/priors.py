@@ -28,6 +28,7 @@ PRESCREEN = "decisions/hammer-prescreen.md"
 MINIMA = "decisions/minima-of-hammer-fits.md"
 GUIDE = "mismatch.md"
 SWITCH_PANELS = "decisions/switch-panels.md"
+CHANNELS = "decisions/identity-of-channels.md"
 KNOTHE, OSCARSSON = "Knothe and Grassie 1993", "Oscarsson 2002"
 
 
@@ -293,6 +294,18 @@ class AlignmentPriors:
 
 
 @dataclass(frozen=True)
+class ChannelPriors:
+    """Which sensor each channel records, from its correlation with the simulation at all sensors."""
+
+    same_sensor: float = prior(
+        0.5, "-", "of a channel with the simulation at its own sensor, at least", CHANNELS)
+    other_sensor: float = prior(
+        0.3, "-", "below it a channel records neither train nor impact where its sensor should be", CHANNELS)
+    min_gain: float = prior(
+        0.5, "-", "by which two channels correlate better with each other's sensor than with their own", CHANNELS)
+
+
+@dataclass(frozen=True)
 class SaturationPriors:
     """Saturated channels, from peaks of impacts and of passages."""
 
@@ -314,6 +327,9 @@ class SaturationPriors:
     min_side_ratio: float = prior(
         0.9, "-", "limit of one side of an amplifier over that of the other, at least", SATURATED)
     limit_sd: float = prior(0.1, "-", "relative error of the limit: both sides of an amplifier differ", SATURATED)
+    level_time: float = prior(0.1, "s", "over which levels of channels are compared", CHANNELS)
+    min_level_correlation: float = prior(
+        0.5, "-", "of the level of a channel with that of the others: without it noise reaches its peaks", CHANNELS)
 
 
 @dataclass(frozen=True)
@@ -345,5 +361,6 @@ RECEPTANCE = ReceptancePriors()
 PASSAGE = PassagePriors()
 SIMULATION = SimulationPriors()
 ALIGNMENT = AlignmentPriors()
+CHANNELS_CHECK = ChannelPriors()
 SATURATION = SaturationPriors()
 DISTURBANCE = DisturbancePriors()

@@ -187,10 +187,23 @@ def _limits_in_passages(campaign: CampaignInput) -> dict[str, SaturationLimit]:
     sizes = [np.abs(r.samples[[r.index(n) for n in names]]) for r in recordings]
     peaks, limits = np.log([np.maximum(np.max(x, axis=1), 1e-12) for x in sizes]), {}
     for k, name in enumerate(names):
+        if not _follows_trains([x[k] for x in sizes], [np.delete(x, k, axis=0) for x in sizes], recordings):
+            continue
         gain = saturation_gain(peaks[:, k], np.delete(peaks, k, axis=1).mean(axis=1))
         if gain > 0.0 and (limit := _dwell_limit([x[k] for x in sizes])):
             limits[name] = SaturationLimit(limit, gain)
     return limits
+
+
+def _follows_trains(own: Sequence[np.ndarray], others: Sequence[np.ndarray], recordings: Sequence[Recording]) -> bool:
+    """Whether the level of a channel rises with that of the ``others``; peaks of noise stay alike without a limit."""
+    correlations = []
+    for x, rest, recording in zip(own, others, recordings):
+        length = max(round(SATURATION.level_time * recording.rate), 1)
+        blocks = [y[: y.size - y.size % length].reshape(-1, length).mean(axis=1) for y in (x, rest.mean(axis=0))]
+        if all(b.size > 2 and np.std(b) > SATURATION.scatter_floor * np.mean(b) for b in blocks):
+            correlations.append(np.corrcoef(*blocks)[0, 1])
+    return not correlations or float(np.median(correlations)) >= SATURATION.min_level_correlation
 
 
 def _is_at_range(recording: Recording) -> bool:
