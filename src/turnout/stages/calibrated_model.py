@@ -352,6 +352,8 @@ def _fit_visit(
             if not answers:
                 campaign = replace(campaign, reserved=names_beyond(campaign, MAX_FITTED_AXLES))
             case = TrackCase(campaign, turnout.settings["mismatch"], accepted=on_route)
+            faults = [sentence for fault in case.data.layout_faults for sentence in fault.sentences()]
+            notes += [f"visit {about['visit']}: {sentence}" for sentence in faults]
             fitted.append(store_visit(folder, group, case, answers.get(", ".join(group.labels), ""), about))
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
