@@ -298,6 +298,34 @@ def test_a_dead_channel_costs_a_hammer_record(tmp_path, in_si):
     assert str(error) == f"a.npz, record 1 of 1, channel 'rail': {found}. {remedy}"
 
 
+@pytest.mark.parametrize(
+    ("dead", "kept"), [("sleeper", ["force", "rail"]), ("rail", ["force", "sleeper"]), ("force", None)]
+)
+def test_a_dead_channel_costs_a_hammer_record_with_another_response_that_channel_only(tmp_path, in_si, dead, kept):
+    described = replace(in_si, channels=(*in_si.channels, RawChannel("sleeper", "sleeper", "acceleration")))
+    samples = {"force": saw(), "rail": 2.0 * saw(), "sleeper": 3.0 * saw()} | {dead: np.zeros(100)}
+    name = archive(tmp_path, fs=51200.0, **samples, units=["N", "m/s²", "m/s²"])
+    if kept is None:
+        assert only_error(name, tmp_path, described, 0).reason == "dead_channel"
+        return
+    result = read(name, tmp_path, described)
+    assert [c.name for c in result.recordings[0].channels] == kept
+    np.testing.assert_allclose(result.recordings[0].samples[0], saw())
+    (error,) = result.errors
+    assert error.reason == "dead_channel" and repr(dead) in error.where
+
+
+def test_a_dead_channel_that_is_required_costs_the_record(tmp_path, in_si):
+    """A section without its response has no modes, whatever else was recorded."""
+    channels = (*in_si.channels, RawChannel("sleeper", "sleeper", "acceleration"))
+    described = replace(in_si, channels=channels, required=("force", "rail"))
+    name = archive(
+        tmp_path, fs=51200.0, force=saw(), rail=np.zeros(100), sleeper=np.zeros(100), units=["N"] + ["m/s²"] * 2
+    )
+    error = only_error(name, tmp_path, described, 0)
+    assert error.reason == "dead_channel" and "'rail'" in error.where
+
+
 def test_a_dead_channel_costs_a_passage_that_channel_only(tmp_path, in_si):
     name = archive(tmp_path, fs=51200.0, force=saw(), rail=np.zeros(100), units=["N", "m/s²"])
     result = read(name, tmp_path, replace(in_si, kind="passage"))

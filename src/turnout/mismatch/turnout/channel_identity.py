@@ -137,7 +137,7 @@ def channel_faults(kind: str, comparisons: Sequence[Comparison]) -> ChannelFault
         False if there are none.
     """
     exchanged = exchanged_channels(kind, comparisons)
-    correlations = _typical_correlations(comparisons, exchanged.sensor_of)
+    correlations = typical_correlations(comparisons, exchanged.sensor_of)
     unrelated = {
         c: r
         for (c, s), r in correlations.items()
@@ -162,7 +162,7 @@ def exchanged_channels(kind: str, comparisons: Sequence[Comparison]) -> ChannelF
         False if there are none.
     """
     sensor_of = _best_assignment(comparisons)
-    correlations = _typical_correlations(comparisons, sensor_of)
+    correlations = typical_correlations(comparisons, sensor_of)
     is_certain = all(
         correlations.get((c, s), 0.0)
         >= max(CHANNELS_CHECK.same_sensor, correlations.get((c, c), 1.0) + CHANNELS_CHECK.min_gain)
@@ -171,10 +171,23 @@ def exchanged_channels(kind: str, comparisons: Sequence[Comparison]) -> ChannelF
     return ChannelFaults(kind, len(comparisons), sensor_of if is_certain else {}, {})
 
 
-def _typical_correlations(
+def typical_correlations(
     comparisons: Sequence[Comparison], sensor_of: Mapping[str, str]
 ) -> dict[tuple[str, str], float]:
-    """Median correlation of each (channel, sensor) over the recordings in which most channels agree with a sensor."""
+    """Median correlation of each (channel, sensor) over the recordings in which most channels agree with a sensor.
+
+    Parameters
+    ----------
+    comparisons : sequence of Comparison
+        One per recording.
+    sensor_of : mapping of str to str
+        Channel -> sensor that it records; itself where it is left out.
+
+    Returns
+    -------
+    dict
+        (channel, sensor) -> correlation.
+    """
     values: dict[tuple[str, str], list[float]] = {}
     for comparison in comparisons:
         at_lag = comparison.at_best_lag(sensor_of)
