@@ -325,8 +325,8 @@ def _decisive_fault(
     channels = [c.channel for c in channel_maps]
     forces = {c.name for c in channels if c.quantity == "force"} if description.kind == "hammer" else set()
     decisive = [e for i, e in faults.items() if channels[i].name in forces | set(description.required)]
-    others = {c.name for i, c in enumerate(channels) if i not in faults} - forces
-    return next(iter(decisive if others else [*decisive, *faults.values()]), None)
+    responses = {c.name for i, c in enumerate(channels) if i not in faults} - forces
+    return next(iter(decisive if responses else [*decisive, *faults.values()]), None)
 
 
 def _faults(

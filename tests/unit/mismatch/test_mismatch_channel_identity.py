@@ -73,7 +73,7 @@ def campaign():
 
 def faults_of(campaign):
     data, _ = case_data(campaign, MismatchSettings(), Track1D())
-    return data, {faults.kind: faults for faults in data.layout_faults}
+    return data, {faults.recording_type: faults for faults in data.layout_faults}
 
 
 def relabelled(recording, names):

@@ -169,7 +169,7 @@ def case_data(
     SimulationError
         No recording can be used, or all of them are reserved.
     """
-    as_filed, is_corrected = campaign, {faults.kind for faults in corrected}
+    as_filed, is_corrected = campaign, {faults.recording_type for faults in corrected}
     saturated = saturated_channels(campaign, settings.threshold)
     campaign = without_saturated(campaign, saturated)
     site = site_of(campaign)
@@ -179,13 +179,13 @@ def case_data(
         misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
         exchanged_channels("hammer tests", compare_channels(predictor, tests)),
     ):
-        if faults and faults.kind not in is_corrected:
-            return case_data(faults.corrected(as_filed), settings, solver, (*corrected, faults))
+        if faults and faults.recording_type not in is_corrected:
+            return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))
     predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
     passages = observe_passages(campaign, settings.materiality, predictor, start_values)
-    if (exchanged := passages.channel_faults) and exchanged.kind not in is_corrected:
-        return case_data(exchanged.corrected(as_filed), settings, solver, (*corrected, exchanged))
+    if (exchanged := passages.channel_faults) and exchanged.recording_type not in is_corrected:
+        return case_data(exchanged.correct(as_filed), settings, solver, (*corrected, exchanged))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:

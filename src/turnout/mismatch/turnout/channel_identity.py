@@ -51,13 +51,13 @@ class Comparison:
 
 @dataclass(frozen=True)
 class ChannelFaults:
-    """Channels that do not record their sensor, in recordings of one ``kind`` ("passages" or "hammer tests").
+    """Channels that do not record their sensor, in recordings of one ``recording_type`` ("passages" or "hammer tests").
 
     ``sensor_of`` are exchanged channels, each with the sensor that it records. ``unrelated`` are channels that record
     nothing of what the others do, with their correlation. ``n`` is the number of recordings compared.
     """
 
-    kind: str
+    recording_type: str
     n: int
     sensor_of: Mapping[str, str]
     unrelated: Mapping[str, float]
@@ -77,18 +77,18 @@ class ChannelFaults:
         if self.sensor_of:
             pairs = ", ".join(f"{c} records sensor {s}" for c, s in sorted(self.sensor_of.items()))
             texts.append(
-                f"In the {self.kind} channels are exchanged: {pairs}. The diagnosis names them by the sensors that "
-                "they record. Correct the layout, or the cables at the logger"
+                f"In the {self.recording_type} channels are exchanged: {pairs}. The diagnosis names them by the "
+                "sensors that they record. Correct the layout, or the cables at the logger"
             )
         texts += [
-            f"In the {self.kind} channel {c} does not record what the other channels do: its correlation with the "
-            f"simulation at its sensor is {r:.2f}, and at least {CHANNELS_CHECK.same_sensor:g} is usual. It was not "
-            "used. Check the sensor, its cable and 'source' of this channel in the layout"
+            f"In the {self.recording_type} channel {c} does not record what the other channels do: its correlation "
+            f"with the simulation at its sensor is {r:.2f}, and at least {CHANNELS_CHECK.same_sensor:g} is usual. It "
+            "was not used. Check the sensor, its cable and 'source' of this channel in the layout"
             for c, r in sorted(self.unrelated.items())
         ]
         return texts
 
-    def corrected(self, campaign: CampaignInput) -> CampaignInput:
+    def correct(self, campaign: CampaignInput) -> CampaignInput:
         """The campaign with exchanged channels named by the sensors that they record, without unrelated ones.
 
         Parameters
@@ -101,15 +101,18 @@ class ChannelFaults:
         CampaignInput
         """
         position_of = {s.name: s.place for s in campaign.sensors}
-        if self.kind == "passages":
-            passages = (replace(p, recording=self._corrected(p.recording, position_of)) for p in campaign.passages)
+        if self.recording_type == "passages":
+            passages = (
+                replace(p, recording=self._correct_recording(p.recording, position_of)) for p in campaign.passages
+            )
             return replace(campaign, passages=tuple(passages))
         tests = (
-            replace(t, recordings=tuple(self._corrected(r, position_of) for r in t.recordings)) for t in campaign.hammer
+            replace(t, recordings=tuple(self._correct_recording(r, position_of) for r in t.recordings))
+            for t in campaign.hammer
         )
         return replace(campaign, hammer=tuple(tests))
 
-    def _corrected(self, recording: Recording, position_of: Mapping[str, float]) -> Recording:
+    def _correct_recording(self, recording: Recording, position_of: Mapping[str, float]) -> Recording:
         rows = [i for i, c in enumerate(recording.channels) if c.name not in self.unrelated]
         channels = [recording.channels[i] for i in rows]
         renamed = (
@@ -121,12 +124,12 @@ class ChannelFaults:
         return replace(recording, samples=recording.samples[rows], channels=tuple(renamed))
 
 
-def channel_faults(kind: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
+def channel_faults(recording_type: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
     """Channels that do not record their sensor: exchanged ones, and those that record nothing of the train.
 
     Parameters
     ----------
-    kind : str
+    recording_type : str
         Of the recordings: "passages".
     comparisons : sequence of Comparison
         One per recording.
@@ -136,7 +139,7 @@ def channel_faults(kind: str, comparisons: Sequence[Comparison]) -> ChannelFault
     ChannelFaults
         False if there are none.
     """
-    exchanged = exchanged_channels(kind, comparisons)
+    exchanged = exchanged_channels(recording_type, comparisons)
     correlations = typical_correlations(comparisons, exchanged.sensor_of)
     unrelated = {
         c: r
@@ -146,12 +149,12 @@ def channel_faults(kind: str, comparisons: Sequence[Comparison]) -> ChannelFault
     return replace(exchanged, unrelated=unrelated)
 
 
-def exchanged_channels(kind: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
+def exchanged_channels(recording_type: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
     """Channels that record each other's sensor.
 
     Parameters
     ----------
-    kind : str
+    recording_type : str
         Of the recordings: "passages" or "hammer tests".
     comparisons : sequence of Comparison
         One per recording.
@@ -168,7 +171,7 @@ def exchanged_channels(kind: str, comparisons: Sequence[Comparison]) -> ChannelF
         >= max(CHANNELS_CHECK.same_sensor, correlations.get((c, c), 1.0) + CHANNELS_CHECK.min_gain)
         for c, s in sensor_of.items()
     )
-    return ChannelFaults(kind, len(comparisons), sensor_of if is_certain else {}, {})
+    return ChannelFaults(recording_type, len(comparisons), sensor_of if is_certain else {}, {})
 
 
 def typical_correlations(

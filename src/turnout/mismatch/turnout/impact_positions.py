@@ -15,10 +15,10 @@ from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 
 @dataclass(frozen=True)
 class MisplacedTests:
-    """Hammer tests at other positions than stated: ``positions`` are (stated, found) by name of the test. [m]"""
+    """Hammer tests at other positions than stated: ``positions`` are (stated, agreeing) by name of the test. [m]"""
 
     positions: Mapping[str, tuple[float, float]]
-    kind = "positions of impacts"
+    recording_type = "positions of impacts"
 
     def __bool__(self) -> bool:
         return bool(self.positions)
@@ -35,12 +35,12 @@ class MisplacedTests:
         for name, positions in self.positions.items():
             tests_of.setdefault(positions, []).append(name)
         return [
-            f"Hammer tests {', '.join(names)} agree with impacts at {found:.2f} m and not with impacts at "
+            f"Hammer tests {', '.join(names)} agree with impacts at {agreeing:.2f} m and not with impacts at "
             f"{stated:.2f} m, as stated. The diagnosis takes them where they agree. Check the names of their files"
-            for (stated, found), names in tests_of.items()
+            for (stated, agreeing), names in tests_of.items()
         ]
 
-    def corrected(self, campaign: CampaignInput) -> CampaignInput:
+    def correct(self, campaign: CampaignInput) -> CampaignInput:
         """The campaign with these tests at the positions where they agree with the simulation.
 
         Parameters
@@ -52,8 +52,10 @@ class MisplacedTests:
         -------
         CampaignInput
         """
-        found = {name: position for name, (_, position) in self.positions.items()}
-        return replace(campaign, hammer=tuple(replace(t, place=found.get(t.name, t.place)) for t in campaign.hammer))
+        positions = {name: position for name, (_, position) in self.positions.items()}
+        return replace(
+            campaign, hammer=tuple(replace(t, place=positions.get(t.name, t.place)) for t in campaign.hammer)
+        )
 
 
 def misplaced_tests(predictor: Predictor, tests: ObservedTests, positions: Iterable[float]) -> MisplacedTests:
@@ -73,13 +75,13 @@ def misplaced_tests(predictor: Predictor, tests: ObservedTests, positions: Itera
     MisplacedTests
         False if there are none.
     """
-    others, misplaced = sorted(set(positions)), {}
+    stated_positions, misplaced = sorted(set(positions)), {}
     for test in {pair.test.name: pair.test for pair in tests.frf_pairs.values()}.values():
-        own = mean_correlation(predictor, tests, test, test.place)
-        if own >= CHANNELS_CHECK.same_sensor:
+        stated_correlation = mean_correlation(predictor, tests, test, test.place)
+        if stated_correlation >= CHANNELS_CHECK.same_sensor:
             continue
-        trials = [(mean_correlation(predictor, tests, test, x), x) for x in others if x != test.place]
-        best, found = max(trials, default=(-np.inf, test.place))
-        if best >= max(CHANNELS_CHECK.same_sensor, own + CHANNELS_CHECK.min_gain):
-            misplaced[test.name] = test.place, found
+        trials = [(mean_correlation(predictor, tests, test, x), x) for x in stated_positions if x != test.place]
+        best_correlation, best_position = max(trials, default=(-np.inf, test.place))
+        if best_correlation >= max(CHANNELS_CHECK.same_sensor, stated_correlation + CHANNELS_CHECK.min_gain):
+            misplaced[test.name] = test.place, best_position
     return MisplacedTests(misplaced)

@@ -195,12 +195,14 @@ def _limits_in_passages(campaign: CampaignInput) -> dict[str, SaturationLimit]:
     return limits
 
 
-def _follows_trains(own: Sequence[np.ndarray], others: Sequence[np.ndarray], recordings: Sequence[Recording]) -> bool:
-    """Whether the level of a channel rises with that of the ``others``; peaks of noise stay alike without a limit."""
+def _follows_trains(
+    sizes: Sequence[np.ndarray], sizes_of_others: Sequence[np.ndarray], recordings: Sequence[Recording]
+) -> bool:
+    """Whether the level of a channel rises with that of others; peaks of noise stay alike without a limit."""
     correlations = []
-    for x, rest, recording in zip(own, others, recordings):
+    for x, of_others, recording in zip(sizes, sizes_of_others, recordings):
         length = max(round(SATURATION.level_time * recording.rate), 1)
-        blocks = [y[: y.size - y.size % length].reshape(-1, length).mean(axis=1) for y in (x, rest.mean(axis=0))]
+        blocks = [y[: y.size - y.size % length].reshape(-1, length).mean(axis=1) for y in (x, of_others.mean(axis=0))]
         if all(b.size > 2 and np.std(b) > SATURATION.scatter_floor * np.mean(b) for b in blocks):
             correlations.append(np.corrcoef(*blocks)[0, 1])
     return not correlations or float(np.median(correlations)) >= SATURATION.min_level_correlation
