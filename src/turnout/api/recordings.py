@@ -12,6 +12,8 @@ from turnout import config, readers
 from turnout.config import Configuration, TurnoutConfig
 from turnout.config.load import load_layout
 from turnout.errors import ConfigError, ReadError
+from turnout.readers.channel_descriptions import quantity_of_sensor
+from turnout.readers.channel_maps import index_of
 from turnout.records import RawChannel, RawDescription, ReadResult
 from turnout.units import SI, conversion, to_si
 
@@ -128,6 +130,7 @@ def _described_channels(file: Path, channels: ChannelMap, format: str) -> tuple[
     names = [name for name, _ in stated]
     for name in channels:
         if name not in names:
+            _check_numbers(file, name, format)
             remedy = "Correct the name in 'channels'"
             available = ", ".join(repr(n) for n in names)
             problem = f"there is no channel {name!r}; there are {available}"
@@ -138,6 +141,14 @@ def _described_channels(file: Path, channels: ChannelMap, format: str) -> tuple[
         else _channel_by_unit(name, index, unit, file)
         for index, (name, unit) in enumerate(stated)
     )
+
+
+def _check_numbers(file: Path, name: str, format: str) -> None:
+    """ReadError if a variable of the file has this name and holds no real numbers."""
+    source, _, raw = readers.read_unconverted(file.name, file.parent, format)
+    for record in raw.records:
+        if not isinstance(record, ReadError) and name in record.not_numbers:
+            index_of(record, name, "the channels", source)
 
 
 def _channel_as_described(name: str, index: int, unit: str, entry: str | Mapping[str, Any] | RawChannel) -> RawChannel:
@@ -155,12 +166,14 @@ def _channel_by_unit(name: str, index: int, unit: str, file: Path) -> RawChannel
         quantity = conversion(unit).dimension if unit else ""
     except ValueError:
         quantity = ""
-    if quantity in SI:
+    named = quantity_of_sensor(name)
+    if quantity in SI and named in ("", quantity):
         return RawChannel(name, index, quantity)
     statement = f"its unit {unit!r} does not state its quantity" if unit else "the file states no unit"
-    raise ReadError(
-        file, f"channel {name!r}", statement, f"Describe it: channels={{{name!r}: {EXAMPLE}}}", "unit_unknown"
-    )
+    if quantity in SI:
+        statement = f"its unit {unit!r} is one of {quantity}, and its name says {named}"
+    remedy = f"Describe it: channels={{{name!r}: {EXAMPLE}}}, or {{{name!r}: 'ignored'}} if it is not wanted"
+    raise ReadError(file, f"channel {name!r}", statement, remedy, "unit_unknown")
 
 
 def load_configuration(folder: str | os.PathLike = "config") -> Configuration:

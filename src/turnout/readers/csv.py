@@ -29,7 +29,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.clock_texts import is_clock_or_date
-from turnout.readers.csv_cells import BLANK, first_cells
+from turnout.readers.csv_cells import BLANK, SEPARATORS, cells_of, first_cells, is_row
 from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import read_head
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns
@@ -123,6 +123,8 @@ def _end_of_rows(data: bytes | mmap, end: int, source: Source) -> tuple[int, tup
     line = data[:end].count(b"\n") + 1
     problem = "the last line has no line break: its last number may be cut"
     remedy = f"{COPY_AGAIN}, or add the line break if it is whole"
+    if start == 0 and not is_row(cells_of(text := decode_text(last), next((s for s in SEPARATORS if s in text), ","))):
+        return end, ()  # not even numbers: the head is all that there is
     if start == 0:
         raise source.error(f"line {line}", problem, remedy, reason="truncated")
     return start, (source.error(f"line {line}", f"{problem}. It is left out", remedy, reason="truncated"),)

@@ -44,7 +44,9 @@ from turnout.readers.stated_sensitivities import is_sensitivity_name
 from turnout.readers.time_texts import is_day, looks_dated
 from turnout.readers.unit_names import is_unit_name
 
-HEAD_LINE = re.compile(rf"^#?\s*([^\W\d][\w .'’-]*?)\s*([\[(][^\])]*[\])])?\s*(?:{COLON}|[=,;\t])\s*(.*)$")
+HEAD_LINE = re.compile(
+    rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*(?:{COLON}|[=,;\t])\s*(.*)$"
+)
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
 HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}

@@ -9,7 +9,7 @@ WINDOW_STEPS = (1, 2, 4, 8)  # samples; doubled four times, a key belongs to 16 
 KEY_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # odd, without a pattern: it spreads every bit over those above it
 ONE_OF = np.uint64(64 - 3)  # shift: one key in eight is compared, the same ones in both copies of a block
 MIN_DIFFERENT = 100  # windows of a block: fewer are those of a constant or of a short period
-MIN_TURNS = 0.1  # share of samples at which a channel turns: noise turns at 0.67, a tone of 20 samples at 0.1
+MIN_TURNS = 0.2  # share of samples at which a channel turns: noise turns at 0.67, a tone of 10 samples at 0.2
 MAX_LAGS = 4  # distances between equal windows, the most frequent ones, that are examined
 
 

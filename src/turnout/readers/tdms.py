@@ -20,7 +20,7 @@ from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.array_names import natural_sort_key, numbered_names
 from turnout.readers.clock_texts import with_durations
-from turnout.readers.entries import Entry, entries_of
+from turnout.readers.entries import FREE_TEXT, MAX_ENTRIES, Entry, entries_of, entries_of_text
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES
 from turnout.readers.record_columns import missing_record
@@ -280,6 +280,10 @@ def _complete_record(
         problem = f"it lacks the channel {min(missing)!r} that other groups have"
         remedy = f"{COPY_AGAIN}; if it is so there too, export all channels of a record into one group"
         raise source.error(where, problem, remedy, reason="truncated")
+    remarks = [c for c in channels if _is_remark(c, channels)]
+    channels = [c for c in channels if c not in remarks]
+    texts = [(f"channel {c.name!r}", str(text)) for c in remarks for text in c[:MAX_ENTRIES]]
+    of_remarks = [e for place, text in texts for e in (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))]
     for channel in channels:
         promised = Metadata(channel.properties, source).number(("wf_samples",))
         # for a channel written in several segments it counts the samples of the last one
@@ -301,7 +305,7 @@ def _complete_record(
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        entries=(*of_file, *_entries(channels, groups)),
+        entries=(*of_file, *of_remarks, *_entries(channels, groups)),
         units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
         **start_fields(
             *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
@@ -315,6 +319,12 @@ def _complete_record(
         aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
         undecided=undecided,
     )
+
+
+def _is_remark(channel: nptdms.TdmsChannel, channels: Sequence[nptdms.TdmsChannel]) -> bool:
+    """Whether a channel holds text of another length than the channels with a time axis beside it."""
+    lengths = {len(c) for c in channels if "wf_increment" in c.properties}
+    return channel.data_type is nptdms.types.String and bool(lengths) and len(channel) not in lengths
 
 
 def _scale_text(*levels: Mapping[str, Any]) -> str:

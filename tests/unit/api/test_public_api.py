@@ -229,6 +229,22 @@ def test_a_file_without_units_needs_its_channels_described(tmp_path):
     np.testing.assert_array_equal(recording.samples, [[0.0, -2000.0, 0.0], [0.0, 2.0, 1.0]])
 
 
+@pytest.mark.parametrize("names", [("Beschleunigung", "Kraft"), ("accelerometer 3", "rail")])
+def test_a_unit_that_is_not_that_of_the_name_needs_a_description(tmp_path, names):
+    path = tmp_path / "test.npz"
+    np.savez(path, **dict(zip(names, np.eye(2, 3))), fs=1000.0, units=np.array(["N", "m/s²"]), channels=np.array(names))
+    with pytest.raises(ReadError, match=f"channel '{names[0]}': its unit 'N' is one of force, and its name says accel"):
+        turnout.read(path)
+    assert turnout.read(path, channels=dict(zip(names, ("force", "acceleration"))), kind="passage").recordings
+
+
+def test_a_channel_without_real_numbers_says_what_it_holds(tmp_path):
+    path = tmp_path / "test.npz"
+    np.savez(path, force=np.arange(100) + 1j, rail=np.random.default_rng(1).normal(size=100), fs=1000.0)
+    with pytest.raises(ReadError, match=r"test\.npz, the channels: the channel 'force' holds complex numbers"):
+        turnout.read(path, channels={"force": "force", "rail": "acceleration"})
+
+
 def test_only_the_channels_that_differ_need_a_description(tmp_path):
     recording = pair()
     write([recording], tmp_path / "a.h5", "hdf5")

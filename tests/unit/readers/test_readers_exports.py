@@ -1,6 +1,9 @@
 """Files as other programs export them: each is read to within rounding, or rejected with its true reason."""
 
+import time
+
 import h5py
+import nptdms
 import numpy as np
 import pandas
 import pyarrow as pa
@@ -9,6 +12,7 @@ import pytest
 import scipy.io
 from tests.unit.readers.cpu_limit import ended_after
 
+import turnout
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.entries import entries_of_text
@@ -299,3 +303,51 @@ def test_lvm_samples_with_another_decimal_mark_than_the_header_are_named(tmp_pat
     (tmp_path / "a.lvm").write_text(head + marker + samples.replace(".", ","), encoding="utf-8")
     error = str(only_error(read("a.lvm", tmp_path, IN_SI)))
     assert "has another decimal mark than '.', which its header states. Export it again with one decimal mark" in error
+
+
+TEXTS = {"event": ["start", "train passes"], "comment": ["Gain x10"], "operator": ["A. Müller"]}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_tdms_channel_of_text_beside_the_samples_is_a_remark(tmp_path, name):
+    """It was a channel of another rate, so that the record was lost; what it says of a scale is not."""
+    rng = np.random.default_rng(1)
+    step = {"wf_increment": 1 / 2000.0}
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        channels = [
+            nptdms.ChannelObject("g", c, rng.normal(size=500), {**step, "unit_string": unit})
+            for c, unit in (("force", "N"), ("rail", "m/s^2"))
+        ]
+        writer.write_segment([*channels, nptdms.ChannelObject("g", name, TEXTS[name])])
+    if "Gain" in TEXTS[name][0]:
+        with pytest.raises(ReadError, match="'text: Gain x10' in channel 'comment' may state a scale"):
+            turnout.read(tmp_path / "a.tdms")
+    else:
+        assert not turnout.read(tmp_path / "a.tdms").errors
+
+
+FOREIGN = {
+    "binary": (b"DEWESoft Data File" + b"\x01\x02" * 300, "byte 18: 0x01 is no text"),
+    "padded": (b"C 1 CLIENT".ljust(3200) + b"\x00" * 600, "is no text"),
+    "a web page": (b"<table><tr><td>F</td></tr></table>" * 30, "no line of numbers"),
+    "rich text": (b"{\\rtf1\\ansi F;a\\par 1;2\\par}", "no line of numbers"),
+}
+
+
+@pytest.mark.parametrize("content", FOREIGN)
+def test_a_file_without_numbers_is_not_said_to_be_cut(tmp_path, content):
+    data, problem = FOREIGN[content]
+    (tmp_path / "a.txt").write_bytes(data)
+    with pytest.raises(ReadError) as caught:
+        turnout.read(tmp_path / "a.txt")
+    assert problem in str(caught.value) and "line break" not in str(caught.value)
+
+
+@pytest.mark.parametrize("filling", [" ", "\u00a0", ". ", "- ", " a"])
+def test_a_long_line_of_the_head_takes_no_time(tmp_path, filling):
+    """The time grew with the third power of the number of blanks: 800 took 8 s."""
+    head = f"C 1 CLIENT{filling * 1000}%\nrate: 20000\n{HEAD}"
+    (tmp_path / "a.csv").write_text(head + "".join(f"{f};{a}\n" for f, a in zip(FORCE, RAIL)), encoding="utf-8")
+    begin = time.process_time()
+    (recording,) = read("a.csv", tmp_path, layout()).recordings
+    assert time.process_time() - begin < 5.0 and recording.samples.shape == (2, N)

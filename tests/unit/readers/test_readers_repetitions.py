@@ -117,10 +117,13 @@ def test_a_record_that_repeats_another_counts_once(tmp_path):
     assert [str(e) for e in errors_without_layout(raw, source)] == [str(error)]
 
 
-def test_the_same_pulse_without_noise_is_no_shared_force(tmp_path):
-    pulse = np.zeros(2000)
-    pulse[100:110] = 1000.0 * np.hanning(10)
-    groups = {f"hit_{k}": {"force": pulse, "rail": noise(2000, k)[0]} for k in (1, 2)}
+PULSE = np.zeros(2000)
+PULSE[100:110] = 1000.0 * np.hanning(10)
+
+
+@pytest.mark.parametrize("force", [PULSE, *(np.cos(np.arange(2000) / x) for x in (2.0, 3.0, 7.0, 50.0))])
+def test_the_same_pulse_or_tone_without_noise_is_no_shared_force(tmp_path, force):
+    groups = {f"hit_{k}": {"force": force, "rail": noise(2000, k)[0]} for k in (1, 2)}
     assert not read(with_groups(tmp_path / "a.h5", groups), tmp_path, HAMMER).errors
 
 
