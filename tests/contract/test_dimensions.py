@@ -80,7 +80,7 @@ def same(**powers):
 def test_function_is_covariant(name):
     function, units = FUNCTIONS[name]
     for before, after, powers in zip(function(same), function(unit), units, strict=True):
-        assert after == pytest.approx(np.asarray(before) * unit(**powers), rel=1e-9)
+        assert after == pytest.approx(np.asarray(before) * unit(**powers), rel=1e-9, abs=0.0)
 
 
 def recordings(u):
@@ -131,6 +131,6 @@ def test_receptance_is_a_displacement_per_force():
     results = [receptance_of(find_impacts(recordings(u), "f", "a", settings(u)), settings(u)) for u in (same, unit)]
     a, b = results
     for name in ("h1", "h2", "hv"):
-        assert getattr(b, name) == pytest.approx(getattr(a, name) * unit(m=1, n=-1), rel=1e-8)
+        assert getattr(b, name) == pytest.approx(getattr(a, name) * unit(m=1, n=-1), rel=1e-8, abs=0.0)
     assert b.frequency == pytest.approx(a.frequency * unit(s=-1))
     assert b.gate_level == pytest.approx(a.gate_level, abs=1e-9) and np.array_equal(a.passed, b.passed)

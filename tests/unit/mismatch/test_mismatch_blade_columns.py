@@ -13,9 +13,9 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 @pytest.fixture(scope="module")
 def case():
-    plan = small_plan((15.0,), hammer_positions=(24.0,))
+    plan = small_plan((15.0,), passages=False, hammer_positions=(24.0,))
     turnout = with_blade(plan.turnout)
-    campaign = replace(measured_campaign(plan, (), 3), turnout=turnout, passages=())
+    campaign = replace(measured_campaign(plan, (), 3), turnout=turnout)
     return TrackCase(campaign, families=("slide_chair_gap", "heel_support"))
 
 

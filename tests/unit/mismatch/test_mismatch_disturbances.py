@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout import case as cases
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances, independent_of_trains
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 RATE, DURATION, SPAN, SENSORS = 2000.0, 4.0, 20.0, (0.0, 2.0, 4.0, 6.0)
 
@@ -94,7 +94,7 @@ def test_one_passage_with_a_higher_level_after_its_train_shows_no_source_of_its_
 
 def test_a_case_is_disturbed_only_by_a_source_that_no_train_carries(monkeypatch):
     """Both passages are left out of the fit; the answer rests on them only if two trains show the source."""
-    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
+    campaign = intact_campaign((24.0,), 3)
     case_data = cases.case_data
 
     def disturbed_by(*trains):

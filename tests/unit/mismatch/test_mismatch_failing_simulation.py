@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout.errors import SimulationError
 from turnout.mismatch import diagnose
@@ -15,7 +16,6 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import CampaignInput, TrackCase
 from turnout.mismatch.turnout.campaign import PassageInput
 from turnout.mismatch.turnout.candidates.short_polygons import short_polygon_candidates, wheel_excess
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.physics import Parameter
 
@@ -85,7 +85,7 @@ def test_a_train_of_two_lengths_is_rejected():
 
 
 def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used(monkeypatch):
-    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 3)
+    campaign = intact_campaign((24.0,), 3)
     (first, *_), names = campaign.passages, {p.name for p in campaign.passages}
 
     simulator_of = Predictor.passage_simulator

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.channel_lines import SteadyLine, line_without_wheel, mains_lines, strongest_lines
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 AMPLITUDE = 2.0  # [m/s²]
 SILENCE = 3.0  # behind each train [s]
@@ -75,7 +75,7 @@ def test_a_stretch_of_two_periods_is_needed():
 
 def hum_campaign(frequency, amplitude=AMPLITUDE):
     """Passages with hum in S3 that starts at a phase of its own in each."""
-    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7)
+    campaign = intact_campaign((24.0,), 7)
     passages = []
     for passage, phase in zip(campaign.passages, PHASES):
         recording = passage.recording

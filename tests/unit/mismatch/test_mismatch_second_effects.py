@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout.mismatch import diagnose
 from turnout.mismatch.engine.candidate import Candidate
@@ -121,7 +122,7 @@ def with_whites(case, base, candidate, size, share):
 
 @pytest.fixture(scope="module")
 def passages_and_impacts():
-    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
+    case = TrackCase(intact_campaign((24.0,), 7))
     return case, fit_jointly(case, iterations=0)
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout import physics
 from turnout.mismatch.turnout import TrackCase, pseudo_forces, track_under_wheels
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 
 N_SIMULATED = 5  # values of a passage without a closed form: wheels, load, pads, ballast, ballast damping
@@ -13,7 +13,7 @@ N_SIMULATED = 5  # values of a passage without a closed form: wheels, load, pads
 
 @pytest.fixture(scope="module")
 def case():
-    return TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
+    return TrackCase(intact_campaign((24.0,), 7))
 
 
 @pytest.fixture

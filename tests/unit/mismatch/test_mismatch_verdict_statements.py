@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout import physics
 from turnout.config.settings.mismatch import MismatchSettings
@@ -23,7 +24,6 @@ from turnout.mismatch.engine.verification import Verification, predict_with_deco
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.candidates.catalogue import candidate_of, channel_sites
 from turnout.mismatch.turnout.passage_observation import AlignedPassage, observe_passage
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import RECEPTANCE
 from turnout.mismatch.turnout.receptance_model import ReceptanceModel
@@ -284,7 +284,7 @@ def test_the_position_error_of_a_sensor_is_not_that_of_a_sleeper():
 
 @pytest.fixture(scope="module")
 def rolled():
-    return TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7))
+    return TrackCase(intact_campaign((24.0,), 7))
 
 
 def test_noise_is_not_measured_while_the_train_comes(rolled):
@@ -317,7 +317,7 @@ def test_one_sensor_does_not_distinguish_a_position_from_its_own_channel(rolled)
 
 def test_passages_that_are_all_reserved_suggest_nothing_and_stop_nothing():
     """Waves of the rail that no fitted recording depends on have no size."""
-    campaign = measured_campaign(small_plan((15.0,), hammer_positions=(24.0,)), (), 7)
+    campaign = intact_campaign((24.0,), 7)
     case = TrackCase(replace(campaign, reserved=tuple(p.name for p in campaign.passages)))
     assert case.aligned_passages and not any(o.name in case.aligned_passages for o in case.observations)
     assert case.residual_candidates(fit_jointly(case, iterations=0)) == ()

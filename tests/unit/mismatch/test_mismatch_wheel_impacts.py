@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.intact_campaigns import intact_campaign
 
 from turnout.mismatch.engine.localization import location_of_ambiguity
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout import wheel_impacts as module
 from turnout.mismatch.turnout.defect_priors import IMPACTS
-from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.wheel_impacts import (
     ImpactSignal,
     _known_stretches,
@@ -126,7 +126,7 @@ def test_impacts_are_located_where_their_wheels_were_a_lag_before(direction):
 
 @pytest.mark.parametrize(("direction", "sign"), [("facing", 1.0), ("trailing", -1.0)])
 def test_a_known_irregularity_is_left_out_from_1_m_before_to_2_m_behind_it_as_the_train_runs(direction, sign):
-    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    case = TrackCase(intact_campaign((), 7))
     aligned = case.fitted_passages()[0]
     aligned = replace(aligned, passage=replace(aligned.passage, direction=direction))
     position = float(np.mean([s.place for s in aligned.sensors]))
@@ -154,7 +154,7 @@ def with_recording(aligned, **changes):
 
 def test_a_case_reports_impacts_and_intact_track_has_none():
     """Recordings of our own simulator, with its roughness; the band of a slower recorder ends too low."""
-    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    case = TrackCase(intact_campaign((), 7))
     assert wheel_impacts(case) is None and case.ambiguity() is None
     passages = case.fitted_passages()
     position = float(np.mean([s.place for s in passages[0].sensors])) + 0.3
@@ -169,7 +169,7 @@ def test_a_case_reports_impacts_and_intact_track_has_none():
 def test_impacts_of_one_train_alone_are_located_on_the_train(monkeypatch):
     levels = impact_levels(visit(2, lambda t, k: (5.3, slice(None)) if k == 2 else None))
     monkeypatch.setattr(module, "impact_levels", lambda signals: levels)
-    case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (), 7))
+    case = TrackCase(intact_campaign((), 7))
     location = location_of_ambiguity(case)
     assert str(location) == "on a" and location.place is None and location.nats > 12.0
     ambiguity = case.ambiguity()

@@ -65,7 +65,7 @@ def test_matlab_structure_and_structure_array(by_name, tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"measurement": one})
     (recording,) = read("a.mat", tmp_path, by_name).recordings
     both(recording)
-    scipy.io.savemat(tmp_path / "b.mat", {"hit_1": one, "hit_2": {**one, "Force": -FORCE}})
+    scipy.io.savemat(tmp_path / "b.mat", {"hit_1": one, "hit_2": {**one, "Force": -FORCE, "Acc": -RAIL}})
     first, second = read("b.mat", tmp_path, by_name).recordings
     both(first)
     np.testing.assert_array_equal(second.signal("force"), -FORCE)
@@ -104,7 +104,7 @@ def test_hdf5_with_a_group_per_impact_and_a_time_vector(by_name, tmp_path):
         for impact in ("Impact 10", "Impact 9"):  # 9 comes before 10
             group = file.create_group(impact)
             group["time"] = np.arange(300) / RATE
-            group["Force"], group["Acc"] = FORCE * (1 if impact.endswith("9") else 3), RAIL
+            group["Force"], group["Acc"] = np.array([FORCE, RAIL]) * (1 if impact.endswith("9") else 3)
             group["Force"].attrs["unit"], group["Acc"].attrs["unit"] = "N", "m/s²"
     first, second = read("a.h5", tmp_path, by_name).recordings
     both(first)
@@ -117,7 +117,7 @@ def named_by_a_list(folder, **lists):
         file.attrs.update({"rate": RATE, **lists})
         for impact in (1, 2):
             group = file.create_group(f"hit_{impact}")
-            group["Sleeper"], group["Force"], group["Acc"] = RAIL[::-1] * impact, FORCE, RAIL
+            group["Sleeper"], group["Force"], group["Acc"] = np.array([RAIL[::-1], FORCE, RAIL]) * impact
     return "a.h5"
 
 
@@ -133,8 +133,8 @@ def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_nam
     result = read(named_by_a_list(tmp_path, channels=names, units=units), tmp_path, by_three_names)
     assert result.errors == ()
     for impact, recording in enumerate(result.recordings, start=1):
-        np.testing.assert_allclose(recording.signal("force"), 1000 * FORCE, rtol=1e-14)
-        np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("force"), 1000 * FORCE * impact, rtol=1e-14)
+        np.testing.assert_allclose(recording.signal("rail"), RAIL * impact, rtol=1e-14)
         np.testing.assert_allclose(recording.signal("sleeper"), 9.80665 * impact * RAIL[::-1], rtol=1e-14)
 
 

@@ -28,6 +28,22 @@ def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_r
     assert np.array_equal(found, bare)
 
 
+def test_a_given_force_acts_as_it_is_whatever_the_hammer():
+    """A half-sine of 4 ms, in channel 0 to 1 %, the ripple of the anti-alias filter, and its response is linear."""
+    duration, peak = 4e-3, 8e3
+
+    def half_sine(time):
+        return peak * np.sin(np.pi * np.clip(time / duration, 0.0, 1.0))
+
+    quiet = {"sensors": [Sensor("A", 15.0)]}
+    once, twice = (impact(pulse=f, **quiet) for f in (half_sine, lambda time: 2.0 * half_sine(time)))
+    assert once[0].sum() / 20e3 == pytest.approx(2.0 / np.pi * peak * duration, rel=1e-4)
+    assert once[0].max() == pytest.approx(peak, rel=0.01)
+    assert np.flatnonzero(once[0] > 0.01 * peak)[0] == pytest.approx(0.005 * 20e3, abs=2.0)  # after the pretrigger
+    assert np.allclose(twice, 2.0 * once, rtol=1e-9, atol=1e-9 * np.max(np.abs(once)))
+    assert np.std(once[1]) > 1.0
+
+
 def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
     """A gain of 3 is three times the signal, to rounding: these channels have no converter."""
     quiet = [Sensor("A", 15.0), Sensor("B", 15.6)]

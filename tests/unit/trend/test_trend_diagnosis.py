@@ -3,7 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from tests.unit.trend.test_trend_list import fallen, viewed
+from tests.unit.trend.evaluated_views import evaluated_views
+from tests.unit.trend.test_trend_list import fallen
 
 SECTION = "T00001/S4"
 
@@ -35,7 +36,7 @@ def test_an_alarm_has_the_diagnosis_of_its_section_or_a_reason(settings, rows, w
     found_at = rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago)
     findings = finding(found_at, verdict, "soft ballast at 21.6 m", sections)
     query = "select diagnosis, state from worklist where section_id = ?"
-    with viewed(rows, settings, mismatch_findings=findings) as con:
+    with evaluated_views(rows, settings, mismatch_findings=findings) as con:
         ((diagnosis, state),) = con.execute(query, [SECTION]).fetchall()
         others = con.execute("select diagnosis from worklist where raised_at_utc is null").fetchall()
     assert state == "inspect this week" and expected in diagnosis
@@ -53,7 +54,7 @@ def change(found_at, verdict="named", **more):
 
 
 def diagnosis_of(rows, settings, **tables):
-    with viewed(rows, settings, **tables) as con:
+    with evaluated_views(rows, settings, **tables) as con:
         query = "select state, diagnosis, since_earliest_utc, since_latest_utc from worklist where section_id = ?"
         ((state, words, *since),) = con.execute(query, [SECTION]).fetchall()
     assert state == "inspect this week"
@@ -111,7 +112,7 @@ def test_where_alarm_and_diagnosis_differ_the_row_says_in_what(settings, rows):
 def test_another_component_direction_or_position_is_no_decision(settings, rows, more, expected):
     sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
     findings = change(rows["measured_at_utc"].max(), **more)
-    with viewed(rows, settings, change_findings=findings, sections=sections) as con:
+    with evaluated_views(rows, settings, change_findings=findings, sections=sections) as con:
         query = "select * replace (case when section_id = ? then 'ballast' end as changed_component) from chart_status"
         con.register("chart_status", con.execute(query, [SECTION]).df())
         query = "select diagnosis from worklist where section_id = ? and raised_at_utc is not null"
@@ -126,7 +127,7 @@ def test_more_impacts_are_no_advice_for_a_chart_of_trains(settings, rows):
     noise = np.exp(np.random.default_rng(1).normal(0.0, 0.3, len(rows)))
     peaks = rows.assign(band="amplitude", source="passage", frequency_hz=100.0 * noise)
     query = "select distinct source, look_at from worklist where state = 'cannot tell'"
-    with viewed(peaks, settings) as con:
+    with evaluated_views(peaks, settings) as con:
         ((source, look_at),) = con.execute(query).fetchall()
     assert source == "passage" and "more trains" in look_at and "impacts" not in look_at
 
@@ -136,7 +137,7 @@ def amplitude_row(rows, settings, **tables):
     peaks = rows.assign(
         band="amplitude", source="passage", frequency_hz=rows["frequency_hz"].max() ** 2 / rows["frequency_hz"]
     )
-    with viewed(peaks, settings, **tables) as con:
+    with evaluated_views(peaks, settings, **tables) as con:
         query = """
             select state, direction, diagnosis, look_at from worklist
             where section_id = ? and raised_at_utc is not null"""
@@ -179,7 +180,7 @@ def test_what_to_look_at_are_the_sleepers_of_the_diagnosis(settings, rows, weeks
     sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
     findings = change(rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago), **more)
     tables = {"change_findings": findings, "sections": sections}
-    with viewed(rows, settings, **tables) as con:
+    with evaluated_views(rows, settings, **tables) as con:
         query = "select look_at from worklist where section_id = ? and raised_at_utc is not null"
         ((of_impacts,),) = con.execute(query, [SECTION]).fetchall()
     _, of_trains = amplitude_row(rows, settings, **tables)

@@ -15,7 +15,7 @@ from turnout.trend.stiffness import (
     stiffness_change,
 )
 
-from .test_trend_list import viewed
+from .evaluated_views import evaluated_views
 
 
 def chain(pad, ballast, rail=36.0, sleeper=150.0):
@@ -97,7 +97,7 @@ def test_one_campaign_of_another_mode_does_not_name_its_component():
 
 def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):
     rows = both_bands(1.0, 0.5, 7, turnouts=2)
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         listed = con.execute(
             "select band, component, state, sentence, look_at from worklist where section_id like '%/S0'"
         ).fetchall()
@@ -113,7 +113,7 @@ def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):
 def test_each_component_is_looked_at_by_its_own_sign(settings):
     """Pads were exchanged for harder ones while the ballast lost stiffness: chance of both by the closed form."""
     rows = both_bands(1.4, 0.6, 9, turnouts=2)
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         looks = con.execute(
             "select look_at from worklist where section_id like '%/S0' and changed_component = 'both'"
         ).fetchall()
@@ -123,7 +123,7 @@ def test_each_component_is_looked_at_by_its_own_sign(settings):
 
 def test_both_rows_of_a_section_say_the_same_of_its_stiffness(settings):
     """The railpad resonance moves by 0.6 %, too little for an onset of its own; half of the stiffness is truly lost."""
-    with viewed(both_bands(1.0, 0.5, 7, turnouts=2), settings) as con:
+    with evaluated_views(both_bands(1.0, 0.5, 7, turnouts=2), settings) as con:
         sizes = con.execute(
             "select ballast_stiffness_low_pct, ballast_stiffness_high_pct, band from chart_states "
             "where section_id like '%/S0' and raised_at_utc is not null order by section_id"
@@ -143,9 +143,9 @@ def test_a_coupled_alarm_is_referred_to_the_other_one_only_where_that_one_is_lis
         }
     )  # fmt: skip
     question = "select sentence, look_at from worklist where section_id = 'T00000/S0' and band = 'railpad'"
-    with viewed(rows, settings, acknowledgements=silence) as con:
+    with evaluated_views(rows, settings, acknowledgements=silence) as con:
         ((sentence, look),) = con.execute(question).fetchall()
     assert "whose own row" not in sentence and "see the other" not in look
-    with viewed(rows, settings) as con:
+    with evaluated_views(rows, settings) as con:
         ((sentence, look),) = con.execute(question).fetchall()
     assert "whose own row" in sentence and "see the other" in look
