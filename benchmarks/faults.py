@@ -143,7 +143,7 @@ class Fleet:
         write_plans(configuration, self.raw, self.plan.parent, 1, accept_vanished=True)
         stage = Stage("hammer", compute, "1")
         summary = run_shard(self.plan, self.state, stage, configuration, self.raw, threads=self.threads)
-        result = register(batch_paths([self.state]), self.registry, read=read_results, patience=5.0)
+        result = register(batch_paths([self.state]), self.registry, read=read_results, max_wait=5.0)
         if self.is_compacting:
             compact(self.registry)
         faults = "".join(f"; {path}: {fault}" for path, fault in result.faults.items())
