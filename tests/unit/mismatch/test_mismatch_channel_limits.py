@@ -64,3 +64,22 @@ def test_impacts_of_a_flat_that_one_channel_shows_less_are_no_limit():
     with_impact = [passage(a, b, (66.0, 46.0)) for a, b in zip(limited, larger, strict=True)]
     campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[*rolling, *with_impact])
     assert saturated_channels(campaign, 12.0) == {}
+
+
+@pytest.mark.parametrize("is_noise", [True, False])
+def test_peaks_of_noise_that_stay_are_no_limit_and_those_of_a_train_are(is_noise):
+    """A train is in the middle third of each recording. A1 stays within 90 m/s² always, or only under the train."""
+    time, rng = np.linspace(0.0, 3.0, 3001), np.random.default_rng(2)
+    under_train = np.where((time > 1.0) & (time < 2.0), 1.0, 0.02)
+
+    def passage(peak):
+        wave = under_train * np.sin(300.0 * time)
+        noise = np.clip(40.0 * rng.standard_normal(time.size), -90.0, 90.0)
+        first = noise if is_noise else np.clip(peak * wave, -90.0, 90.0)
+        samples = np.array([first, 1.3 * peak * wave, 0.8 * peak * wave])
+        channels = tuple(Channel(n, "acceleration", "m/s²") for n in ("A1", "A2", "A3"))
+        return SimpleNamespace(recording=Recording(samples, 1000.0, channels))
+
+    sensors = [SimpleNamespace(name=n, place=x) for n, x in (("A1", 1.0), ("A2", 3.0), ("A3", 5.0))]
+    campaign = SimpleNamespace(sensors=sensors, hammer=(), passages=[passage(np.exp(peak)) for peak in PEAKS])
+    assert list(saturated_channels(campaign, 3.0)) == ([] if is_noise else ["A1"])
