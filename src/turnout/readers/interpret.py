@@ -323,10 +323,12 @@ def _decisive_fault(
 ) -> ReadError | None:
     """The fault that makes a record useless: of a channel that is needed, or where no response is left."""
     channels = [c.channel for c in channel_maps]
-    forces = {c.name for c in channels if c.quantity == "force"} if description.kind == "hammer" else set()
-    decisive = [e for i, e in faults.items() if channels[i].name in forces | set(description.required)]
-    responses = {c.name for i, c in enumerate(channels) if i not in faults} - forces
-    return next(iter(decisive if responses else [*decisive, *faults.values()]), None)
+    is_hammer = description.kind == "hammer"
+    needed = {c.name for c in channels if is_hammer and c.quantity == "force"} | set(description.required)
+    decisive = [e for i, e in faults.items() if channels[i].name in needed]
+    auxiliary = ("force", "temperature") if is_hammer else ()
+    has_response = any(c.quantity not in auxiliary for i, c in enumerate(channels) if i not in faults)
+    return next(iter(decisive if has_response else [*decisive, *faults.values()]), None)
 
 
 def _faults(
