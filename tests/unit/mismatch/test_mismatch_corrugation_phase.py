@@ -63,18 +63,18 @@ def test_the_phase_is_that_of_the_free_waves(phase):
     assert wave.gain > 10.0 and abs(wave.start - STRETCH[0]) <= 0.6 * LENGTH
 
 
-def test_the_price_of_a_phase_is_that_of_its_choice():
+def test_the_penalty_of_a_phase_is_that_of_its_choice():
     """Between nothing and the number of phases; nothing where the band holds nothing of the wave."""
     true = physics.RailCorrugation(*STRETCH, 5e-5, 0.0, LENGTH, 2.5)
     for case in (CorrugatedRail(true), CorrugatedRail(None)):
         wave = wave_in_band(scan_of(case), STRETCH, (LENGTH, 0.025 * LENGTH), AMPLITUDE)
-        assert 0.5 < wave.price <= np.log(16.0)
+        assert 0.5 < wave.penalty <= np.log(16.0)
     short = wave_in_band(scan_of(CorrugatedRail(true)), STRETCH, (0.12, 0.003), AMPLITUDE)
-    assert short.gain == pytest.approx(0.0, abs=0.05) and short.price == pytest.approx(0.0, abs=0.05)
+    assert short.gain == pytest.approx(0.0, abs=0.05) and short.penalty == pytest.approx(0.0, abs=0.05)
     assert short.amplitude == pytest.approx(AMPLITUDE[0], rel=0.01)
 
 
-def test_on_intact_rail_the_best_phase_less_its_price_is_rarely_evidence():
+def test_on_intact_rail_the_best_phase_less_its_penalty_is_rarely_evidence():
     """The mean of the likelihood ratio over all phases, amplitudes and wavelengths is 1 on such rail."""
     ratios = []
     for seed in range(60):
