@@ -3,13 +3,14 @@
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
-from turnout.workflow.launch import TurnoutError, launch
+from turnout.workflow.launch import TurnoutError, launch, quote_interpreter
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 
 min_version("9.14")
 
 try:
+    quote_interpreter()
     RUN = launch(config, scan=workflow.is_main_process, formats=FORMATS, to_si=to_si)
 except (
     TurnoutError

@@ -111,7 +111,6 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     TurnoutError
         With ``scan``, if another run works in this folder.
     """
-    _quote_interpreter()
     for name in options:
         if name not in OPTIONS:
             raise ConfigError("--config", "option", f"unknown option {name!r}", suggestion(name, OPTIONS))
@@ -160,8 +159,11 @@ def _keep_other_runs_out() -> None:
     _HELD[path] = lock
 
 
-def _quote_interpreter() -> None:
-    """Quote the path of the interpreter: Snakemake writes it into shell commands as it is, and it may have spaces."""
+def quote_interpreter() -> None:
+    """Quote the path of the interpreter for Snakemake, which writes it into shell commands as it is.
+
+    The path may have spaces. Only the process of Snakemake may call this: others start the interpreter by its path.
+    """
     if " " in sys.executable and Path(sys.executable).exists():
         sys.executable = shlex.quote(sys.executable)
 
