@@ -5,7 +5,8 @@ What is recognised:
 * separators: comma, semicolon, tab, ``|`` or blanks; a decimal comma where the separator is not a comma;
 * head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_words`` recognises, ``started_at``,
   ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
-* units in brackets after the names ("force [N]", "force (N)") or in a line of their own;
+* units in brackets after the names ("force [N]", "force (N)"), behind a slash, a comma or "in" where most names have
+  one ("F/N", "Force, N", "Kraft in N"), or in a line of their own;
 * a column of time in numbers or as the time of day, "13.05.2026 10:00:00.00005"; a column ``record`` that numbers the
   records;
 * the start, where the head states none, in the first row: a date with a time of day, or a time column since 1970.
@@ -31,7 +32,7 @@ from turnout.readers.array_metadata import Metadata
 from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.csv_cells import BLANK, SEPARATORS, cells_of, first_cells, is_row
 from turnout.readers.csv_columns import seconds_per_number, time_column
-from turnout.readers.csv_header import read_head
+from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
@@ -72,7 +73,8 @@ def read_raw(source: Source) -> RawFile:
     end, remarks = _end_of_rows(data, end, source)
     if isinstance(data, bytes):
         data = data[:end]
-    head, names, units, offset, separator, entries = read_head(data, source)
+    head = read_head(data, source)
+    names, units, offset, separator = head.names, head.units, head.offset, head.separator
     if separator == BLANK:
         data = data[:end]
         data = data[:offset] + _with_single_blanks(data[offset:])
@@ -83,11 +85,11 @@ def read_raw(source: Source) -> RawFile:
         columns, footer = lazy_columns(source, data, offset, end, separator, names, time)
     else:
         columns, footer = columns_in_memory(source, data[:end], offset, separator, names)
-    entries = (*entries, *footer)
+    head = head._replace(entries=(*head.entries, *footer))
     remarks += control_character_errors(data[:offset], source)
-    facts = Metadata(head, source)
+    facts = Metadata(head.notes, source)
     first = start_in_cells(first_cells(data, offset, separator), names)
-    records = tuple(_records(columns, names, units, time, facts, source, entries, first))
+    records = tuple(_records(columns, head, time, facts, source, first))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
 
 
@@ -147,17 +149,19 @@ def _in_utf8(source: Source, encoding: str) -> bytes:
         return source.data.decode(encoding).encode()
 
 
+TIME_UNIT_REMEDY = "Find out which is right; then correct the other in the header of the file"
+
+
 def _records(
     columns: list[Column],
-    names: Sequence[str],
-    units: Sequence[str],
+    head: Head,
     time: int | None,
     facts: Metadata,
     source: Source,
-    entries: tuple[Entry, ...],
     first: tuple[datetime | None, str],
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
+    names, units, entries = head.names, head.units, head.entries
     numbering = record_column(dict(reversed([*zip(names, columns)])), source)
     numbers = columns[names.index(numbering)] if numbering is not None else None
     numbers = None if numbers is not None and _counts_rows(numbers) else numbers
@@ -176,6 +180,9 @@ def _records(
         promised = int(rows)
     of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
+    if time in head.unit_conflicts:
+        raise source.error("the time column", head.unit_conflicts[time], TIME_UNIT_REMEDY, reason="unit_unknown")
+    unit_conflicts = {k: head.unit_conflicts[i] for k, i in enumerate(selected) if i in head.unit_conflicts}
     entries = tuple(_of_channels(entry, selected, len(names)) for entry in entries)
     for k, span in enumerate(spans):
         if span is None:
@@ -201,7 +208,9 @@ def _records(
             axis_starts=(first,) if k == 0 else (),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
+            aliases=tuple((head.written[i],) for i in selected),
             undecided=undecided,
+            unit_conflicts=unit_conflicts,
             time_label="" if time is None else _label(names, units, time),
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),

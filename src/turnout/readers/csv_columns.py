@@ -4,16 +4,20 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from turnout.readers.metadata_names import TIME_NAMES
+from turnout.readers.attached_units import (
+    TIME_WORDS,
+    UNITS_OF_TIME_ALONE,
+    have_most_a_unit,
+    is_known,
+    name_and_unit,
+    names_and_units_in,
+    unit_behind_mark,
+)
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
-from turnout.readers.stated_units import SENSITIVITY_IN_NAME
+from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.time_numbers import SINCE
 from turnout.units import conversion
-
-TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
-# Units that say alone that a column is the time. "min" and "d" may be a minimum and a distance.
-UNITS_OF_TIME_ALONE = ("", "s", "sec", "ms", "µs", "us", "ns")
 
 
 def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
@@ -93,50 +97,6 @@ def _plain_unit(unit: str) -> str:
     return unit.strip().replace("\u03bc", "µ")
 
 
-NAME_WITH_UNIT = re.compile(r"^(.*?)\s*[\[(]([^\[\]]*)[\])]$")
-BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(((?:[^()]|\([^()]*\))*)\))\s*")
-
-
-def name_and_unit(cell: str) -> tuple[str, str]:
-    """Name and unit of a column: the unit is the known one in brackets, else what brackets at the end hold.
-
-    Brackets at the end are no part of the name, nor is a slash before them, which stands for a division.
-
-    Parameters
-    ----------
-    cell : str
-        Name of a column as it is written.
-
-    Returns
-    -------
-    tuple of (str, str)
-        "" as unit if none is stated.
-
-    Examples
-    --------
-    >>> name_and_unit("force [kN]"), name_and_unit("a/(m/s²)"), name_and_unit("Force [N] (ch 1)")
-    (('force', 'kN'), ('a', 'm/s²'), ('Force [N] (ch 1)', 'N'))
-    """
-    sensitivity = SENSITIVITY_IN_NAME.search(cell)
-    for match in reversed([*BRACKETS.finditer(cell)]):
-        if sensitivity and sensitivity.start() < match.start() < sensitivity.end():  # of "10 mV/(m/s²)"
-            return cell, ""
-        unit = next(text for text in match.groups() if text is not None).strip()
-        if _is_known(unit):
-            return cell[: match.start()].rstrip("/ ") if match.end() == len(cell) else cell, unit
-    match_at_end = NAME_WITH_UNIT.match(cell)
-    return (match_at_end[1], match_at_end[2]) if match_at_end else (cell, "")
-
-
-def _is_known(unit: str) -> bool:
-    """Whether a unit is known: of a sensor, or of time."""
-    try:
-        return bool(conversion(unit))
-    except ValueError:
-        time_unit = rate_unit(unit)
-        return time_unit is not None and time_unit.is_step
-
-
 def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """Find the line of names and the line of units among the lines above the numbers.
 
@@ -186,7 +146,9 @@ def _is_unit(cell: str) -> bool:
 
 
 def are_names(cells: Sequence[str]) -> bool:
-    """Whether a cell names the time or has a unit in brackets; not if any cell starts with a digit, as in "08:30".
+    """Whether a cell names the time or has a unit in brackets, or most of several have one behind a slash or the like.
+
+    Not if any cell starts with a digit, as in "08:30".
 
     Parameters
     ----------
@@ -206,30 +168,25 @@ def are_names(cells: Sequence[str]) -> bool:
     if any(cell[:1].isdigit() for cell in cells):
         return False
     in_brackets = [unit for name, unit in map(name_and_unit, cells) if name]
-    return any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets)
+    if any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets):
+        return True
+    return len(cells) > 1 and have_most_a_unit(cells)
 
 
 COMMENT = re.compile(r"comm?ent|komment|remar[kq]|bemerk|notes?$|anmerk|osserv|opmerk|event|ereign|mark", re.IGNORECASE)
 
 
 class Columns(NamedTuple):
-    """Names and units of the columns, and the ``further`` names beside them for which the rows have no cells."""
+    """Names and units of the columns, and the ``further`` names beside them for which the rows have no cells.
+
+    ``written`` are the names with the units in them; ``conflicts`` tells by the number of a column of two units for it.
+    """
 
     names: list[str]
     units: list[str]
     further: list[str]
-
-
-def _holds_unit(text: str) -> bool:
-    return not text.isdigit() and any(_is_known(word) for word in text.split())
-
-
-def _distinguished_by_brackets(pairs: Sequence[tuple[str, str]]) -> set[str]:
-    """Names that several columns share, with different texts in brackets that are no units: "Y[0]", "acc (left)"."""
-    texts: dict[str, list[str]] = {}
-    for bare, text in pairs:
-        texts.setdefault(bare, []).append(text)
-    return {n for n, t in texts.items() if len(set(t)) == len(t) > 1 and not any(map(_holds_unit, t)) and all(t)}
+    written: list[str]
+    conflicts: dict[int, str]
 
 
 def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
@@ -252,15 +209,70 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     lines = [(line + [""] * open_end)[:count] for line in whole_lines]
     if not lines:
         names = [str(i) for i in range(count)]
-        return Columns([*names[:-1], ""] if open_end and count > 1 else names, [""] * count, [])
+        names = [*names[:-1], ""] if open_end and count > 1 else names
+        return Columns(names, [""] * count, [], names, {})
     name_line, unit_line = names_among(lines)
-    names = lines[name_line]
+    written = lines[name_line]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
-    units = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
-    pairs = [name_and_unit(name) for name in names]
-    told_apart = _distinguished_by_brackets(pairs)
-    for i, (name, (bare, unit)) in enumerate(zip(names, pairs)):
-        if bare in told_apart:
-            continue
-        names[i], units[i] = bare, unit if unit or bare != name else units[i]
-    return Columns(names, units, further)
+    below = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
+    pairs = names_and_units_in(written)
+    names = [name for name, _ in pairs]
+    units = [unit if unit or name != cell else other for (name, unit), cell, other in zip(pairs, written, below)]
+    conflicts = {
+        i: f"its name {cell!r} says {unit!r}, the line of units {other!r}"
+        for i, (cell, other) in enumerate(zip(written, below))
+        if (unit := _contradicting_unit(cell, other))
+    }
+    return Columns(names, units, further, written, conflicts)
+
+
+def _contradicting_unit(cell: str, unit: str) -> str:
+    """The unit in a name that contradicts the one in the line of units, or ""; behind a slash it may be a side."""
+    in_brackets = name_and_unit(cell)[1]
+    attached = unit_behind_mark(cell)
+    stated = in_brackets if is_known(in_brackets) else attached[1] if attached else ""
+    if not stated or not is_known(unit):
+        return ""
+    first, second = known_unit(stated), known_unit(unit)
+    if first is None or second is None:  # one of them is of time
+        return stated if rate_unit(stated) != rate_unit(unit) else ""
+    is_side = stated != in_brackets and first.dimension != second.dimension
+    return "" if is_side or same_unit(stated, unit) else stated
+
+
+def is_line_of_names(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether cells are the names of the columns, with or without units.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of a line above the numbers.
+    names : sequence of str
+        Names of the columns, without units.
+
+    Returns
+    -------
+    bool
+        False for a single column, of which another line may repeat the name.
+    """
+    cells = [cells[0].lstrip("#% "), *cells[1:]]
+    bare = [name for name, _ in names_and_units_in(cells)]
+    return len(names) > 1 and bare[: len(names)] == list(names)
+
+
+def describes_columns(cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
+    """Whether cells are the names of the columns, or their units.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of a line above the numbers.
+    names, units : sequence of str
+        Names and units of the columns.
+
+    Returns
+    -------
+    bool
+        True for a line that states nothing beside them.
+    """
+    return any(cells) and (is_line_of_names(cells, names) or [cell.strip("[]() ") for cell in cells] == list(units))

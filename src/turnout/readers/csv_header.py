@@ -20,7 +20,7 @@ from turnout.readers.csv_cells import (
     is_number,
     is_row,
 )
-from turnout.readers.csv_columns import are_names, name_and_unit, names_and_units
+from turnout.readers.csv_columns import are_names, describes_columns, is_line_of_names, names_and_units
 from turnout.readers.entries import COLON, FREE_TEXT, Entry, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.lost_entries import CONTROL_CHARACTER
@@ -59,7 +59,8 @@ GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 class Head(NamedTuple):
     """Lines above the numbers of a text file: ``notes`` by name, ``names`` and ``units`` of the columns.
 
-    The first number is at byte ``offset``; ``entries`` are all entries of the head with their lines.
+    The first number is at byte ``offset``; ``entries`` are all entries of the head with their lines. ``written`` are
+    the names with their units, ``unit_conflicts`` tells by the number of a column of two units for it.
     """
 
     notes: dict[str, float | str]
@@ -68,6 +69,8 @@ class Head(NamedTuple):
     offset: int
     separator: str
     entries: tuple[Entry, ...]
+    written: list[str]
+    unit_conflicts: dict[int, str]
 
 
 def read_head(data: bytes | mmap, source: Source) -> Head:
@@ -135,7 +138,7 @@ def _complete_head(
     texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
     _check_width(texts, cells, separator, len(head_lines), source)
-    names, units, further = names_and_units(texts, cells)
+    names, units, further, written, conflicts = names_and_units(texts, cells)
     if further:
         problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
         where = f"line {len(head_lines) + 1}"
@@ -146,13 +149,13 @@ def _complete_head(
         if b and not any(rest) and a not in names and is_scale_name(a)
     }
     stated = [i for i, name in enumerate(names) if STATEMENT.fullmatch(name) and not cells[i]]
-    lines_of_entries = ["" if _names_columns(cells_of(t, separator), names, units) else t for t in head_lines]
+    lines_of_entries = ["" if describes_columns(cells_of(t, separator), names, units) else t for t in head_lines]
     separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
     entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
     for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
     names = ["" if i in stated else name for i, name in enumerate(names)]
-    return Head({**notes, **scales}, names, units, offset, separator, entries)
+    return Head({**notes, **scales}, names, units, offset, separator, entries, written, conflicts)
 
 
 def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str] | None:
@@ -316,7 +319,7 @@ def entries_of_lines(
     for i, (line, cells) in enumerate(zip(lines, table)):
         place = f"line {first_line + i}"
         text = line.strip().lstrip("#%*/!'\" ").strip()
-        if not text or _is_line_of(cells, names):
+        if not text or is_line_of_names(cells, names):
             continue
         pairs = [(a, b) for a, b in pairwise(cells) if a and b and not is_number(a)]
         for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
@@ -385,18 +388,6 @@ def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
     }
     is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0])
     return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1
-
-
-def _is_line_of(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether these cells are the names of the columns, with or without units."""
-    cells = [cells[0].lstrip("#% "), *cells[1:]]
-    bare = [name_and_unit(cell)[0] for cell in cells]
-    return len(names) > 1 and list(bare[: len(names)]) == list(names)
-
-
-def _names_columns(cells: Sequence[str], names: Sequence[str], units: Sequence[str]) -> bool:
-    """Whether these cells are the names of the columns, or their units."""
-    return any(cells) and (_is_line_of(cells, names) or [cell.strip("[]() ") for cell in cells] == list(units))
 
 
 def _value(text: str) -> float | str:

@@ -33,6 +33,9 @@ SENSITIVITY_IN_NAME = re.compile(
     r"(?!count|lsb|bit|digit|div)(?:\([^()]*\)|[^\W\d_][^\s\[\](){}<>|_;,]*))"
 )
 
+# Its unit alone, "rail mV/(m/s²)".
+SENSITIVITY_UNIT_IN_NAME = re.compile(r"(?<![^\W_])(?:[mµ\u03bcu]?V|p?C)\s?/\s?\([^()]*\)")
+
 
 @lru_cache(maxsize=4096)
 def _words(name: str) -> frozenset[str]:
@@ -220,7 +223,7 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
 
 def _without_sensitivity(name: str) -> str:
     """A name without the sensitivity of a sensor in it, and without what separates it."""
-    plain = SENSITIVITY_IN_NAME.sub("", name)
+    plain = SENSITIVITY_UNIT_IN_NAME.sub("", SENSITIVITY_IN_NAME.sub("", name))
     return name if plain == name else plain.rstrip(" _@,;-")
 
 
