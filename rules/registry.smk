@@ -1,6 +1,6 @@
 """The registry: one job takes in what all shards have computed, then the run is judged."""
 
-from turnout.workflow.registry_damage import damage_stamp
+from turnout.workflow.registry_damage import repair_request
 
 TARGETS += ["results/registry/_generation.json", "work/verdict.json"]
 
@@ -22,7 +22,7 @@ rule register:
         code=fingerprint("turnout.registry.job", "turnout.reasons"),
         again=attempts("register"),
         # files that changed on the disk make the job run, which restores their rows
-        damage=lambda wildcards: damage_stamp("results/registry"),
+        damage=lambda wildcards: repair_request("results/registry"),
         stages=STAGES,
         shards=RUN.every_shard,
         configuration=RUN.fleet_hash,

@@ -73,6 +73,14 @@ def test_a_registration_that_failed_is_tried_again_though_nothing_is_new(fleet):
     assert "Nothing to be done" in run(fleet).stdout
 
 
+def test_a_damaged_registry_is_repaired_each_time_and_the_night_after_has_nothing_to_do(fleet):
+    before = toy.rows(fleet)
+    for file in ("recordings/**/*.parquet", "registry.duckdb", "registry.duckdb"):
+        next((fleet / "results/registry").glob(file)).unlink()
+        assert run(fleet).returncode == 0 and toy.rows(fleet) == before
+        assert "Nothing to be done" in run(fleet).stdout
+
+
 def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     for turnout in ("T00000", "T00001", "T00003"):
         toy.add_raw(fleet, turnout, n_section=1, n_campaign=1, first=1)

@@ -19,6 +19,7 @@ from turnout.workflow.current_results import DamagedBatch
 from turnout.workflow.duplicate_files import withdraw_moved
 from turnout.workflow.launch import launch_time
 from turnout.workflow.quality_gate import QualityGate, check_quality
+from turnout.workflow.registry_damage import note_repair
 from turnout.workflow.retries import attempt, request_rerun
 from turnout.workflow.shard import Summary, run_shard
 from turnout.workflow.state import batch_paths, state_of, state_of_mark
@@ -120,7 +121,7 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     log : any
         Log file of the job; Snakemake gives a list with one name.
     params : Params
-        job, stages, shards, configuration, again.
+        job, stages, shards, configuration, again, damage.
     """
     _log_to(log)
     configuration = load_configuration(params.job["configuration"])
@@ -133,6 +134,7 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
             batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
             config_hash=params.configuration, code_version=__version__, started_at=launch_time(),
         )  # fmt: skip
+    note_repair(params.damage)
     os.utime(generation)
     for batch, fault in result.faults.items():
         logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
