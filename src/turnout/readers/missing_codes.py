@@ -12,6 +12,8 @@ from turnout.readers.source import BLOCK_SIZE
 # value of masked arrays.
 OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31, 1e20)
 MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
+MIN_NINES_OF_NEGATIVE = 2  # before the decimal point, as in -99.99, under the conditions of ``count_alone``
+MIN_NINES_OF_SINGLE = 4  # in all: -99.9 is a measured value in 1 of 1000 records, where it does not repeat
 
 
 def missing_code(value: float) -> float | None:
@@ -29,13 +31,13 @@ def missing_code(value: float) -> float | None:
 
     Examples
     --------
-    >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 65535.0, 9998.0, 99.0)]
-    [-9999.0, 99999.9, -32768.0, None, None, None]
+    >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 65535.0, 9998.0, 99.0, -99.99)]
+    [-9999.0, 99999.9, -32768.0, None, None, None, -99.99]
     """
     size = abs(float(value))
     text = f"{size:.7g}"
     digits, _, decimals = text.partition(".")
-    if len(digits) >= MIN_NINES and set(digits + decimals) == {"9"}:
+    if len(digits) >= (MIN_NINES_OF_NEGATIVE if value < 0 else MIN_NINES) and set(digits + decimals) == {"9"}:
         return math.copysign(float(text), value)
     return next((math.copysign(code, value) for code in OTHER_CODES if math.isclose(size, code, rel_tol=1e-7)), None)
 
@@ -45,6 +47,9 @@ def count_alone(column: Column, code: float) -> int:
 
     The steps into and out of the code have to be larger than every other step of the channel. A measured value of this
     form has neighbours that are near to it. Samples that are not finite are passed over.
+
+    Beside a code with two nines before the decimal point, the signal must not take its lowest other value: it does so
+    on its way to a limit at which it is clipped. With fewer than four nines in all the code must repeat.
 
     Parameters
     ----------
@@ -62,18 +67,29 @@ def count_alone(column: Column, code: float) -> int:
     --------
     >>> count_alone(np.array([0.0, 2.0, -9999.0, 1.0]), -9999.0), count_alone(np.array([0.0, 700.0, 999.0]), 999.0)
     (1, 0)
+    >>> count_alone(np.array([0.0, 2.0, -99.99, 1.0]), -99.99), count_alone(np.array([0.0, -40.0, -99.99]), -99.99)
+    (1, 0)
     """
-    count, smallest_jump, largest_step = 0, np.inf, 0.0
+    count, smallest_jump, largest_step, lowest, lowest_beside = 0, np.inf, 0.0, np.inf, np.inf
     for block in _overlapping_blocks(column):
         own_code = np.asarray(code).astype(block.dtype)
         count += int(np.count_nonzero(block[:BLOCK_SIZE] == own_code))
         block = block[np.isfinite(block)]
         is_code = block == own_code
-        steps = np.abs(np.diff(block.astype(float)))
+        values = block.astype(float)
+        lowest = min(lowest, values[~is_code].min(initial=np.inf))
+        steps = np.abs(np.diff(values))
         into_code = is_code[:-1] ^ is_code[1:]
         largest_step = max(largest_step, steps[~into_code].max(initial=0.0))
         smallest_jump = min(smallest_jump, steps[into_code].min(initial=np.inf))
-    return count if largest_step < smallest_jump < np.inf else 0
+        beside = np.maximum(values[:-1], values[1:])[into_code]  # the code itself is lower
+        lowest_beside = min(lowest_beside, beside.min(initial=np.inf))
+    if not largest_step < smallest_jump < np.inf:
+        return 0
+    if abs(code) < 10**MIN_NINES_OF_NEGATIVE:
+        n_nines = f"{code:.7g}".count("9")
+        return count if lowest_beside > lowest and (count > 1 or n_nines >= MIN_NINES_OF_SINGLE) else 0
+    return count
 
 
 def _overlapping_blocks(column: Column) -> Iterator[np.ndarray]:

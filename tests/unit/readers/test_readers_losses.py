@@ -66,6 +66,33 @@ def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_pat
     assert [c.name for c in passage.recordings[0].channels] == ["force"]  # it costs its channel alone
 
 
+@pytest.mark.parametrize("samples", [[700, 2000], [700, 701, 702, 2000]])
+@pytest.mark.parametrize("code", [-99.0, -99.9, -99.99, -99.999])
+def test_a_code_with_two_nines_before_the_decimal_point_is_no_measured_value(code, samples, tmp_path):
+    rail = 0.25 * RAIL
+    rail[samples] = code
+    (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
+    reason, message = reason_of(tmp_path, "a.csv")
+    assert reason == "not_finite" and f"{len(samples)} of {N} samples are {code:.7g}, a usual code" in message
+
+
+@pytest.mark.parametrize(("code", "is_missing"), [(-99.99, True), (-99.9, False), (-99.0, False), (99.99, False)])
+def test_a_single_value_with_few_nines_may_be_measured(code, is_missing, tmp_path):
+    rail = 0.25 * RAIL
+    rail[700] = code
+    (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
+    assert bool(read("a.csv", tmp_path, PASSAGE).errors) == is_missing
+
+
+@pytest.mark.parametrize("flank", [-40.0, -1.0])
+def test_a_pulse_that_is_clipped_at_such_a_value_is_measured(flank, tmp_path):
+    """The samples beside the limit are lower than all others: the signal is on its way there."""
+    rail = np.round(RAIL / np.abs(RAIL).max() / 2.0, 3)
+    rail[700:704] = [flank, -99.99, -99.99, flank]
+    (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
+    assert [error.reason for error in read("a.csv", tmp_path, PASSAGE).errors if error.reason == "not_finite"] == []
+
+
 @pytest.mark.parametrize("dtype", ["f4", "f8", "i4"])
 def test_a_code_is_found_in_any_type_and_in_a_record_that_stays_in_the_file(dtype, tmp_path):
     n = 300_000  # the code lies in the second block
