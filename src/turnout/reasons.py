@@ -31,6 +31,7 @@ REASONS = {
     "sign_reversed": "the force is negative at contact: the sign is reversed",
     "clock_backwards": "the time stamps run backwards",
     "duplicate": "the same bytes as another file, or the same impact or samples a second time",
+    "other_turnout": "another turnout has a hammer file with the same bytes; its recordings are used at both",
     "wrong_time": "the time of the recording contradicts its campaign, or a passage has none",
     "start_unknown": "the start time in the file is unreadable, implausible or of another day; the recording is used",
     "rate_ambiguous": "the file states a rate before a reduction that nothing confirms; its recordings are used",

@@ -1,6 +1,7 @@
 """What the machine does to single units and to whole jobs holds nothing else back. One fleet, test by test."""
 
 import re
+import shutil
 import subprocess
 import sys
 
@@ -79,6 +80,14 @@ def test_a_damaged_registry_is_repaired_each_time_and_the_night_after_has_nothin
         next((fleet / "results/registry").glob(file)).unlink()
         assert run(fleet).returncode == 0 and toy.rows(fleet) == before
         assert "Nothing to be done" in run(fleet).stdout
+
+
+def test_a_file_that_is_at_two_turnouts_is_named_by_the_run_and_in_the_registry(fleet):
+    name, copy = "T00004/hammer/2024-01-01/A1_1.npz", "T00005/hammer/2024-01-01/A1_2.npz"
+    shutil.copy(fleet / "raw" / name, fleet / "raw" / copy)
+    done = run(fleet)
+    assert done.returncode == 0 and f"WARNING {copy}: same bytes as {name}; it counts at both" in done.stdout
+    assert sum("other_turnout" in row for row in toy.rows(fleet)["quarantine"]) == 2
 
 
 def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):

@@ -1,12 +1,14 @@
 """Handle copied and moved files.
 
 Files that are twice in a turnout's folder count in one unit; the other unit names the original in its quarantine row. A
-measurement whose files were moved counts in the new unit only, also in another turnout.
+measurement whose files were moved counts in the new unit only, also in another turnout. Nothing tells at which of two
+turnouts a hammer test was made whose file is at both: it counts at both, with a remark.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeGuard
 
 from turnout.config.merge import digest
 from turnout.config.settings.fleet import FleetSettings
@@ -327,6 +329,51 @@ def _holders(contents: Collection[str], states: Iterable[tuple[Units, Collection
                 if content in holders:
                     holders[content].add(_turnout(name))
     return holders
+
+
+def files_at_two_turnouts(work: Path, stages: Sequence[str], shards: Iterable[str]) -> list[dict]:
+    """Remarks on hammer files of which another turnout has the same bytes, after the jobs of all shards.
+
+    A passage may be at two turnouts, because one logger may record the train at both.
+
+    Parameters
+    ----------
+    work : Path
+        Folder ``work`` of the workflow.
+    stages : sequence of str
+        Names of the stages.
+    shards : iterable of str
+        Names of all shards.
+
+    Returns
+    -------
+    list of dict
+        Rows of ``quarantine``, sorted by path: each names one file of another turnout.
+    """
+    units_by_content: dict[str, dict[str, Unit]] = {}
+    for shard in shards:
+        plan = work / "plan" / f"{shard}.json"
+        tests = [p.unit for p in read_plan(plan) if p.unit.kind == "hammer"] if plan.exists() else []
+        for stage in stages if tests else ():
+            states = load_state(work / stage / f"{shard}.json").units
+            for unit in tests:
+                entry = states.get(unit_id(unit))
+                for (path, *_), content in zip(unit.files, entry.all_contents if _has_rows(entry) else ()):
+                    units_by_content.setdefault(content, {})[path] = unit
+    rows = [
+        quarantine_row(unit, path, "other_turnout", "the file", f"same bytes as {other}; it counts at both", REMEDY)
+        for units in units_by_content.values()
+        for path, unit in units.items()
+        if (other := min((p for p, u in units.items() if u.turnout != unit.turnout), default=""))
+    ]
+    return sorted(rows, key=lambda row: row["path"])
+
+
+REMEDY = "Delete it at the turnout where it was not measured"
+
+
+def _has_rows(entry: UnitState | None) -> TypeGuard[UnitState]:
+    return entry is not None and entry.status in WITH_ROWS
 
 
 def _turnout(name: str) -> str:

@@ -16,7 +16,7 @@ from turnout.files import changed_at, write_text
 from turnout.workflow.batches import read_results
 from turnout.workflow.configuration_rows import configuration_rows
 from turnout.workflow.current_results import DamagedBatch
-from turnout.workflow.duplicate_files import withdraw_moved
+from turnout.workflow.duplicate_files import files_at_two_turnouts, withdraw_moved
 from turnout.workflow.launch import launch_time
 from turnout.workflow.quality_gate import QualityGate, check_quality
 from turnout.workflow.registry_damage import note_repair
@@ -107,10 +107,14 @@ def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: An
     return gate
 
 
+MAX_SHARED_SHOWN = 10  # files that are at two turnouts in the log; the registry names all
+
+
 def register_job(register: Callable, generation: PathLike | str, log: Any, params: Any) -> None:
     """Register the batches of all shards, including those that take no part in this run.
 
-    Before that, units that were moved to a turnout of another shard are withdrawn from the old one.
+    Before that, units that were moved to a turnout of another shard are withdrawn from the old one. Hammer files that
+    are at two turnouts get a remark.
 
     Parameters
     ----------
@@ -130,14 +134,19 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
     with attempt("register", params.again):
         withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"])
+        shared = files_at_two_turnouts(Path("work"), params.stages, params.shards)
+        tables["quarantine"] += shared
         result = register(
             batch_paths(states), Path(generation).parent, read=read_results, tables=tables,
             config_hash=params.configuration, code_version=__version__, started_at=launch_time(),
         )  # fmt: skip
     note_repair(params.damage)
     os.utime(generation)
+    log_of_run = logging.getLogger("turnout.workflow")
     for batch, fault in result.faults.items():
-        logging.getLogger("turnout.workflow").warning("%s: %s", batch, fault)
+        log_of_run.warning("%s: %s", batch, fault)
+    for row in shared[:MAX_SHARED_SHOWN]:
+        log_of_run.warning("%s: %s. %s.", row["path"], row["found"], row["remedy"])
     _report(f"register: {result.n_units} units, {sum(result.rows.values())} rows, {result.n_rejected} rejected")
 
 

@@ -6,6 +6,7 @@ import shutil
 import pytest
 from length_fleet import CALLS, Fleet
 
+from turnout.workflow.duplicate_files import files_at_two_turnouts
 from turnout.workflow.state import batch_paths
 
 
@@ -46,6 +47,33 @@ def test_the_same_file_at_two_turnouts_is_no_copy(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "turnout 0")
     fleet.run()
     assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
+
+
+def remarks(fleet):
+    rows = files_at_two_turnouts(fleet.folder / "work", ["hammer"], [fleet.plan.stem])
+    return [(row["turnout_id"], row["path"], row["found"]) for row in rows if row["reason_code"] == "other_turnout"]
+
+
+def test_the_same_file_at_two_turnouts_has_a_remark_at_each_until_one_is_deleted(fleet):
+    """Nothing tells at which of them it was measured."""
+    fleet.put("t1/2024-05-13/A_2.txt", "turnout 0")
+    fleet.run()
+    first, second = "t0/2024-05-13/A_1.txt", "t1/2024-05-13/A_2.txt"
+    assert remarks(fleet) == [
+        ("t0", first, f"same bytes as {second}; it counts at both"),
+        ("t1", second, f"same bytes as {first}; it counts at both"),
+    ]
+    (fleet.raw / first).unlink()
+    fleet.run()
+    assert remarks(fleet) == []
+
+
+def test_a_copy_within_one_turnout_or_a_file_that_cannot_be_used_is_at_no_other_turnout(fleet):
+    share_a_file(fleet)
+    for turnout in ("t0", "t1"):
+        fleet.put(f"{turnout}/2024-06-13/A_1.txt", "damaged")
+    fleet.run()
+    assert remarks(fleet) == []
 
 
 FIRST, SECOND = "t0/hammer/A/2024-05-13", "t0/hammer/A/2024-05-31"
