@@ -226,6 +226,7 @@ CHANNEL_REASONS = frozenset(
         "clipped",
         "channels_swapped",
         "clock_drift",
+        "spikes",
         "sensor_lost",
     )
 )

@@ -60,6 +60,7 @@ REASONS = {
     "clock_drift": "the loggers' clocks drift apart",
     "sensor_lost": "a sensor stopped working during the recording",
     "interference": "electrical pulses on all channels at the same moment; they were removed",
+    "spikes": "single samples that stand out of a channel; they were replaced by the mean of their neighbours",
     "simulation_failed": "the simulation could not be completed",
     "internal_error": "a fault of this program, with its traceback",
 }

@@ -10,10 +10,8 @@ import numpy as np
 from turnout.passage.axle_count import best_count, count_without_distance
 from turnout.passage.axles import sensor_times
 from turnout.passage.channel_checks import channel_states, lost_sensors
+from turnout.passage.cleaning import clean
 from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
-from turnout.passage.electrical_pulses import (
-    without_pulses,
-)
 from turnout.passage.kinematics import Motion, pair_correlations, refine_slowness, scan_slowness
 from turnout.passage.position_checks import inconsistent_channels, inconsistent_positions
 from turnout.passage.result import Passage
@@ -60,10 +58,10 @@ def analyse(
     Passage
         "rejected" where no axle was found, "partly" where only a part of the passage can be used.
     """
-    recording, pulses = without_pulses(recording, sensors)
+    recording, removed = clean(recording, sensors)
     states = {s.name: s for s in channel_states(recording)}
     by_name = {s.name: s for s in sensors}
-    findings = [*pulses, *(f for s in states.values() if s.name in by_name for f in s.findings)]
+    findings = [*removed, *(f for s in states.values() if s.name in by_name for f in s.findings)]
     usable = [
         by_name[name] for name, state in states.items() if name in by_name and state.usable and state.lost_at is None
     ]

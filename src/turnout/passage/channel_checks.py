@@ -13,6 +13,7 @@ import numpy as np
 from scipy import ndimage
 
 from turnout.records import Recording, Rejection
+from turnout.signal.converter import converter_step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -147,23 +148,6 @@ def silent_from(samples: np.ndarray, rate: float) -> float | None:
     start = samples[: max(int(MIN_CONSTANT_TIME * rate), 1)]
     quiet = np.mean(np.abs(start - samples[-1]) < 1.5 * converter_step(samples)) > 0.9
     return None if changes.size and quiet else float(last)
-
-
-def converter_step(samples: np.ndarray) -> float:
-    """Smallest change from one sample to the next: a converter's step, or nearly 0; 0 where nothing changes.
-
-    Parameters
-    ----------
-    samples : (n_sample,) array of float
-        Acceleration. [m/s²]
-
-    Returns
-    -------
-    float
-        [m/s²]
-    """
-    change = np.abs(np.diff(samples))
-    return float(np.min(change, where=change > 0, initial=np.inf)) if change.any() else 0.0
 
 
 MIN_RELATIVE_LEVEL = 0.2  # of a sensor's typical log level at axles: below it an axle is not audible

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.passage.channel_checks import converter_step
 from turnout.passage.impact_timing import ImpactTimes, impact_times
 from turnout.passage.impulse_fit import joint_fit, whitener
 from turnout.passage.model_tests import DirectionTest, NullBand, direction_test, null_bases, null_scores
 from turnout.passage.scores import Scores, common_delay, delay_power, forecast, score
 from turnout.passage.wheel_basis import apply_filter, band_pass, wheel_basis
 from turnout.records import ModalModel
+from turnout.signal.converter import converter_step
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -17,10 +17,12 @@ from typing import TYPE_CHECKING, Any
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.mismatch.turnout import HammerInput, PassageInput
-from turnout.passage.electrical_pulses import without_pulses
+from turnout.passage.cleaning import clean
 from turnout.passage.timetable import listed_at, listed_trains
 from turnout.readers import read
-from turnout.records import LongRecording, Recording, Unit
+from turnout.reasons import REASONS
+from turnout.records import LongRecording, Recording, Rejection, Unit
+from turnout.signal.spikes import without_spikes
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
@@ -151,7 +153,12 @@ def _add_test(
     # any response will do: that of the section is not needed
     description = replace(hammer.descriptions[section], required=(hammer.force[section],))
     records = _recordings(unit, description, raw_root, inputs.notes)
-    recordings = tuple(r for r in records if isinstance(r, Recording))  # without a limit none is a long one
+    recordings = []
+    for record in records:
+        if isinstance(record, Recording):  # without a limit none is a long one
+            clean_recording, removed = without_spikes(record)
+            recordings.append(clean_recording)
+            inputs.notes += map(_note_of_removed, removed)
     if not recordings:
         return
     position = float(turnout.section(section).position)
@@ -209,7 +216,7 @@ def _add_passages(
             f"{n} trains in it, {len(rows)} where passages were analysed: what was found of them there is not used"
         )
         unit_inputs.notes.insert(0, Note(f"{_passage_name(unit)}: {message}"))
-    inputs.notes += [note for note in unit_inputs.notes if note not in inputs.notes]
+    inputs.notes += [note for note in unit_inputs.notes if note.fault or note not in inputs.notes]
     for passage in unit_inputs.passages:
         inputs.passages.append(passage)
         _thin_out(inputs.passages)
@@ -295,9 +302,15 @@ def _trains(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, notes: lis
     for recording in _recordings(unit, turnout.passages.description, raw_root, notes, settings.longest):
         try:
             for train_recording, *_ in trains_in(recording, settings):
-                yield without_pulses(train_recording, sensors)[0]
+                clean_recording, removed = clean(train_recording, sensors)
+                notes += map(_note_of_removed, removed)
+                yield clean_recording
         except ReadError as error:
             notes.append(_note_of(error))
+
+
+def _note_of_removed(finding: Rejection) -> Note:
+    return Note(f"{REASONS[finding.reason]} ({finding.detail}).", fault=(finding.reason, finding.channel or ""))
 
 
 def _note_of(error: Exception) -> Note:

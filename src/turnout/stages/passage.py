@@ -18,8 +18,8 @@ from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, axle_load
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.channel_fit import find_peak, fit_channel
+from turnout.passage.cleaning import clean
 from turnout.passage.clusters import Clusters
-from turnout.passage.electrical_pulses import without_pulses
 from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.segmentation import cut_passages
 from turnout.passage.timetable import listed_for, listed_trains
@@ -241,7 +241,7 @@ def _add_train(
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
     passage = analyse(recording, sensors, context.patterns, settings)
-    recording, _ = without_pulses(recording, sensors)  # for loads and fits
+    recording, _ = clean(recording, sensors)  # for loads and fits
     base = {"turnout_id": turnout.id}
     first = float(passage.times[0]) if passage.n_axle else 0.0
     passed_at = started_at + timedelta(seconds=round(first, 3))

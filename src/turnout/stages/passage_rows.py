@@ -28,6 +28,7 @@ REMEDIES = {
     "not_finite": "Export the file again without gaps",
     "sensor_lost": "Look at the sensor and its cable",
     "interference": "Nothing: they were cut out. Where they come with many trains, look at shields and earthing",
+    "spikes": "Nothing: they were replaced. Where they come with many trains, look at the converter or radio link",
     "channels_swapped": "Exchange the two channels in the layout, or at the logger",
     "clock_drift": "Synchronise the loggers, or correct the sensor's position in the layout",
     "two_trains": "Nothing: the passage is used as far as it is sound",

@@ -104,6 +104,13 @@ def test_exchanged_cables_give_the_observations_of_right_ones(campaign):
     by_name = {o.name: o.data for o in right.observations}
     for o in data.observations:  # rows of a passage are in the order of the sensors, by name
         np.testing.assert_allclose(o.data, by_name[o.name], rtol=1e-6, atol=1e-9 * np.max(np.abs(o.data)))
+    position_of = {s.name: s.place for s in campaign.sensors}
+    for recording in (
+        *(p.recording for p in data.campaign.passages),
+        *(r for t in data.campaign.hammer for r in t.recordings),
+    ):
+        named = {c.name: c.position for c in recording.channels if c.name in (first, second)}
+        assert named == {n: position_of[n] for n in (first, second)}
     (sentence,) = faults["passages"].sentences()
     assert f"{first} records sensor {second}, {second} records sensor {first}" in sentence
 

@@ -93,6 +93,31 @@ def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
     assert rows["models"][0]["status"] == "accepted" and len(rows["impacts"]) == 20
 
 
+@pytest.mark.parametrize("is_force", [True, False])
+def test_spikes_change_no_mode_and_are_stated(tmp_path, is_force):
+    """Six samples of each record of one file are wrong, by 1.5 times the peak of the force or of the response."""
+
+    def spoil(test, recordings):
+        spoilt = []
+        for recording in recordings:
+            samples, row = recording.samples.copy(), [c.quantity == "force" for c in recording.channels].index(is_force)
+            at = np.random.default_rng(recording.record).choice(np.arange(40, samples.shape[1] - 40, 40), 6, False)
+            samples[row, at] += 1.5 * np.abs(samples[row]).max()
+            spoilt.append(replace(recording, samples=samples))
+        return spoilt if test == 2 else recordings
+
+    rows = []
+    for name, change in (("clean", None), ("spoilt", spoil)):
+        unit, turnout, _ = lay_out(tmp_path / name, "A8", change=change)
+        rows.append(hammer_unit(unit, turnout, tmp_path / name, algo="1"))
+    clean, spoilt = rows
+    assert [(q["reason_code"], q["measured_value"]) for q in spoilt["quarantine"]] == [("spikes", 6.0)] * 10
+    assert all("A8_2" in q["path"] and len(q["channels"]) == 1 for q in spoilt["quarantine"])
+    assert [i["status"] for i in spoilt["impacts"]] == [i["status"] for i in clean["impacts"]]
+    for mode, other in zip(clean["modes"], spoilt["modes"], strict=True):
+        assert abs(mode["frequency_hz"] - other["frequency_hz"]) < 0.1 * mode["frequency_se_hz"]
+
+
 def test_an_impact_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
     """A resonance of 1350 Hz at half of the peak rings in one impact of ten alone: it was hit elsewhere, or
     loose."""

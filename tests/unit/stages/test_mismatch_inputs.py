@@ -494,6 +494,43 @@ def test_impacts_are_judged_as_the_hammer_stage_judges_them(folder, softest, use
     assert tests
 
 
+def test_a_hammer_test_whose_own_response_fails_is_used_with_its_other_responses(folder):
+    """Only a fault of the force costs a record; that of one response costs this response."""
+    turnout = turnout_in(folder)
+    response = turnout.hammer.response["A"]
+    for path in (folder / "raw/t1/hammer").rglob("A_*.h5"):
+        recordings = read(path, folder / "raw", turnout.hammer.descriptions["A"]).recordings
+        spoilt = []
+        for recording in recordings:
+            row = recording.index(response)
+            other = replace(recording.channels[row], name="other")
+            samples = np.vstack([recording.samples, recording.samples[row]])
+            samples[row] = 0.0
+            spoilt.append(replace(recording, samples=samples, channels=(*recording.channels, other)))
+        path.unlink()
+        write(spoilt, path, "hdf5")
+    layout, rail = folder / "config/layouts/small.yaml", "    rail: {source: rail, quantity: acceleration, unit: m/s²"
+    named = layout.read_text().replace(rail, rail.replace("rail", "other") + ", mounting: rail web}\n" + rail)
+    layout.write_text(named)
+    found = gathered(folder, "hammer")
+    (test,) = (t for t in found.tests if t.name.startswith("A "))
+    assert {c.name for r in test.recordings for c in r.channels} == {"force", "other"}
+    assert any(response in note.text for note in found.notes)
+
+
+def test_spikes_in_recordings_are_replaced_and_stated_once_for_each_channel(folder):
+    def spoil(recording):
+        samples = recording.samples.copy()
+        samples[0, [200, 400, 600]] = 1e4
+        return replace(recording, samples=samples)
+
+    small.roll(folder, speeds=(100.0, 110.0), change=spoil)
+    found = gathered(folder, "passage")
+    assert all(np.abs(p.recording.samples).max() < 1e3 for p in found.passages) and len(found.passages) == 2
+    (note,) = (n.text for n in found.notes if "stand out" in n.text)
+    assert "3 samples replaced" in note and "Other records with this fault: 1." in note
+
+
 def test_a_calibration_judges_impacts_by_the_turnouts_settings(folder):
     file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
     file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
