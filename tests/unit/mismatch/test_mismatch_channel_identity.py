@@ -21,7 +21,7 @@ def comparison(recorded, own=0.95, other=0.1, names=NAMES):
         at_lag[i, :] = other if sensor is not None else 0.02
         if sensor is not None:
             at_lag[i, names.index(sensor)] = own
-    return Comparison(names, names, np.stack([0.1 * at_lag, at_lag, 0.2 * at_lag], axis=-1))
+    return Comparison(names, names, np.stack([0.1 * at_lag, at_lag, 0.2 * at_lag], axis=-1), np.ones(len(names)))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_channel_is_exchanged_only_if_it_agrees_clearly_better_with_the_other_
     def with_own(own):
         at_lag = comparison(("A1", "A3", "A2", "A4")).correlations.copy()
         at_lag[[1, 2], [1, 2]] = own
-        return exchanged_channels("hammer tests", [Comparison(NAMES, NAMES, at_lag)] * 2)
+        return exchanged_channels("hammer tests", [Comparison(NAMES, NAMES, at_lag, np.ones(4))] * 2)
 
     assert with_own(0.4) and not with_own(0.5)
 

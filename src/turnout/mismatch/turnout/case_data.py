@@ -11,6 +11,7 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
+from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.channel_identity import ChannelFaults, exchanged_channels
 from turnout.mismatch.turnout.disturbances import Disturbance
@@ -23,6 +24,8 @@ from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
+
+LayoutFault = ChannelFaults | MisplacedTests | WrongScale
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,8 @@ class CaseData:
         Passages in which another source shakes the sensors.
     notes : tuple of str
         What is not used, and why.
-    layout_faults : tuple of ChannelFaults or MisplacedTests
-        Channels and impacts that are not where the layout states, as corrected in the campaign.
+    layout_faults : tuple of LayoutFault
+        Channels and impacts that are not where the layout states, and wrong units, as corrected in the campaign.
     """
 
     campaign: CampaignInput
@@ -68,7 +71,7 @@ class CaseData:
     unmatched: tuple[PassageInput, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
-    layout_faults: tuple[ChannelFaults | MisplacedTests, ...] = ()
+    layout_faults: tuple[LayoutFault, ...] = ()
 
     @property
     def mismatched_trains(self) -> tuple[str, ...]:
@@ -142,12 +145,13 @@ def case_data(
     campaign: CampaignInput,
     settings: MismatchSettings,
     solver: Track1D,
-    corrected: tuple[ChannelFaults | MisplacedTests, ...] = (),
+    corrected: tuple[LayoutFault, ...] = (),
 ) -> tuple[CaseData, Predictor]:
     """Observations of a campaign, and the predictor of its recordings.
 
-    Channels and impacts that are not where the layout states are corrected first. Then the rail is fitted to the hammer
-    tests. On that rail passages are simulated, to align the recorded ones and to compute their errors.
+    Channels and impacts that are not where the layout states, and wrong units, are corrected first. Then the rail is
+    fitted to the hammer tests. On that rail passages are simulated, to align the recorded ones and to compute their
+    errors.
 
     Parameters
     ----------
@@ -155,7 +159,7 @@ def case_data(
     settings : MismatchSettings
     solver : Track1D
         Settings of the simulation of passages.
-    corrected : tuple of ChannelFaults or MisplacedTests
+    corrected : tuple of LayoutFault
         Faults that have been corrected in the campaign.
 
     Returns
@@ -175,17 +179,20 @@ def case_data(
     site = site_of(campaign)
     tests = observe_tests(campaign, settings.pair_tolerance, saturated)
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
+    comparisons = compare_channels(predictor, tests)
     for faults in (
         misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
-        exchanged_channels("hammer tests", compare_channels(predictor, tests)),
+        exchanged_channels("hammer tests", comparisons),
+        wrong_scale("hammer tests", comparisons),
     ):
         if faults and faults.recording_type not in is_corrected:
             return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))
     predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
     passages = observe_passages(campaign, settings.materiality, predictor, start_values)
-    if (exchanged := passages.channel_faults) and exchanged.recording_type not in is_corrected:
-        return case_data(exchanged.correct(as_filed), settings, solver, (*corrected, exchanged))
+    for faults in (passages.channel_faults, passages.wrong_scale):
+        if faults and faults.recording_type not in is_corrected:
+            return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:

@@ -22,12 +22,14 @@ class Comparison:
     """Correlations of the channels of one recording with the simulation at the sensors.
 
     ``channels`` are the names of the rows of ``correlations`` (n_channel, n_sensor, n_lag), ``sensors`` those of its
-    columns. A hammer test has one lag.
+    columns. A hammer test has one lag. ``ratios`` (n_channel,) are recorded over simulated amplitudes of each channel
+    with its own sensor.
     """
 
     channels: tuple[str, ...]
     sensors: tuple[str, ...]
     correlations: np.ndarray
+    ratios: np.ndarray
 
     def at_best_lag(self, sensor_of: Mapping[str, str]) -> dict[tuple[str, str], float]:
         """Correlation of each channel with each sensor, at the lag where the channels fit the ``sensor_of`` them best.
@@ -194,14 +196,26 @@ def typical_correlations(
     values: dict[tuple[str, str], list[float]] = {}
     for comparison in comparisons:
         at_lag = comparison.at_best_lag(sensor_of)
-        if _most_agree(at_lag, sensor_of):
+        if most_agree(at_lag, sensor_of):
             for pair, r in at_lag.items():
                 values.setdefault(pair, []).append(r)
     return {pair: float(np.median(r)) for pair, r in values.items()}
 
 
-def _most_agree(correlations: Mapping[tuple[str, str], float], sensor_of: Mapping[str, str]) -> bool:
-    """Whether more than half of the channels, with either polarity, agree with their sensors: the train is known."""
+def most_agree(correlations: Mapping[tuple[str, str], float], sensor_of: Mapping[str, str]) -> bool:
+    """Whether more than half of the channels, with either polarity, agree with their sensors: the train is known.
+
+    Parameters
+    ----------
+    correlations : mapping
+        (channel, sensor) -> correlation.
+    sensor_of : mapping of str to str
+        Channel -> sensor that it records; itself where it is left out.
+
+    Returns
+    -------
+    bool
+    """
     channels = {channel for channel, _ in correlations}
     agreeing = [c for c in channels if abs(correlations[c, sensor_of.get(c, c)]) >= CHANNELS_CHECK.same_sensor]
     return 2 * len(agreeing) > len(channels)

@@ -10,6 +10,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import passage_observation
+from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.channel_identity import ChannelFaults, channel_faults
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
@@ -26,7 +27,7 @@ class ObservedPassages:
     """Passages as ``observations`` (name, Observation), with those that are not used, and notes.
 
     ``surface_values`` are the nuisances of the running surface with which they were aligned. ``channel_faults`` are
-    channels that do not record their sensor; nothing else holds where there are any.
+    channels that do not record their sensor, ``wrong_scale`` a wrong unit; nothing else holds where there is one.
     """
 
     aligned: Mapping[str, AlignedPassage]
@@ -36,6 +37,7 @@ class ObservedPassages:
     surface_values: Mapping[str, float]
     notes: tuple[str, ...]
     channel_faults: ChannelFaults
+    wrong_scale: WrongScale
 
 
 def observe_passages(
@@ -58,7 +60,7 @@ def observe_passages(
     ObservedPassages
     """
     if not campaign.passages:
-        return ObservedPassages({}, (), (), (), {}, (), channel_faults("passages", ()))
+        return ObservedPassages({}, (), (), (), {}, (), channel_faults("passages", ()), wrong_scale("passages", ()))
     aligner = PassageAligner(campaign, predictor)
     values = {**{n.name: 0.0 for n in predictor.site.nuisances()}, **start_values}
     surface_values = fit_surface(aligner, values)
@@ -85,6 +87,7 @@ def observe_passages(
         f"passage {name}: not used, its vibration {d.when} the train is {d.excess:.0f} dB above that of other passages"
         for name, d in rejected.items()
     ]
+    comparisons = list(filter(None, map(aligner.comparison, campaign.passages)))
     return ObservedPassages(
         {name: a for name, a in aligned.items() if name not in rejected},
         tuple((name, o) for name, o in observations if name not in rejected),
@@ -92,7 +95,8 @@ def observe_passages(
         disturbed,
         surface_values,
         tuple(notes),
-        channel_faults("passages", list(filter(None, map(aligner.comparison, campaign.passages)))),
+        channel_faults("passages", comparisons),
+        wrong_scale("passages", comparisons if start_values else ()),
     )
 
 

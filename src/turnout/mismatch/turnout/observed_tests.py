@@ -93,7 +93,7 @@ def compare_channels(predictor: Predictor, tests: ObservedTests) -> list[Compari
     comparisons = []
     for pairs in pairs_by_test.values():
         names = tuple(p.channel for p in pairs)
-        correlations = np.zeros((len(pairs), len(pairs), 1))
+        correlations, ratios = np.zeros((len(pairs), len(pairs), 1)), np.zeros(len(pairs))
         for i, measured in enumerate(pairs):
             at_sensors = [
                 replace(measured, name=str(j), channel=p.channel, sensor=p.sensor) for j, p in enumerate(pairs)
@@ -103,7 +103,8 @@ def compare_channels(predictor: Predictor, tests: ObservedTests) -> list[Compari
             simulated = trials.predict(values, (), [replace(observation, name=p.name) for p in at_sensors])
             for j, row in enumerate(simulated):
                 correlations[i, j] = _correlation(measured, observation.data, row)
-        comparisons.append(Comparison(names, names, correlations))
+            ratios[i] = 1.0 / max(np.median(np.hypot(*simulated[i].reshape(2, -1))), 1e-12)
+        comparisons.append(Comparison(names, names, correlations, ratios))
     return comparisons
 
 

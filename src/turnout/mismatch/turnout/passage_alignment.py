@@ -163,9 +163,10 @@ class PassageAligner:
         model_time = np.arange(0.0, low.shape[-1] / self.predictor.solver.rate, ALIGNMENT.sample_step)
         model = read_at(low, self.predictor.solver.rate, model_time)
         size = next_fast_len(data.shape[1] + model_time.size, real=True)
-        data, model = (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-12) for x in (data, model))
+        norms = [np.maximum(np.linalg.norm(x, axis=1), 1e-12) for x in (data, model)]
+        data, model = (x / norm[:, None] for x, norm in zip((data, model), norms))
         spectra = np.fft.rfft(data, size)[:, None] * np.fft.rfft(model, size).conj()
-        return Comparison(names, names, np.fft.irfft(spectra, size))
+        return Comparison(names, names, np.fft.irfft(spectra, size), norms[0] / norms[1])
 
     def correlation(self, values: Values, passage: PassageInput) -> float:
         """Correlation of a passage with its simulation, 0 if it cannot be simulated.
