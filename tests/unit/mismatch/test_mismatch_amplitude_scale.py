@@ -34,6 +34,7 @@ def comparison(*ratios, agreement=0.9):
         ("passages", 0.8, None),
         ("hammer tests", 1.5, None),
         ("hammer tests", 0.4, 0.4),
+        ("hammer tests", 5.3, 5.3),  # far from 1 and from 9.81
     ],
 )
 def test_a_common_factor_is_that_of_two_units_or_itself(recordings, ratio, divisor):

@@ -64,7 +64,7 @@ class WrongScale:
     @property
     def _nearest_unit_factor(self) -> float | None:
         nearest = min(UNIT_FACTORS, key=lambda factor: abs(np.log(self.ratio / factor)))
-        return nearest if abs(np.log(self.ratio / nearest)) <= np.log(_least_factor(self.recordings)) else None
+        return nearest if abs(np.log(self.ratio / nearest)) <= np.log(CHANNELS_CHECK.unit_tolerance) else None
 
     def sentences(self) -> list[str]:
         """What was found, what was done, and what to do.

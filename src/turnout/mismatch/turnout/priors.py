@@ -304,11 +304,13 @@ class ChannelPriors:
     min_gain: float = prior(
         0.5, "-", "by which two channels correlate better with each other's sensor than with their own", CHANNELS)
     min_passage_scale: float = prior(
-        1.3, "-", "factor from which all channels of passages have a wrong scale; within it a unit agrees", CHANNELS)
+        1.3, "-", "factor from which all channels of passages have a wrong scale", CHANNELS)
     min_impact_scale: float = prior(
         2.0, "-", "the same of hammer tests, whose level depends on the track as well", CHANNELS)
     scale_spread: float = prior(
         2.0, "-", "within which the channels of a wrong scale share one factor", CHANNELS)
+    unit_tolerance: float = prior(
+        1.4, "-", "within which that factor is the one of two units", CHANNELS)
 
 
 @dataclass(frozen=True)
