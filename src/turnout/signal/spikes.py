@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.records import Recording, Rejection
 from turnout.signal.converter import converter_step
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 SPIKE_FACTOR = 8.0  # least height of a spike, in units of the bends before and behind it
 SPIKE_REACH = 8  # samples before and behind a spike with which it is compared
 MAX_LARGE_BENDS = 2  # on either side: that of the spike itself, and that of another disturbance
+NOISE_FACTOR = 5.0  # the same in standard deviations of the noise
 LOUD_QUANTILE = 0.99  # of the magnitudes of a channel: smaller spikes change no result
 
 
@@ -29,8 +31,9 @@ def without_spikes(
     r"""The recording with straight lines in place of its spikes, and the findings.
 
     A sample is a spike if both neighbours lie on the same side of it, and its height h over the nearer one is larger
-    than 99 % of the magnitudes of its channel. It is also larger than ``SPIKE_FACTOR`` times the third largest bend b
-    of the 8 samples before it, and of the 8 behind it; an impact is followed by the vibration that it causes:
+    than 99 % of the magnitudes of its channel. It is also larger than ``NOISE_FACTOR`` standard deviations of the quieter half
+    of the channel, and than ``SPIKE_FACTOR`` times the third largest bend b of the 8 samples before it and of the 8
+    behind it, since an impact is followed by the vibration that it causes:
 
     .. math:: h_n = \min(|x_n - x_{n-1}|,\ |x_n - x_{n+1}|), \qquad b_n = |x_n - \tfrac12 (x_{n-1} + x_{n+1})|
 
@@ -93,11 +96,15 @@ def spikes_in(samples: np.ndarray) -> np.ndarray:
     heights, bends = np.zeros(samples.size), np.zeros(samples.size)
     heights[1:-1] = np.where(is_extreme, np.minimum(np.abs(change[:-1]), np.abs(change[1:])), 0.0)
     bends[1:-1] = 0.5 * np.abs(np.diff(change))
-    loud = np.flatnonzero(heights > np.quantile(np.abs(samples - np.median(samples)), LOUD_QUANTILE))
+    magnitudes = np.abs(samples - np.median(samples))
+    loud = np.flatnonzero(heights > NOISE_FACTOR * MAD_TO_SD * np.median(magnitudes))
+    if loud.size:
+        least = max(np.quantile(magnitudes, LOUD_QUANTILE), SPIKE_FACTOR * converter_step(samples))
+        loud = loud[heights[loud] > least]
     if not loud.size:
         return none
     offsets = np.arange(1, SPIKE_REACH + 1)
     bends = np.pad(bends, SPIKE_REACH, mode="reflect")
     sides = bends[SPIKE_REACH + loud[:, None, None] + np.stack([-offsets, offsets])]  # (n_loud, 2, SPIKE_REACH)
     usual = np.partition(sides, -MAX_LARGE_BENDS - 1, axis=-1)[..., -MAX_LARGE_BENDS - 1].max(axis=1)
-    return loud[heights[loud] > SPIKE_FACTOR * np.maximum(usual, converter_step(samples))]
+    return loud[heights[loud] > SPIKE_FACTOR * usual]
