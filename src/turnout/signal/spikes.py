@@ -31,9 +31,9 @@ def without_spikes(
     r"""The recording with straight lines in place of its spikes, and the findings.
 
     A sample is a spike if both neighbours lie on the same side of it, and its height h over the nearer one is larger
-    than 99 % of the magnitudes of its channel. It is also larger than ``NOISE_FACTOR`` standard deviations of the quieter half
-    of the channel, and than ``SPIKE_FACTOR`` times the third largest bend b of the 8 samples before it and of the 8
-    behind it, since an impact is followed by the vibration that it causes:
+    than 99 % of the magnitudes of its channel. It is also larger than ``NOISE_FACTOR`` standard deviations of the
+    quieter half of the channel, and than ``SPIKE_FACTOR`` times the third largest bend b of the 8 samples before it and
+    of the 8 behind it, since an impact is followed by the vibration that it causes:
 
     .. math:: h_n = \min(|x_n - x_{n-1}|,\ |x_n - x_{n+1}|), \qquad b_n = |x_n - \tfrac12 (x_{n-1} + x_{n+1})|
 
