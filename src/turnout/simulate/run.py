@@ -137,6 +137,8 @@ def run(
     use_stand_in = bool(vehicle) and drive.entry > 0.0
     stand_in = _stand_in(prepared, drive) if use_stand_in else (1.0, 0.0, 1.0)
     bodies = vehicle_arrays(vehicle or _dummy_vehicle(), prepared.scheme, stand_in)
+    if vehicle is None:  # arrays of the right types for the kernels, but no block of bodies that moves
+        bodies = bodies._replace(block_start=bodies.block_start[:1])
     arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
     motion = _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in)
     signals = np.zeros((len(probes), n_step))
