@@ -15,7 +15,7 @@ force = lambda t: 1e4 * np.sin(np.pi * np.clip(t / 1e-3, 0.0, 1.0))
 impact = run(prepared, 0.004, [Probe(6.3)], pulses=[(6.0, force)])
 assert np.max(np.abs(impact.signals)) > 0.0
 train = run(prepared, 0.004, [Probe(6.3)], lone_wheels(1000.0, (0.0, 2.5)), Drive(start=6.0, speed=20.0))
-assert np.max(np.abs(train.port_force)) > 0.0
+assert np.max(np.abs(train.force)) > 0.0
 """
 
 
