@@ -19,7 +19,7 @@ from turnout.records import Impact
 from turnout.registry.intake import Arrival, gather
 from turnout.stages.hammer import hammer_unit
 from turnout.stages.hammer_curve_rows import density_columns
-from turnout.workflow.guard import compute_guarded
+from turnout.workflow.guard import compute_guarded, status_of
 from turnout.workflow.scan import scan
 
 DAY = date(2024, 5, 13)
@@ -113,6 +113,7 @@ def test_spikes_change_no_mode_and_are_stated(tmp_path, is_force):
     clean, spoilt = rows
     assert [(q["reason_code"], q["measured_value"]) for q in spoilt["quarantine"]] == [("spikes", 6.0)] * 10
     assert all("A8_2" in q["path"] and len(q["channels"]) == 1 for q in spoilt["quarantine"])
+    assert status_of(spoilt) == "ok"  # all records are used
     assert [i["status"] for i in spoilt["impacts"]] == [i["status"] for i in clean["impacts"]]
     for mode, other in zip(clean["modes"], spoilt["modes"], strict=True):
         assert abs(mode["frequency_hz"] - other["frequency_hz"]) < 0.1 * mode["frequency_se_hz"]

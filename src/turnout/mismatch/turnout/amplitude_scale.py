@@ -96,11 +96,7 @@ class WrongScale:
         -------
         CampaignInput
         """
-        if self.recordings == "passages":
-            passages = (replace(p, recording=self._correct_recording(p.recording)) for p in campaign.passages)
-            return replace(campaign, passages=tuple(passages))
-        tests = (replace(t, recordings=tuple(map(self._correct_recording, t.recordings))) for t in campaign.hammer)
-        return replace(campaign, hammer=tuple(tests))
+        return campaign.with_recordings(self.recordings, self._correct_recording)
 
     def _correct_recording(self, recording: Recording) -> Recording:
         is_acceleration = np.array([c.quantity == "acceleration" for c in recording.channels])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from turnout.config.settings.receptance import ReceptanceSettings
@@ -100,6 +100,25 @@ class CampaignInput:
         for name in self.reserved:
             if name not in names:
                 raise SimulationError(f"reserved {name!r} is no recording; there are {', '.join(names)}.")
+
+    def with_recordings(self, recording_type: str, change: Callable[[Recording], Recording]) -> CampaignInput:
+        """The campaign with all recordings of one type changed.
+
+        Parameters
+        ----------
+        recording_type : str
+            "passages" or "hammer tests".
+        change : callable
+            Recording -> recording in its place.
+
+        Returns
+        -------
+        CampaignInput
+        """
+        if recording_type == "passages":
+            return replace(self, passages=tuple(replace(p, recording=change(p.recording)) for p in self.passages))
+        tests = (replace(t, recordings=tuple(map(change, t.recordings))) for t in self.hammer)
+        return replace(self, hammer=tuple(tests))
 
     def sensors_of(self, passage: PassageInput) -> tuple[Sensor, ...]:
         """The sensors that recorded a passage.

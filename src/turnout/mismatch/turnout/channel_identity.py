@@ -103,16 +103,7 @@ class ChannelFaults:
         CampaignInput
         """
         position_of = {s.name: s.place for s in campaign.sensors}
-        if self.recording_type == "passages":
-            passages = (
-                replace(p, recording=self._correct_recording(p.recording, position_of)) for p in campaign.passages
-            )
-            return replace(campaign, passages=tuple(passages))
-        tests = (
-            replace(t, recordings=tuple(self._correct_recording(r, position_of) for r in t.recordings))
-            for t in campaign.hammer
-        )
-        return replace(campaign, hammer=tuple(tests))
+        return campaign.with_recordings(self.recording_type, lambda r: self._correct_recording(r, position_of))
 
     def _correct_recording(self, recording: Recording, position_of: Mapping[str, float]) -> Recording:
         rows = [i for i, c in enumerate(recording.channels) if c.name not in self.unrelated]
