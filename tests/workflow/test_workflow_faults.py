@@ -75,6 +75,7 @@ def test_a_registration_that_failed_is_tried_again_though_nothing_is_new(fleet):
 
 
 def test_a_damaged_registry_is_repaired_each_time_and_the_night_after_has_nothing_to_do(fleet):
+    assert run(fleet).returncode == 0
     before = toy.rows(fleet)
     for file in ("recordings/**/*.parquet", "registry.duckdb", "registry.duckdb"):
         next((fleet / "results/registry").glob(file)).unlink()

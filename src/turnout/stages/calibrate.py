@@ -17,6 +17,7 @@ from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription, Receptance, Recording
+from turnout.signal.spikes import without_spikes
 from turnout.simulate import load_track
 from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibrate
 from turnout.simulate.hammer import resolve_location
@@ -135,8 +136,12 @@ def _recordings(files: Iterable[str | Path], description: RawDescription) -> tup
         except ReadError as error:
             rejected.append(str(error))
             continue
-        recordings += result.recordings
         rejected += map(str, result.errors)
+        for recording in result.recordings:
+            clean_recording, removed = without_spikes(recording)
+            recordings.append(clean_recording)
+            for finding in removed:
+                LOG.warning("%s, record %d: %s", recording.source, recording.record + 1, finding.detail)
     return recordings, rejected
 
 

@@ -90,7 +90,7 @@ def test_hammer_tests_in_another_unit_are_observed_as_those_in_the_right_one(cam
     )
     data, _ = case_data(replace(campaign, hammer=tests), MismatchSettings(), Track1D())
     (fault,) = data.layout_faults
-    assert fault.recording_type == "amplitudes of hammer tests" and fault.cause == "m/s² to g"
+    assert fault.recording_type == "amplitudes of hammer tests" and fault.cause == "m/s² and g"
     assert "accelerations over forces of all" in fault.sentences()[0]
     by_name = {o.name: o.data for o in right.observations}
     for o in data.observations:

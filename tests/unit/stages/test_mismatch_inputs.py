@@ -539,6 +539,24 @@ def test_a_calibration_judges_impacts_by_the_turnouts_settings(folder):
         calibrate_to_files(str(track), "A", files, "t1", folder / "config")
 
 
+def test_a_calibration_replaces_spikes_and_states_them(folder, monkeypatch, caplog):
+    file = sorted((folder / "raw/t1/hammer").rglob("A_*"))[0]
+    turnout = turnout_in(folder)
+    result = read(file.name, file.parent, turnout.hammer.descriptions["A"])
+    recording, *others = result.recordings
+    samples = recording.samples.copy()
+    at = recording.index("rail"), int(0.8 * samples.shape[1])
+    samples[at] = 3.0 * np.abs(samples[at[0]]).max()
+    write([replace(recording, samples=samples), *others], file, "hdf5")
+    used = []
+    monkeypatch.setattr("turnout.stages.calibrate.find_impacts", lambda recordings, *_: used.extend(recordings) or [])
+    track = folder / "config/tracks/small.yaml"
+    with pytest.raises(SimulationError, match="0 accepted impacts"):
+        calibrate_to_files(str(track), "A", [file], "t1", folder / "config")
+    assert abs(used[0].samples[at]) < 0.1 * abs(samples[at])
+    assert f"{file.name}, record 1: rail: 1 sample replaced" in caplog.text
+
+
 def test_files_that_a_calibration_cannot_use_are_said(folder, tmp_path, caplog):
     """Without the turnout's layout no channel of the file is known."""
     track = folder / "config/tracks/small.yaml"

@@ -17,13 +17,8 @@ from turnout.mismatch.turnout.channel_identity import Comparison, most_agree
 from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 from turnout.records import Recording
 
-# Factor of the recorded values -> the two units that were exchanged.
-UNIT_FACTORS = {
-    STANDARD_GRAVITY: "m/s² to g",
-    1.0 / STANDARD_GRAVITY: "g to m/s²",
-    1000.0: "a unit to a thousandth of it, as of kN to N",
-    0.001: "a thousandth of a unit to that unit, as of N to kN",
-}
+# Ratio of two units that are easily taken for each other, or its inverse -> the two.
+UNIT_FACTORS = {STANDARD_GRAVITY: "m/s² and g", 1000.0: "two units that differ by a prefix, as N and kN"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ class WrongScale:
     def cause(self) -> str | None:
         """The two units whose ratio it is, or None."""
         factor = self._nearest_unit_factor
-        return None if factor is None else UNIT_FACTORS[factor]
+        return None if factor is None else UNIT_FACTORS[max(factor, 1.0 / factor)]
 
     @property
     def divisor(self) -> float:
@@ -63,7 +58,8 @@ class WrongScale:
 
     @property
     def _nearest_unit_factor(self) -> float | None:
-        nearest = min(UNIT_FACTORS, key=lambda factor: abs(np.log(self.ratio / factor)))
+        nearest = min(UNIT_FACTORS, key=lambda factor: abs(abs(np.log(self.ratio)) - np.log(factor)))
+        nearest = nearest if self.ratio > 1.0 else 1.0 / nearest
         return nearest if abs(np.log(self.ratio / nearest)) <= np.log(CHANNELS_CHECK.unit_tolerance) else None
 
     def sentences(self) -> list[str]:
@@ -80,8 +76,9 @@ class WrongScale:
         cause = f"That is the ratio of {self.cause}. " if self.cause else ""
         return [
             f"In the {self.recordings} the {amplitudes} of all {len(self.ratios)} channels are {self.ratio:.3g} times "
-            f"those of the simulation ({low:.3g} to {high:.3g}, {self.n} recordings). {cause}The diagnosis divides "
-            f"them by {self.divisor:.3g}. Correct the units or sensitivities in the layout{loads}"
+            f"those of the simulation (by channel {low:.3g} to {high:.3g}, {self.n} recordings). {cause}"
+            f"The diagnosis divides them by {self.divisor:.3g}. "
+            f"Correct the units or sensitivities in the layout{loads}"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
