@@ -16,6 +16,9 @@ sys.dont_write_bytecode = False
 
 import pytest
 
+# A forked process that destroys a connection of DuckDB which it inherited ends with a segmentation fault.
+os.register_at_fork(after_in_child=gc.freeze)
+
 KERNELS = pytest.StashKey[list[str]]()
 
 

@@ -3,6 +3,7 @@
 The processes end with their parent, because nothing would use their results.
 """
 
+import gc
 import multiprocessing
 import os
 import threading
@@ -83,7 +84,7 @@ def map_in_processes(function: Callable, tasks: Sequence, threads: int) -> Itera
 def _run_until_death(tasks: Sequence, threads: int, lost: list) -> Iterator:
     """Results of the processes of one pool until one dies; tasks without a result are appended to ``lost``."""
     n = min(threads, len(tasks))
-    with ProcessPoolExecutor(n, multiprocessing.get_context("fork"), _end_with_parent) as pool:
+    with ProcessPoolExecutor(n, multiprocessing.get_context("fork"), _begin) as pool:
         futures = deque(_submit(pool, task) for task in tasks)
         try:
             for task in tasks:
@@ -95,6 +96,12 @@ def _run_until_death(tasks: Sequence, threads: int, lost: list) -> Iterator:
                 yield result
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _begin() -> None:
+    """Keep inherited objects: a database connection that is closed without the threads of its parent crashes."""
+    gc.freeze()
+    _end_with_parent()
 
 
 def _end_with_parent() -> None:
