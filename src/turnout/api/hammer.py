@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import cast
@@ -10,7 +11,10 @@ from turnout import hammer_test
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.records import Impact, ModalModel, Receptance, Recording
+from turnout.signal.spikes import replace_spikes
 from turnout.stages.hammer import identify_accepted
+
+LOG = logging.getLogger("turnout.hammer")
 
 
 class Impacts(tuple[Impact, ...]):
@@ -36,6 +40,9 @@ def find_impacts(
     settings: ReceptanceSettings | None = None,
 ) -> Impacts:
     """Find the impacts of one hammer test, measure them, and reject those that cannot be used.
+
+    As in the hammer stage, single wrong samples are replaced first (``turnout.signal.spikes``). A warning of the log
+    "turnout" states them.
 
     Parameters
     ----------
@@ -86,7 +93,8 @@ def find_impacts(
         raise ValueError("no recording is given")
     force = force or _only_channel(listed[0], "force", "force")
     response = response or _only_channel(listed[0], "acceleration", "response")
-    return Impacts(hammer_test.find_impacts(listed, force, response, settings))
+    clean = replace_spikes(listed, LOG, (force, response))
+    return Impacts(hammer_test.find_impacts(clean, force, response, settings))
 
 
 def _items_of_type(items: Iterable, wanted: type, words: str) -> list:

@@ -17,7 +17,7 @@ from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription, Receptance, Recording
-from turnout.signal.spikes import without_spikes
+from turnout.signal.spikes import replace_spikes
 from turnout.simulate import load_track
 from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibrate
 from turnout.simulate.hammer import resolve_location
@@ -137,11 +137,7 @@ def _recordings(files: Iterable[str | Path], description: RawDescription) -> tup
             rejected.append(str(error))
             continue
         rejected += map(str, result.errors)
-        for recording in result.recordings:
-            clean_recording, removed = without_spikes(recording)
-            recordings.append(clean_recording)
-            for finding in removed:
-                LOG.warning("%s, record %d: %s", recording.source, recording.record + 1, finding.detail)
+        recordings += replace_spikes(result.recordings, LOG)
     return recordings, rejected
 
 

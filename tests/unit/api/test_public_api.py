@@ -325,6 +325,22 @@ def test_errors_of_a_layout_name_line_and_column(tmp_path):
 # Hammer tests
 
 
+def test_spikes_in_a_hammer_test_are_replaced_and_a_warning_states_them(caplog):
+    rng, t = np.random.default_rng(1), np.arange(2000) / 10_000.0
+    force = 500.0 * np.sin(np.pi * (t - 0.01) / 2e-3) * ((t > 0.01) & (t < 0.012))
+    acceleration = np.exp(-80.0 * (t - 0.01)) * np.sin(900.0 * (t - 0.01)) * (t > 0.01)
+    samples = np.stack([force, acceleration]) + rng.normal(size=(2, 2000)) * [[0.1], [1e-3]]
+    channels = Channel("hammer", "force"), Channel("rail", "acceleration")
+    expected = turnout.find_impacts(Recording(samples, 1e4, channels))
+    assert len(expected.usable) == 1 and not caplog.text
+    spoilt = samples.copy()
+    spoilt[0, 1200] = 900.0
+    (impact,) = turnout.find_impacts(Recording(spoilt, 1e4, channels, source="OT_1.uff"))
+    # the replaced sample of noise is part of the offset that is subtracted
+    assert impact.accepted and impact.impulse == pytest.approx(expected[0].impulse, rel=1e-3)
+    assert "OT_1.uff, record 1: hammer: 1 sample replaced, the first at 0.120 s" in caplog.text
+
+
 def test_which_of_several_channels_is_meant_must_be_said():
     samples = np.zeros((3, 50))
     channels = Channel("hammer", "force"), Channel("acc_1", "acceleration"), Channel("acc_2", "acceleration")
