@@ -1,4 +1,4 @@
-"""How an impact fades along the marched rail, against closed forms: what a sensor metres away is worth."""
+"""The response to an impact decays along the simulated rail as in closed forms, also metres away from the impact."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def lines(world, places, hit, frequency, duration, temperature=None, dt=TIME_STE
     return (kernel @ a.T) / (kernel @ force)[:, None] / -((2.0 * np.pi * np.asarray(frequency)) ** 2)[:, None]
 
 
-def test_a_beam_on_a_foundation_fades_with_distance():
+def test_the_response_of_a_beam_on_a_foundation_decays_with_distance():
     """Below the cut-on at 205 Hz to a thousandth at 4.5 m, above it by waves; 5 % and a 2000th of the impact's
     place."""
     k, c, frequency, x = 1e8, 1.5e4, np.array([35.0, 60.0, 120.0, 300.0, 450.0]), np.array([0.0, 1.5, 3.0, 4.5, 6.0])
@@ -37,7 +37,7 @@ def test_a_beam_on_a_foundation_fades_with_distance():
 
 
 @pytest.mark.parametrize(("frequency", "share"), [((36.0, 50.0, 80.0, 120.0), 0.09), ((200.0, 700.0, 900.0), 0.22)])
-def test_a_track_on_sleepers_fades_with_distance(frequency, share):
+def test_the_response_of_a_track_on_sleepers_decays_with_distance(frequency, share):
     """To 6.3 m against the exact series with point supports; the pads here are 0.2 m wide, which shows near 200 Hz."""
     world = uniform_world(pad_damping=2.5e4, rail=Rail(damping=RAIL_DAMPING))
     places = 0.3 + np.array([0.0, 2.1, 4.2, 6.3])
@@ -48,10 +48,10 @@ def test_a_track_on_sleepers_fades_with_distance(frequency, share):
 
 
 @pytest.mark.parametrize("seed", [5, 6])
-def test_a_record_is_long_enough_for_its_rail(seed):
-    """Ringing cut off by the record's end would fill the lowest lines of the farthest sensors: below 5 % there.
+def test_a_record_is_long_enough_for_the_decay_of_its_rail(seed):
+    """A record that ends too early has errors in the lowest lines of the farthest sensors. They stay below 5 %.
 
-    With a rail damped by 30 N s/m² alone it rings at 1040 Hz for a second and these lines are up to 27 times too
+    A rail with a damping of 30 N s/m² alone vibrates at 1040 Hz for a second. These lines are then up to 27 times too
     large.
     """
     site = draw_site(np.random.default_rng(seed))

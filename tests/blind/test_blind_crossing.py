@@ -1,4 +1,4 @@
-"""Sites at a crossing: what is cast into the rail, what wheels meet, and what the owner's files say of it."""
+"""Sites at a crossing: the casting in the rail, the nose under the wheels, and the owner's files of both."""
 
 from collections import Counter
 
@@ -18,8 +18,8 @@ from turnout_blind.strata import plan_cases
 CAST = Crossing(6.0, bending=1.8, mass=2.4, depth=1.2e-3, length=0.8, share=0.4)
 
 
-def test_a_casting_weighs_what_its_stretch_in_the_file_does():
-    """Ramps lie half in, half out: the trapezoid has the area of the rectangle. Far from it the rail is the rail."""
+def test_a_casting_has_the_mass_of_its_stretch_in_the_file():
+    """Half of each ramp lies in the stretch, so trapezoid and rectangle have equal areas. The rest is plain."""
     x = np.linspace(0.0, 12.0, 120001)
     start, end = CAST.ends
     for found, factor in zip(CAST.profile(x), (1.8, 2.4)):
@@ -29,7 +29,7 @@ def test_a_casting_weighs_what_its_stretch_in_the_file_does():
 
 
 def test_a_nose_is_as_deep_and_long_as_its_parameters_state():
-    """Nothing 0.4 of the length before it and 0.6 behind, its depth in the middle, rounded: no corner."""
+    """It begins 0.4 of its length before the nose and ends 0.6 behind it. Its deepest point is rounded."""
     assert CAST.dip(6.0) == pytest.approx(1.2e-3)
     assert CAST.dip(6.0 - 0.32 - 0.016) == 0.0 < CAST.dip(6.0 - 0.32 + 0.001)
     assert CAST.dip(6.0 + 0.48 + 0.016) == 0.0 < CAST.dip(6.0 + 0.48 - 0.001)
@@ -42,8 +42,8 @@ def site():
     return draw_site(np.random.default_rng([5, 23, 1]), panel="crossing")
 
 
-def test_wheels_meet_the_nose_each_a_little_otherwise_and_come_to_rest(site):
-    """The first wheel's force rises at the nose by far more than elsewhere, and comes back to its weight."""
+def test_the_force_of_a_wheel_rises_at_the_nose_and_all_treads_differ(site):
+    """The force of the first wheel rises at the nose by far more than elsewhere, and returns to the static load."""
     train, nose = site.true_trains["railcar"], site.world.surface[0]
     _, force, _ = simulate_passage(site.world, train, 30.0, [2.0], 1.2, 0.6)
     load = 0.5 * train.axle_load
@@ -58,8 +58,8 @@ def test_wheels_meet_the_nose_each_a_little_otherwise_and_come_to_rest(site):
     assert np.unique(more).size == 8 and more.max() < 0.6 * nose(x).max()
 
 
-def test_the_owner_files_of_a_crossing_load_as_they_were_drawn(site, tmp_path):
-    """The stretch and the nose of the drawings, with their priors; no other wheel, no true number."""
+def test_the_files_of_the_owner_of_a_crossing_load_with_the_drawn_values(site, tmp_path):
+    """They hold the stretch and the nose of the drawings with their priors, and no true value."""
     write_configuration(tmp_path / "config", "T1", site)
     (tmp_path / "raw").mkdir()
     text = (tmp_path / "config" / "tracks" / "site.yaml").read_text()
@@ -85,9 +85,9 @@ def test_a_set_in_crossing_panels_has_the_strata_of_plain_track_and_a_worn_nose(
     assert kinds[1] - kinds[0] == Counter({("single", "nose"): 1}) and not kinds[0] - kinds[1]
 
 
-def test_the_story_of_a_case_at_a_crossing_is_drawn_there(monkeypatch, tmp_path):
+def test_the_figure_of_a_case_at_a_crossing_shows_a_crossing_panel(monkeypatch, tmp_path):
     class Staged(Exception):
-        """Enough: the plan is known."""
+        """Ends the simulation as soon as the panel is known."""
 
     def staged(plan, effects):
         raise Staged(plan.panel)

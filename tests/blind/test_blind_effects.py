@@ -65,14 +65,14 @@ def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
             assert 1 <= drawn.where["axle"] <= site.trains[drawn.where["train"]].axles().size
 
 
-def test_every_kind_has_its_line_in_the_map_of_names():
+def test_every_kind_has_an_entry_in_the_table_of_right_names():
     assert set(EFFECTS) == set(RIGHT_NAMES)
     for kind, same in SAME_PARAMETERS.items():
         site = draw_site(np.random.default_rng(1), **EFFECTS[kind].site)
         assert set(same) <= set(EFFECTS[kind].draw_concealed(np.random.default_rng(2), site, 3).parameters), kind
 
 
-def test_a_full_set_has_what_the_proof_asks_for():
+def test_a_full_set_has_the_numbers_of_cases_that_the_proof_needs():
     plans = plan_cases(3, EFFECTS)
     strata = Counter(p.stratum for p in plans)
     assert len(plans) >= 200
@@ -96,7 +96,7 @@ def test_the_order_of_the_cases_has_no_information_on_their_effects():
     assert abs(ranks.mean() - 0.5 * (n - 1)) < 3.0 * spread
 
 
-def test_an_effect_of_ones_own_is_one_file(tmp_path):
+def test_a_user_adds_an_effect_as_one_file(tmp_path):
     (tmp_path / "squeal.py").write_text(
         "from turnout_blind.effect import Effect\n"
         "def draw(rng, site, level):\n    return {}, {'level': level}\n"
@@ -112,8 +112,8 @@ def test_an_effect_of_ones_own_is_one_file(tmp_path):
         load_effects(tmp_path)
 
 
-def test_a_polygon_passes_at_a_frequency_of_the_track():
-    """n v / 2 pi R of the order drawn, at the train's mean speed: 60 to 110 Hz, half an order off by rounding."""
+def test_a_polygonal_wheel_excites_the_track_at_60_to_110_hz():
+    """n v / 2 pi R of the drawn order at the mean speed of the train; rounding errs by up to half an order."""
     for seed in range(20):
         rng = np.random.default_rng(seed)
         site = draw_site(rng)
@@ -125,7 +125,7 @@ def test_a_polygon_passes_at_a_frequency_of_the_track():
 
 
 def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
-    """Of what is far beyond; nothing within 0.73 of it is touched; the limit counts in peaks that the channel meets."""
+    """Signals far beyond the limit end there; signals within 0.73 of it stay. Real peaks reach the limit."""
     site = draw_site(np.random.default_rng(4))
     world = site.world.copy()
     drawn = EFFECTS["clipping"].draw_concealed(np.random.default_rng(4), site, 2)
@@ -139,8 +139,8 @@ def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
     assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # an impact of 10 kN on a rail, within the sensor's range
 
 
-def test_a_saturating_amplifier_shows_no_more_than_its_limit_though_the_mounting_rings():
-    """A click rings at the mounting's 3.5 kHz, far beyond the limit; the larger side has 1.08 of that."""
+def test_a_saturating_amplifier_limits_the_resonance_of_the_mounting():
+    """A pulse excites the mounting at 3.5 kHz, far beyond the limit. The larger side ends at 1.08 of the limit."""
     site = draw_site(np.random.default_rng(4))
     world = site.world.copy()
     EFFECTS["clipping"].act(world, site, {"sensor": "A2"}, {"limit": 50.0})
@@ -173,14 +173,14 @@ def test_wheel_roughness_repeats_every_turn():
     assert not np.allclose(dips(x, 0.3), dips(x, 1.3), atol=1e-6)
 
 
-def test_mounting_is_flat_below_and_peaks_by_its_quality():
+def test_a_mounting_is_flat_below_its_resonance_and_peaks_by_its_quality_factor():
     t = np.arange(60000) / 60000.0
     for frequency, gain in ((50.0, 1.0), (400.0, 8.0)):
         shown = mounting_response(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
         assert np.abs(shown[40000:]).max() == pytest.approx(gain, rel=0.03)
 
 
-def test_sixteen_bits_and_their_range():
+def test_a_converter_has_steps_and_range_of_sixteen_bits():
     chain = MeasurementChain("A1", 100.0, mount=0.0, coupling=0.0, noise=0.0, drift=0.0)
     t = np.arange(60000) / 60000.0
     shown = digitise(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
@@ -190,8 +190,8 @@ def test_sixteen_bits_and_their_range():
     assert (steps.min(), steps.max()) == (-32768, 32767)
 
 
-def test_a_channel_that_shows_nothing_shows_nothing_of_the_effect():
-    """It must not count as infinitely plain."""
+def test_a_silent_channel_does_not_count_in_the_visibility_of_an_effect():
+    """Its relative change would be infinite."""
     t = np.arange(6000) / 60000.0
     before = np.array([np.sin(600.0 * t), np.sin(600.0 * t)])
     after = np.array([1.1 * np.sin(600.0 * t), 0.0 * t])

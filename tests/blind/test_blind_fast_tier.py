@@ -1,4 +1,4 @@
-"""Forty revealed cases, kept without their recordings: their seals hold, and their seeds make them again."""
+"""Forty opened cases are stored without their recordings: all match their hashes, and seeds generate them again."""
 
 import io
 import json
@@ -33,11 +33,11 @@ def held(repository):
 
 @pytest.fixture(scope="module")
 def truths(held):
-    """Truths by case, every seal of which holds."""
+    """Truths by case, each verified against its hash."""
     return verify_archive(held)
 
 
-def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(truths):
+def test_all_forty_cases_match_their_hashes_and_all_effects_follow_from_the_seed(truths):
     strata = [t["stratum"] for t in truths.values()]
     assert len(truths) == 40
     assert {s: strata.count(s) for s in set(strata)} == {
@@ -46,8 +46,8 @@ def test_all_forty_seals_hold_and_all_effects_follow_from_the_seed(truths):
     assert len({t["nonce"] for t in truths.values()}) == 40
 
 
-def test_rungs_of_the_ladders_show_more_and_more(truths):
-    """Of the singles kept: what the generator says is to be seen grows with the rung, over all kinds together."""
+def test_the_visibility_of_effects_grows_with_their_severity(truths):
+    """The generator states a visibility for each stored single. It correlates with the rung over all kinds together."""
     single = [t for t in truths.values() if t["stratum"] == "single"]
     rungs = [t["effects"][0]["rung"] for t in single]
     seen = [max(t["visible"].values()) for t in single]
@@ -57,7 +57,7 @@ def test_rungs_of_the_ladders_show_more_and_more(truths):
 
 
 def archives_as_sealed():
-    """Whether archives of numpy say in the head of a member that it may be long, as they do since Python 3.11.4."""
+    """Whether numpy writes 64-bit sizes into the header of an archive member, as it does since Python 3.11.4."""
     file = io.BytesIO()
     np.savez(file, a=0.0)
     return ZipFile(file).infolist()[0].extract_version == ZIP64
@@ -65,15 +65,15 @@ def archives_as_sealed():
 
 @pytest.fixture(scope="module")
 def again(held, tmp_path_factory):
-    """(id, folder of cases, truth) of the first control, made once more from its seed."""
+    """(id, folder of cases, truth) of the first control, generated again from its seed."""
     case = min(c for c, text in held["truths"].items() if json.loads(text)["stratum"] == "control")
     folder = tmp_path_factory.mktemp("again")
     return case, folder, make_case(folder, case, plan_of(held, case), load_effects())
 
 
 @pytest.mark.slow
-def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
-    """Bit for bit, with the same arithmetic; elsewhere there is nothing to compare."""
+def test_a_case_that_is_generated_again_equals_the_sealed_case(held, again):
+    """Bit for bit, on a processor with the same arithmetic; others skip the test."""
     made_on = json.loads(held["set"]).get("made_on")
     if made_on not in (None, platform.machine()):
         pytest.skip(f"sealed on {made_on}: another processor rounds otherwise")
@@ -86,7 +86,7 @@ def test_a_case_made_again_is_the_one_that_was_sealed(held, again):
     assert truth["visible"] == json.loads(held["truths"][case])["visible"]
 
 
-def test_a_case_has_the_tests_and_the_trains_of_a_campaign(again):
+def test_a_case_has_the_hammer_tests_and_the_trains_of_a_campaign(again):
     case, folder, _ = again
     raw = folder / case / "raw" / case
     assert len(list(raw.glob("hammer/*/*.npz"))) == 6 and len(list(raw.glob("passages/*.npz"))) == 8
@@ -96,14 +96,14 @@ def test_a_case_has_the_tests_and_the_trains_of_a_campaign(again):
 
 @pytest.mark.slow
 def test_the_diagnosis_names_nothing_in_the_impacts_of_a_control(again):
-    """Hammer tests alone, which take it seconds; the whole campaign is for a release."""
+    """Hammer tests alone, which take seconds. A release tests the whole campaign."""
     case, folder, _ = again
     answers = answers_of(finding_rows(folder / case, case, "hammer_only"))
     assert answers and not [a.names for a in answers if a.verdict == "named"]
 
 
-def test_kept_answers_are_scored_with_their_truths(held, truths):
-    """Where the tool has spoken: every figure can be had from the kept set alone, and no row is lost."""
+def test_stored_answers_are_scored_with_their_truths(held, truths):
+    """If there are answers, all figures follow from the stored set alone, and no row is lost."""
     if held["diagnosis"] is None:
         pytest.skip("no tool has spoken about the kept set yet: turnout blind diagnose, reveal, keep")
     judged = [judge(truths[c], answers_of(held["rows"][c])) for c in truths if c in held["diagnosis"]["cases"]]

@@ -1,4 +1,4 @@
-"""Histories of sites: what is drawn, what changes from visit to visit, and how the answers are judged."""
+"""Histories of sites: the drawn values, the changes between visits, and the scores of the answers."""
 
 import csv
 import json
@@ -24,7 +24,7 @@ def panel(kind):
     return EFFECTS[kind].site.get("panel", "plain")
 
 
-def test_a_set_has_its_patterns_effects_and_panels_in_shares():
+def test_a_set_has_the_stated_shares_of_patterns_effects_and_panels():
     plans = plan_histories(5, 80, EFFECTS)
     assert [sum(p.pattern == n for p in plans) for n in history.PATTERNS] == [20, 10, 25, 25]
     assert sum(p.panel == "crossing" for p in plans) == 40
@@ -64,7 +64,7 @@ def test_the_effect_grows_from_its_day_on_and_the_track_wears(site):
     assert changes[-1] / others[-1] == pytest.approx(expected, rel=0.1)
 
 
-def test_the_owner_has_the_notes_of_all_visits_and_its_events_but_not_the_effect(site):
+def test_the_files_of_the_owner_hold_all_visits_and_events_but_not_the_effect(site):
     folder, truth, _ = site
     with open(folder / "raw" / "T1" / "campaigns.csv") as file:
         assert [row["campaign"] for row in csv.DictReader(file)] == truth["visits"]
@@ -76,7 +76,7 @@ def test_the_owner_has_the_notes_of_all_visits_and_its_events_but_not_the_effect
     assert "growth" not in written and truth["onset"] not in written
 
 
-def test_work_is_in_the_world_from_the_start_of_its_day_as_in_the_events():
+def test_maintenance_changes_the_track_from_the_start_of_its_day_as_in_the_events():
     site = history.draw_site(np.random.default_rng(3))
     n = site.world.position.size
     when = site.campaigns[0].replace(hour=9)
@@ -90,8 +90,8 @@ def test_work_is_in_the_world_from_the_start_of_its_day_as_in_the_events():
 
 
 @pytest.mark.parametrize("kind", history.HISTORY_EFFECTS)
-def test_no_recorded_work_repairs_what_is_concealed(kind, tmp_path, monkeypatch):
-    """The first draw has tamping and the exchange of every sensor, the second none."""
+def test_no_recorded_maintenance_repairs_the_concealed_effect(kind, tmp_path, monkeypatch):
+    """The first draw has tamping and an exchange of every sensor; the second draw has no maintenance."""
     for name in ("write_campaign", "write_passage", "write_configuration", "write_notes", "set_file_times"):
         monkeypatch.setattr(history, name, lambda *a: None)
     monkeypatch.setattr(history, "effect_visibility", lambda *a: {"hammer_pct": 30.0, "passage_pct": 0.0})
@@ -114,7 +114,7 @@ def test_no_recorded_work_repairs_what_is_concealed(kind, tmp_path, monkeypatch)
     assert len(draws) == (2 if is_repaired else 1) and bool(truth["maintenance"]) != is_repaired
 
 
-def test_work_elsewhere_or_before_the_effect_repairs_nothing():
+def test_maintenance_elsewhere_or_before_the_effect_does_not_repair_it():
     onset = datetime(2023, 3, 1, 15)
     gain = ConcealedEffect("gain", "sensor", {"sensor": "A2"})
     for sensor, day, expected in (("A2", 2, True), ("A2", 1, True), ("A3", 2, False), ("A2", -1, False)):
@@ -172,7 +172,7 @@ def rows(*change):
     ]
 
 
-def test_a_change_that_is_named_at_its_position_in_time_counts():
+def test_a_change_that_is_named_at_its_position_and_in_time_counts():
     result = judge_history(TRUTH, rows(NOTHING, NOTHING, PAD, PAD))
     assert (result.named, result.is_located, result.onset_covered) == ("named", True, True)
     assert not result.wrong_names and not result.alarms
@@ -204,7 +204,7 @@ def test_wrong_names_false_alarms_and_maintenance_are_counted():
     assert (rate.k, rate.years) == (1, pytest.approx(3 * 248 / 365.25))
 
 
-def test_each_false_alarm_counts_when_it_begins_and_those_after_work_are_found():
+def test_each_false_alarm_counts_when_it_begins_also_after_maintenance():
     """Four visits without an effect: two alarms of a pad are one, a gain after it and work before are a second."""
     gain = {**PAD, "term": "sensor_gain", "channel": "A1"}
     intact = {**TRUTH, "pattern": "none", "effects": [], "severities": [0.0] * 4, "onset": None}
@@ -223,7 +223,7 @@ def test_each_false_alarm_counts_when_it_begins_and_those_after_work_are_found()
     assert (figures[worked].k, figures[worked].n) == (1, 1)
 
 
-def test_nothing_is_exposed_at_a_visit_with_the_effect():
+def test_a_visit_with_the_effect_has_no_exposure_to_false_alarms():
     """The effect is present but not clear from the second visit on: a wrong name then is no false alarm."""
     truth = {**TRUTH, "severities": [0.0, 0.3, 1.0, 1.0], "maintenance": [{"day": "2022-10-12", "kind": "tamping"}]}
     result = judge_history(truth, rows(NOTHING, {**PAD, "term": "sensor_gain", "channel": "A1"}, PAD, PAD))
@@ -233,7 +233,7 @@ def test_nothing_is_exposed_at_a_visit_with_the_effect():
     assert rate.is_met is None
 
 
-def test_an_effect_of_the_first_day_is_asked_of_the_file():
+def test_an_effect_of_the_first_day_is_scored_by_the_comparison_with_the_file():
     truth = {**TRUTH, "pattern": "start", "onset": None, "severities": [1.0] * 4, "visible": [TRUTH["visible"][2]] * 4}
     answers = [{**PAD, "visit": TRUTH["visits"][0], "question": "file", "onset_after": None}]
     result = judge_history(truth, answers)
@@ -244,7 +244,7 @@ def test_an_effect_of_the_first_day_is_asked_of_the_file():
     assert change.alarms == {"change": ("2022-10-12",)}
 
 
-def test_times_of_campaigns_and_passages_of_single_cases_stay(tmp_path):
+def test_times_of_campaigns_and_passages_of_single_cases_do_not_change(tmp_path):
     site = history.draw_site(np.random.default_rng(1))
     assert site.passage_time(1) == datetime(2024, 7, 16, 11, 30)
     moved = replace(site, passages=[replace(site.passages[0], when=datetime(2023, 1, 1))])

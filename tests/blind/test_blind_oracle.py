@@ -1,4 +1,4 @@
-"""What an oracle is told, and rows as the bridge writes them; neither runs a simulation here."""
+"""The candidates that an oracle receives, and the rows that the bridge writes. Neither runs a simulation here."""
 
 import json
 from types import SimpleNamespace
@@ -31,7 +31,7 @@ EFFECT = {"kind": "pad", "where": {"position": 3.1, "sleeper": 40}, "parameters"
           "locked_to": "place"}  # fmt: skip
 
 
-def test_an_oracle_gets_the_right_name_at_the_true_position_and_nothing_else():
+def test_an_oracle_receives_only_the_right_name_at_the_true_position():
     assert [c.where["place"] for c in _candidates(CASE, EFFECT)] == [3.0]
     gain = {"kind": "gain", "where": {"sensor": "A3"}, "parameters": {"gain": 1.2}}
     assert [c.where for c in _candidates(CASE, gain)] == [{"sensor": "A3"}]
@@ -40,13 +40,13 @@ def test_an_oracle_gets_the_right_name_at_the_true_position_and_nothing_else():
     assert not list(_candidates(CASE, {"kind": "guard_rail_rattle", "where": {"position": 3.0}, "parameters": {}}))
 
 
-def test_an_oracle_starts_from_the_truth_within_the_bounds():
+def test_an_oracle_starts_from_the_true_values_within_the_bounds():
     assert _true_start(PADS[5], EFFECT) == [0.33]
     assert _true_start(PADS[5], {**EFFECT, "parameters": {"factor": 0.01}}) == [0.05]
     assert _true_start(PADS[5], {**EFFECT, "kind": "void", "parameters": {"gap": 1e-3}}) == [0.4]
 
 
-def test_a_sample_of_clear_singles_is_drawn_by_id_alone():
+def test_clear_singles_are_sorted_by_id():
     def truth(stratum, share, kind="pad", **where):
         return {
             "stratum": stratum,
@@ -96,7 +96,7 @@ def test_a_rival_of_the_true_effect_has_another_name_and_no_negative_gain():
     [(12.1, 0.0, True, True), (12.0, 0.0, True, False), (20.0, 14.0, True, True), (20.0, 14.1, True, False),
      (50.0, 0.0, False, False)],
 )  # fmt: skip
-def test_evidence_is_enough_above_the_bars_of_a_name(gain, rival, reportable, expected):
+def test_evidence_is_enough_above_the_threshold_and_the_margin_of_a_name(gain, rival, reportable, expected):
     settings = MismatchSettings(threshold=12.0, margin=6.0)
     assert has_enough(SimpleNamespace(gain=gain, is_reportable=reportable), rival, settings) is expected
     assert not has_enough(None, 0.0, settings)

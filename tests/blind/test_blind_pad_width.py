@@ -1,4 +1,4 @@
-"""Why a fit to the generator's impacts finds sleepers too light: its pads are wide, and its sleepers coupled."""
+"""A fit to impacts of the generator estimates too light sleepers, since its pads are wide and its sleepers coupled."""
 
 from dataclasses import replace
 
@@ -74,13 +74,13 @@ def free():
     return world()
 
 
-def test_pads_without_width_make_sleepers_too_light_and_pads_of_its_width_do_not(free):
+def test_pads_without_width_give_too_light_sleepers_and_pads_of_the_true_width_do_not(free):
     """The spline that carries a pad is as wide as a uniform pad of 0.2 m (3 times 0.6556 steps of 0.1 m)."""
     point, wide = (estimated(free, width)["sleeper_mass"] for width in (0.0, 0.2))
     assert -0.04 < point < -0.015
     assert abs(wide) < 0.012
 
 
-def test_ballast_that_couples_sleepers_makes_them_lighter_again(free):
+def test_ballast_that_couples_sleepers_reduces_their_estimated_mass(free):
     """The coupling of 4 % of the ballast stiffness is unknown to the library."""
     assert -0.04 < estimated(world(0.04), 0.2)["sleeper_mass"] - estimated(free, 0.2)["sleeper_mass"] < -0.012

@@ -1,4 +1,4 @@
-"""The blind generator's physics against closed forms and exact series, none of them made by its own march."""
+"""The physics of the blind generator against closed forms and exact series, which do not use its time integration."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ CAR = Car(32e3, 1.8e6, 3000.0, 3000.0, 1500.0, 1.2e6, 60e3, 0.5e6, 80e3, 2.5, 8.
 
 
 def series(world, x, xi, omega=0.0, n=3000):
-    """Receptance between places of a simply supported Timoshenko beam: exact sum over sines, no march in it."""
+    """Receptance between positions of a simply supported Timoshenko beam, by the exact sum over sines."""
     rail, grid = world.rail, world.grid
     length = grid.end - grid.start
     k = np.arange(1, n + 1) * np.pi / length
@@ -67,7 +67,7 @@ BENDING_ONLY = Rail(bending=6.42e6, shear=2e9, mass=60.21, rotary=0.24, damping=
 
 @pytest.mark.parametrize("front", [4.0, 4.3, 4.13])
 def test_static_deflection_under_four_wheels(front):
-    """Within 2 %: pads and wheels are spread over 0.4 m, which the exact points are not."""
+    """Within 2 %: pads and wheels are 0.4 m wide here, and points in the exact series."""
     world = uniform_world(length=36.0)
     train = Train("car", (CAR,))
     places = front - (train.axles() - train.axles()[0])
@@ -179,7 +179,7 @@ def test_pinned_pinned_resonance():
     assert f[inside][np.argmax(np.abs(h[0, inside]))] == pytest.approx(1070.0, rel=0.03)
 
 
-def test_a_sleeper_without_ballast_swings_on_its_pad():
+def test_a_sleeper_without_ballast_vibrates_on_its_pad():
     """The receptance near it follows the exact series with a free mass there: new peak and antiresonance."""
     world = uniform_world(pad_damping=1e4, ballast_damping=8e4, sponge=0.0)
     j = world.nearest(0.0)
@@ -195,7 +195,7 @@ def test_a_sleeper_without_ballast_swings_on_its_pad():
 
 
 @pytest.mark.parametrize("seated", [0.8, 0.35])
-def test_a_sleeper_that_hangs_in_part_has_that_part_less_ballast(seated):
+def test_a_partly_hanging_sleeper_has_the_share_of_ballast_that_bears(seated):
     """Under a hammer the gap stays open: the exact series with the share of ballast that bears."""
     world = uniform_world(pad_damping=1e4, ballast_damping=8e4, sponge=0.0)
     j = world.nearest(0.0)
@@ -225,8 +225,8 @@ def test_maxwell_branches_stiffen_the_pads():
         assert abs(found[0] - exact) < 0.5 * abs(plain - exact), frequency
 
 
-def test_a_rider_holds_the_rail_still_at_its_own_frequency():
-    """Driving-point receptance where a dynamic absorber hangs, at its resonance: the rail all but stands."""
+def test_an_attached_mass_stops_the_rail_at_its_own_frequency():
+    """The driving-point receptance at a dynamic absorber is nearly 0 at the resonance of the absorber."""
     world = uniform_world(sponge=0.0)
     free = on_supports(world, [0.0], [0.0], 2.0 * np.pi * 150.0)[0, 0]
     k = 60.0 * (2.0 * np.pi * 150.0) ** 2
@@ -236,8 +236,8 @@ def test_a_rider_holds_the_rail_still_at_its_own_frequency():
     assert abs(found[0]) < 0.1 * abs(free)
 
 
-def test_energy_is_kept_without_damping():
-    """Kinetic and elastic energy after the impact is what the hammer lost, to 2 %, at two times."""
+def test_energy_is_conserved_without_damping():
+    """Kinetic and elastic energy after the impact equal the energy that the hammer lost, to 2 %, at two times."""
     rail = replace(Rail(), damping=0.0)
     world = uniform_world(36.0, pad_damping=0.0, ballast_damping=0.0, rail=rail, sponge=0.0)
     for duration in (0.02, 0.12):
@@ -280,8 +280,8 @@ def test_hammer_on_a_rigid_rail_is_a_hertz_impact():
     assert force.sum() * TIME_STEP == pytest.approx(2.0 * 5.5 * 1.1, rel=0.01)
 
 
-def test_a_deep_dip_throws_the_wheel_off_the_rail():
-    """Contact forces fall to zero and never below, and the sum of forces comes back to the weight."""
+def test_a_wheel_leaves_the_rail_at_a_deep_dip():
+    """Contact forces fall to zero and never below, and the sum of forces returns to the weight."""
     world = uniform_world()
     world.surface.append(lambda x: 5e-3 * np.clip(1.0 - np.abs(x) / 0.3, 0.0, None))
     train = Train("car", (CAR,))
@@ -292,8 +292,8 @@ def test_a_deep_dip_throws_the_wheel_off_the_rail():
     assert np.mean(force[:, 100:500]) == pytest.approx(weight, rel=0.02)
 
 
-def test_softly_closing_gap():
-    """No force above the gap, half way it lags behind k d, far beyond it follows k (d - close)."""
+def test_a_gap_closes_gradually():
+    """The force is 0 within the gap, below k d shortly beyond it, and k (d - close) far beyond it."""
     world = uniform_world(12.0)
     world.gap[3], world.close[3] = 1e-3, 2e-4
     s = world.supports()
@@ -308,8 +308,8 @@ def test_softly_closing_gap():
     assert _ballast_force(s, 3, 4e-3, 0.0, 0.0) == pytest.approx(k * (0.4 * 4e-3 + 0.6 * (3e-3 - 2e-4)), rel=1e-6)
 
 
-def test_sleepers_pass_at_speed_over_spacing():
-    """A smooth rail shakes the wheel at v/L and its multiples, and hardly anywhere else."""
+def test_the_sleepers_excite_a_wheel_at_speed_over_spacing():
+    """On a smooth rail the force of a wheel has lines at v/L and its multiples, and hardly any others."""
     world = uniform_world(96.0)
     _, force, _ = simulate_passage(world, Train("car", (CAR,)), 40.0, [10.0], 1.9, 1.3)
     steady = force[0, 700:1900] - force[0, 700:1900].mean()

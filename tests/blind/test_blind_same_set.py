@@ -1,4 +1,4 @@
-"""A seed gives the same seals again, and a set for one tool is for no other; cases themselves stand in here."""
+"""A seed gives the same hashes again, and a set for one tool rejects other tools. The cases here are stand-ins."""
 
 import json
 import shutil
@@ -13,7 +13,7 @@ from turnout_blind.seal import BlindError, digest, verify
 
 @pytest.fixture
 def light(monkeypatch):
-    """Cases of one file, made in no time."""
+    """Cases of one file without a simulation."""
 
     def made(folder, case, plan, effects):
         (folder / case).mkdir(parents=True)
@@ -29,14 +29,14 @@ def tool_is(monkeypatch, sha):
         monkeypatch.setattr(f"turnout_blind.{module}.digest_of_folder", lambda folder, pattern="*": sha)
 
 
-def test_a_lost_set_is_made_again_from_its_seed_seals_and_all(light, tmp_path):
+def test_a_lost_set_is_generated_again_from_its_seed_with_the_same_hashes(light, tmp_path):
     shas = [make_set(tmp_path / str(k), tmp_path / f"truth{k}", seed, limit=5) for k, seed in enumerate((7, 7, 8))]
     assert shas[0] == shas[1] != shas[2]
     shutil.copytree(tmp_path / "truth1", tmp_path / "instead")
     assert verify(tmp_path / "0", tmp_path / "instead").keys() == verify(tmp_path / "0", tmp_path / "truth0").keys()
 
 
-def test_a_set_for_a_tool_follows_from_its_sources_alone(light, tmp_path, monkeypatch):
+def test_the_seed_of_a_set_for_a_tool_follows_from_the_sources_of_the_tool(light, tmp_path, monkeypatch):
     seeds = []
     for k, sha in enumerate(("a" * 64, "a" * 64, "b" * 64)):
         tool_is(monkeypatch, sha)
@@ -47,7 +47,7 @@ def test_a_set_for_a_tool_follows_from_its_sources_alone(light, tmp_path, monkey
 
 
 @pytest.mark.parametrize(("tool", "is_rejected"), [("a" * 64, False), ("b" * 64, True)])
-def test_a_set_for_one_tool_lets_no_other_in(light, tmp_path, monkeypatch, tool, is_rejected):
+def test_a_set_for_one_tool_rejects_another_tool(light, tmp_path, monkeypatch, tool, is_rejected):
     tool_is(monkeypatch, "a" * 64)
     make_set(tmp_path / "set", tmp_path / "truth", "tool", limit=1)
     tool_is(monkeypatch, tool)

@@ -1,4 +1,4 @@
-"""The scorer against tools whose scores are known without it: perfect, silent, random, confidently wrong."""
+"""Scores of tools whose scores are known beforehand: perfect, silent, random and confidently wrong ones."""
 
 import json
 from collections import Counter
@@ -89,8 +89,8 @@ def test_a_perfect_tool_meets_every_bar():
                                "sensor_gain", "pad_temperature"} for counts in confusion(judged).values())  # fmt: skip
 
 
-def test_bars_are_also_held_against_effects_that_the_tool_itself_could_have_gained_by():
-    """Where the true effect gains 2 or 4 points: only the latter count, whatever the tool says of its own fit."""
+def test_bars_also_apply_to_effects_whose_oracle_gains_over_3_points():
+    """The true effects gain 2 or 4 points. Only the latter count, whatever fit the tool states."""
     oracle = {f"s{i}": (20.0, 22.0 if i % 2 else 24.0) for i in range(40)}
     silent = table(lambda t: [{"verdict": "none", "probability": 0.9}], oracle=oracle)[1]
     found = table(lambda t: perfect(t) if t["case"] != "s0" else [{"verdict": "none"}], oracle=oracle)[1]
@@ -100,7 +100,7 @@ def test_bars_are_also_held_against_effects_that_the_tool_itself_could_have_gain
     assert found["what: top-1 (clear singles)"].n == 50
 
 
-def test_a_silent_tool_raises_no_alarm_and_finds_nothing():
+def test_a_silent_tool_has_no_false_alarm_and_no_right_name():
     _, found = table(lambda t: [{"verdict": "none", "probability": 0.9}])
     assert found["controls: false alarms"].k == 0
     assert found["not identifiable: 'a or b' with the truth, or none"].share == 100.0
@@ -109,19 +109,19 @@ def test_a_silent_tool_raises_no_alarm_and_finds_nothing():
         assert found[name].k == 0
         assert found[name].n > 0
     assert found["parameters: median error"].n == 0
-    assert found["parameters: median error"].is_met is None  # nothing measured is not a bar met
-    # 0.9 said of "none" in 166 cases, right in 60 controls and 16 that nobody can tell: 76/166.
+    assert found["parameters: median error"].is_met is None  # without a measured value a bar is not met
+    # The answer "none" with 0.9 in 166 cases is right in 60 controls and 16 cases that are not identifiable: 76/166.
     assert found["probability: worst fifth, stated from seen"].value == pytest.approx(abs(0.9 - 76 / 166))
 
 
-def test_a_tool_that_never_answers_is_not_a_silent_one():
+def test_a_tool_without_answers_differs_from_a_silent_one():
     _, found = table(lambda t: None)
     assert found["cases without an answer"].k == 166
     assert found["not identifiable: 'a or b' with the truth, or none"].k == 0
     assert found["controls: false alarms"].k == 0
 
 
-def test_a_random_tool_is_right_at_chance():
+def test_a_random_tool_is_right_as_often_as_by_chance():
     rng = np.random.default_rng(5)
     names = [RIGHT_NAMES[k][0] for k in SINGLES]
 
@@ -137,7 +137,7 @@ def test_a_random_tool_is_right_at_chance():
     assert found["outside the library: named wrongly"].share == 100.0
 
 
-def test_a_confidently_wrong_tool_fails_where_it_should():
+def test_a_confidently_wrong_tool_fails_the_bars_of_names_and_probabilities():
     _, found = table(lambda t: [row(e, "rail_shear", 0.99) for e in t["effects"]] or [{"verdict": "none"}])
     assert found["what: a wrong name (clear singles)"].share == 100.0
     assert found["not identifiable: a wrong name"].is_met is False
@@ -162,7 +162,7 @@ def test_a_wrong_position_axle_train_or_sensor_is_detected():
         assert found[f"where: {what} right (clear singles)"].k == 0
 
 
-def test_one_right_name_and_one_wrong_in_a_double_is_not_well():
+def test_one_right_and_one_wrong_name_in_a_double_do_not_meet_the_bars():
     t = truth("d", "double", "void", "gain")
     right, wrong = row(t["effects"][0], "hanging_sleeper"), row(t["effects"][1], "time_offset")
     judged = judge(t, answers_of([right, wrong]))
@@ -186,7 +186,7 @@ def test_parameters_are_compared_with_what_was_concealed():
     ("train", "right"), [("railcar, axle 3", True), ("railcar, axle 4", False), ("loaded, axle 3", False)]
 )
 def test_train_and_axle_are_read_from_their_column(train, right):
-    """Beside the sentence, in which another number may stand."""
+    """The sentence may contain another number."""
     t = truth("s", "single", "flat")
     said = {"verdict": "unknown", "locked_to": "wheel", "train": train, "sentence": "forces at axle 7 of a train"}
     assert judge(t, answers_of([said])).located == {"lock": True, "axle": right}
@@ -201,20 +201,20 @@ def test_the_gap_of_a_sleeper_that_hangs_in_part_is_not_compared():
     assert judged.parameters == ()
 
 
-def test_effects_too_small_to_cost_fit_are_not_held_against_the_tool():
+def test_effects_too_small_to_reduce_the_fit_do_not_count_against_the_tool():
     assert gain_of({"hammer_pct": 0.0, "passage_pct": 5.0}) < 0.3
     hidden = judge(truth("s", "single", "void", share=5.0), answers_of([{"verdict": "none"}]))
     found = {f.name: f for f in figures([hidden])}
     assert found["what: top-1 (clear singles)"].n == 0
 
 
-def test_a_name_of_ones_own_can_be_added():
+def test_a_user_can_add_a_right_name():
     assert right_names("squeal") == ()
     assert right_names("squeal", {"squeal": ["hum"]}) == ("hum",)
     assert set(RIGHT_LOCKS) <= set(RIGHT_NAMES)
 
 
-def test_reliability_holds_probability_one():
+def test_reliability_includes_a_probability_of_one():
     judged = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": p}])) for p in (0.05, 1.0)]
     assert reliability(judged) == [(0.05, 1.0, 1), (1.0, 1.0, 1)]
 
@@ -231,7 +231,7 @@ def test_a_second_term_among_the_parameters_is_an_answer_of_its_own():
     assert judged.parameters == ((0.0, True), (pytest.approx(0.01 / 0.3), True))
 
 
-def test_failures_are_alarms_wrong_names_and_what_was_missed_each_in_a_row():
+def test_each_false_alarm_wrong_name_and_missed_effect_is_a_row_of_failures():
     def rows(tool):
         judged, _ = table(tool)
         return [line.split(" | ")[0].strip("| ")[0] for line in failure_table(judged).splitlines()[2:]]
@@ -239,20 +239,22 @@ def test_failures_are_alarms_wrong_names_and_what_was_missed_each_in_a_row():
     judged, _ = table(perfect)
     assert failure_table(judged) == "None."
     silent = rows(lambda t: [{"verdict": "none", "probability": 0.9}])
-    assert Counter(silent) == {"s": 50, "d": 20, "o": 20}  # nothing is the answer to controls and the not identifiable
+    # "none" is right for controls and for cases that are not identifiable
+    assert Counter(silent) == {"s": 50, "d": 20, "o": 20}
     unknown = rows(lambda t: [{"verdict": "unknown", "probability": 0.9}])
-    assert Counter(unknown) == {"c": 60, "s": 50, "d": 20, "u": 16}  # and this that to what is outside the library
+    # "unknown" is right for effects outside the library
+    assert Counter(unknown) == {"c": 60, "s": 50, "d": 20, "u": 16}
     assert len(rows(lambda t: None)) == 166
 
 
 def test_an_empty_list_of_rows_is_no_answer():
-    """A tool that ends without a row has not said that nothing is missing."""
+    """A tool that ends without a row has not answered "none"."""
     _, found = table(lambda t: [])
     assert found["cases without an answer"].k == 166
     assert found["not identifiable: 'a or b' with the truth, or none"].k == 0
 
 
-def test_two_names_of_which_none_is_right_are_a_wrong_name():
+def test_two_wrong_names_of_one_answer_count_as_a_wrong_name():
     t = truth("s", "single", "void")
     said = row(t["effects"][0], "rail_shear", verdict="a_or_b", rival_term="time_offset")
     assert judge(t, answers_of([said])).wrong_names == ("rail_shear",)
@@ -269,7 +271,7 @@ def both(gap_at, sensor):
 
 
 @pytest.mark.parametrize(("gap_at", "sensor", "right"), [(4.2, "A2", True), (8.2, "A2", False), (4.2, "A3", False)])
-def test_both_of_two_effects_are_right_at_their_positions(gap_at, sensor, right):
+def test_both_names_of_two_effects_are_right_only_at_their_positions(gap_at, sensor, right):
     judged = judge(truth("d", "double", "void", "gain"), answers_of(both(gap_at, sensor)))
     assert judged.matches == ("named", "named")
     found = {f.name: f for f in figures([judged])}
@@ -277,7 +279,7 @@ def test_both_of_two_effects_are_right_at_their_positions(gap_at, sensor, right)
     assert found["two effects: one right and none wrong"].k == 1
 
 
-def test_a_name_given_twice_for_one_effect_is_wrong_once_and_does_not_lend_its_size():
+def test_a_name_given_twice_for_one_effect_counts_as_wrong_once_and_its_size_does_not_count():
     gain = {"term": "sensor_gain", "fixed": {"channel_name": "A2"}, "parameters": {"gain": {"value": 1.3, "se": 0.01}}}
     other = {"term": "sensor_gain", "fixed": {"channel_name": "A3"}, "parameters": {"gain": {"value": 0.8, "se": 0.01}}}
     rows = [{"verdict": "named", "term": "sensor_gain", "channel": "A2", "term_json": json.dumps([gain, other])}]
@@ -286,8 +288,8 @@ def test_a_name_given_twice_for_one_effect_is_wrong_once_and_does_not_lend_its_s
     assert judged.parameters == ((0.0, True),)
 
 
-def test_silence_closes_no_gap_and_small_oracles_ask_for_none():
-    """Three points to gain: 24.0 against 20.0 is asked, 22.0 is not."""
+def test_a_silent_tool_closes_no_gap_to_the_oracle_and_small_gains_of_the_oracle_do_not_count():
+    """An oracle counts from a gain of three points on: 24.0 against 20.0 counts, 22.0 does not."""
     oracle = {f"s{i}": (20.0, 24.0 if i < 10 else 22.0) for i in range(50)}
     name = "held-out fit: gap to the oracle closed, median"
     _, silent = table(lambda t: [{"verdict": "none", "fit_before_pct": 20.0}], oracle=oracle)
@@ -301,8 +303,8 @@ def test_silence_closes_no_gap_and_small_oracles_ask_for_none():
     assert half[name].value == pytest.approx(50.0)
 
 
-def test_a_fall_counts_wherever_a_name_was_given():
-    """Also of a false alarm, of two effects, and where the named model could not predict anything."""
+def test_a_fall_of_the_fit_counts_for_every_name():
+    """Also for a false alarm, for two effects, and where the named model predicts nothing."""
     fell = {"fit_before_pct": 50.0, "fit_after_pct": 20.0}
     alarm = judge(truth("c", "control"), answers_of([{"verdict": "named", "term": "rail_shear", **fell}]))
     mute = judge(truth("d", "double", "void", "gain"), answers_of([both(4.2, "A2")[0] | {"fit_before_pct": 50.0}]))
@@ -316,8 +318,8 @@ def test_a_fall_counts_wherever_a_name_was_given():
 @pytest.mark.parametrize(
     ("after", "error", "fallen"), [(47.0, 2.5, 1), (47.0, 3.5, 0), (49.5, 0.4, 1), (48.5, None, 1)]
 )
-def test_a_fall_is_held_against_the_standard_error_that_the_row_states(after, error, fallen):
-    """The point stands in where none is stated."""
+def test_a_fall_of_the_fit_is_compared_with_the_standard_error_that_the_row_states(after, error, fallen):
+    """Without a stated error the limit is one point."""
     fits = {"fit_before_pct": 50.0, "fit_after_pct": after, "fit_gain_se_pct": error}
     rows = [row(truth("s", "single", "void")["effects"][0], "hanging_sleeper", **fits)]
     named = judge(truth("s", "single", "void"), answers_of(rows))
@@ -326,7 +328,7 @@ def test_a_fall_is_held_against_the_standard_error_that_the_row_states(after, er
     assert found["held-out fit: fell by over a point"].k == (after < 49.0)
 
 
-def test_fifths_hold_equal_numbers_and_ties_stay_together():
+def test_fifths_have_equal_numbers_of_answers_and_equal_probabilities_stay_together():
     stated = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.6, 0.6, 0.9, 1.0]
     judged = [judge(truth("c", "control"), answers_of([{"verdict": "none", "probability": p}])) for p in stated]
     assert [n for _, _, n in reliability(judged)] == [2, 2, 4, 2]
@@ -345,7 +347,7 @@ def test_exact_probabilities_differ_from_the_shares_by_the_binomial_distribution
     assert by_chance == pytest.approx(expected, abs=1e-12)
 
 
-def test_certain_answers_leave_nothing_to_chance_and_few_answers_are_not_compared():
+def test_certain_answers_have_no_scatter_and_fewer_than_five_answers_are_not_compared():
     control = truth("c", "control")
     sure = [judge(control, answers_of([{"verdict": "none", "probability": 1.0}])) for _ in range(5)]
     assert worst_difference(sure) == (0.0, (0.0, 0.0))

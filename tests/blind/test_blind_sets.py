@@ -1,4 +1,4 @@
-"""A small blind set from end to end: what is written, sealed, hidden, revealed and scored."""
+"""A small blind set from end to end: it is written, sealed, hidden, opened and scored."""
 
 import json
 import re
@@ -33,14 +33,14 @@ pytestmark = pytest.mark.slow
 
 
 def with_two_passages(plan, effects):
-    """As ``stage``, with two of the eight passages: a passage, and how visible an effect is in it, is a second each."""
+    """As ``stage``, with two of the eight passages, since a passage and the visibility in it take a second each."""
     rng, site, world, concealed = stage(plan, effects)
     return rng, replace(site, passages=site.passages[:2]), world, concealed
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """(out, truth) of a control and a single, made once and never changed. A whole case is in test_blind_fast_tier."""
+    """(out, truth) of a control and a single, generated once. test_blind_fast_tier has a whole case."""
     folder = tmp_path_factory.mktemp("blind")
     out, truth = folder / "set", folder / "truth"
     seed = 19  # whose first two cases in shuffled order are a control and a single
@@ -53,7 +53,7 @@ def made(tmp_path_factory):
 
 @pytest.fixture
 def copy(made, tmp_path, monkeypatch):
-    """A copy of the set that a test may spoil; the tool counts as frozen while others work on its files."""
+    """A copy of the set that a test may change; the tool counts as unchanged while its files are edited."""
     monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: "frozen")
     out, truth = tmp_path / "set", tmp_path / "truth"
     shutil.copytree(made[0], out)
@@ -89,13 +89,14 @@ def test_a_user_of_the_project_can_read_the_case(made):
             assert all(3e3 < r.signal("force").max() < 22.3e3 for r in result.recordings)
 
 
-def test_names_sizes_and_times_carry_no_label(made):
-    """Two cases differ in nothing that a listing shows but their id and which middle section has no impacts."""
+def test_names_sizes_and_times_of_files_do_not_reveal_the_stratum(made):
+    """Listings of two cases differ only in the id and in the middle section that has no impacts."""
     listings = []
     for case in cases(made[0]):
         files = [p for p in sorted(case.rglob("*.npz"))]
         listings.append(sorted((p.parent.name, p.stat().st_size, p.stat().st_mtime) for p in files))
-    assert listings[0] == listings[1]  # the size of a passage tells the length of its train's name, as trains.csv does
+    # the size of a passage depends on the length of the train's name, which trains.csv states
+    assert listings[0] == listings[1]
     words = {k for k in load_effects() if k not in ("pad", "ballast", "position", "gain")}
     for path in (p for case in cases(made[0]) for p in case.rglob("*") if p.is_file() and p.suffix != ".npz"):
         text = f"{path.name}\n{path.read_text()}"
@@ -111,7 +112,7 @@ def test_the_same_seed_gives_the_same_samples():
     assert len(tests[0]) > 1 and all(np.array_equal(a.samples, b.samples) for a, b in zip(*tests, strict=True))
 
 
-def test_seals_hold_and_break(copy):
+def test_verification_accepts_intact_cases_and_rejects_added_and_changed_files(copy):
     out, truth = copy
     assert {t["stratum"] for t in verify(out, truth).values()} == {"control", "single"}
     case = cases(out)[0]
@@ -125,7 +126,7 @@ def test_seals_hold_and_break(copy):
         verify(out, truth)
 
 
-def test_a_truth_cannot_be_exchanged_after_the_fact(copy):
+def test_verification_rejects_a_truth_that_was_changed_after_sealing(copy):
     out, truth = copy
     path = truth / f"{cases(out)[0].name}.json"
     held = json.loads(path.read_text())
@@ -134,8 +135,8 @@ def test_a_truth_cannot_be_exchanged_after_the_fact(copy):
         verify(out, truth)
 
 
-def test_nonces_keep_a_truth_from_being_guessed(made):
-    """The seal of a control is not that of the same words without their nonce, nor of another's."""
+def test_a_nonce_prevents_a_guess_of_the_truth_from_its_hash(made):
+    """The hash of a control differs from that of the same text without its nonce, and each truth has its own nonce."""
     truths = verify(*made)
     control = next(t for t in truths.values() if t["stratum"] == "control")
     nonces = {t["nonce"] for t in truths.values()}
@@ -176,7 +177,7 @@ def test_the_tool_sees_neither_truth_nor_generator(copy, tmp_path):
     for path in (out / "findings").glob("*.json"):
         said = json.loads(path.read_text())[0]["sentence"]
         assert said == "" if held["isolation"] == "unshare" else "opened" not in said
-    assert (truth / "set.json").exists()  # outside it is there as before
+    assert (truth / "set.json").exists()  # outside the isolation the folder is still there
     assert len(reveal(out, truth)) == 2
     report = report_text([out])
     assert "| controls: false alarms | 0.0 % (0) | 0.0 to 97.5 % | 1 | <= 3.33 % | met |" in report
@@ -197,13 +198,13 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
-    """It prints notes, then its row, in the folder of the case; anything else is a failure with its words kept."""
+    """It prints notes and then its row in the folder of the case. Other output is a failure and is stored."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
     tool, row = tmp_path / "tool.py", 'print(5)\nprint("{\\n\\"verdict\\": \\"none\\"}")\nprint("page: x.html")'
     tool.write_text("import os; print(os.listdir())")
     held = diagnose_set(out, truth, f"{{python}} {tool}", [one], report=lambda line: None)
-    assert held["cases"][one]["status"] == "failed"  # a list of Python's is no JSON
+    assert held["cases"][one]["status"] == "failed"  # a list in Python syntax is no JSON
     assert held["cases"][one]["said"].startswith("printed no rows; [")
     tool.write_text(row)
     held = diagnose_set(out, truth, f"{{python}} {tool}", [other], report=lambda line: None)
@@ -214,8 +215,8 @@ def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
-    """An empty list says nothing; another command, or a judgement of an open set, is rejected."""
+def test_one_command_diagnoses_all_cases_of_a_set_before_it_is_opened(copy):
+    """An empty list is no answer. Another command, and a diagnosis of an opened set, are rejected."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
     held = diagnose_set(out, truth, "{python} -c 'print([])'", [one], report=lambda line: None)
@@ -239,7 +240,7 @@ def test_a_set_is_judged_by_one_command_with_rows_and_before_it_is_open(copy):
         ("while True: pass", {"cpu": 1.0}, "no answer within 1 s of the processor"),
     ],
 )
-def test_a_case_that_exceeds_its_budget_is_silence(copy, code, budget, said):
+def test_a_case_that_exceeds_its_budget_has_no_answer(copy, code, budget, said):
     out, truth = copy
     held = diagnose_set(out, truth, f"{{python}} -c '{code}'", report=lambda line: None, workers=2, **budget)
     assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", said)}
@@ -248,7 +249,7 @@ def test_a_case_that_exceeds_its_budget_is_silence(copy, code, budget, said):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_what_the_tool_writes_beside_its_files_breaks_no_seal(copy):
+def test_files_that_the_tool_writes_beside_the_case_do_not_change_its_hash(copy):
     out, truth = copy
     code = (
         'import os, json; os.makedirs("results/pages"); open("raw/x", "w"); print(json.dumps([dict(verdict="none")]))'
@@ -259,8 +260,8 @@ def test_what_the_tool_writes_beside_its_files_breaks_no_seal(copy):
     assert not list((out / "copies").iterdir())
 
 
-def test_an_interrupted_set_goes_on(made, tmp_path, monkeypatch):
-    """The first case is there; the second, half-made, is made again; another seed or other sources are rejected."""
+def test_an_interrupted_generation_of_a_set_continues(made, tmp_path, monkeypatch):
+    """The complete case stays, the incomplete one is generated again. Another seed or other sources are rejected."""
     out, truth = tmp_path / "set", tmp_path / "truth"
     shutil.copytree(made[0], out)
     shutil.copytree(made[1], truth)
@@ -285,7 +286,7 @@ def test_an_interrupted_set_goes_on(made, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_tool_that_changes_on_the_way_proves_nothing(copy, monkeypatch):
+def test_a_tool_that_changes_during_the_diagnosis_is_rejected(copy, monkeypatch):
     states = iter(["one", "another"])
     monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: next(states))
     with pytest.raises(BlindError, match="changed while it diagnosed"):
@@ -295,19 +296,19 @@ def test_a_tool_that_changes_on_the_way_proves_nothing(copy, monkeypatch):
         diagnose_set(*copy, "{python} -c 'raise SystemExit(3)'", report=lambda line: None)
 
 
-def test_nothing_is_revealed_before_the_tool_has_spoken(copy):
+def test_a_set_is_not_opened_before_the_tool_has_answered(copy):
     with pytest.raises(BlindError, match="nothing has been diagnosed yet"):
         reveal(*copy)
 
 
-def test_the_truth_may_not_lie_where_the_tool_looks(tmp_path):
+def test_the_truth_must_not_be_inside_the_folder_of_the_tool(tmp_path):
     with pytest.raises(BlindError, match="inside the folder that the tool is given"):
         make_set(tmp_path / "a", tmp_path / "a" / "truth", 1)
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_the_canary_is_found_where_nothing_is_hidden(tmp_path, monkeypatch):
-    """With the hiding switched off, the check itself must cry out."""
+def test_the_check_of_the_isolation_fails_if_the_truth_is_readable(tmp_path, monkeypatch):
+    """The isolation is switched off here, and the check has to raise an error."""
     monkeypatch.setattr("turnout_blind.isolation.hidden_command", lambda command, folders: command)
     (tmp_path / "truth").mkdir()
     hidden = HiddenFolders(tmp_path / "truth")
@@ -326,7 +327,7 @@ def answer(**more):
 
 @pytest.fixture
 def scored(copy, tmp_path):
-    """A revealed set on which a tool said the same of both cases, and a lesser one said nothing."""
+    """An opened set with one tool that gave both cases the same answer and another one without an answer."""
     out, truth = copy
     for label, row in ((None, answer()), ("mute", {"verdict": "none"})):
         tool = tmp_path / f"{label}.py"
@@ -337,7 +338,7 @@ def scored(copy, tmp_path):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tmp_path, monkeypatch):
+def test_a_page_shows_figures_diagrams_cases_failures_and_ablations(scored, tmp_path, monkeypatch):
     monkeypatch.setattr(case_reports, "stage", with_two_passages)
     page = tmp_path / "page.md"
     page.write_text(f"# Before\n\n{BEGIN}\nold\n{END}\n\nAfter\n")
@@ -345,7 +346,7 @@ def test_a_page_shows_figures_pictures_stories_failures_and_ablations(scored, tm
     write_page(page, scored, cases=[single])
     text = page.read_text()
     assert text.startswith("# Before") and text.endswith("After\n") and "\nold\n" not in text
-    assert "| controls: false alarms | 100.0 % (1)" in text  # the failure is there
+    assert "| controls: false alarms | 100.0 % (1)" in text  # the page lists the failure
     assert "the tool (n = 2) | mute (n = 2)" in text
     assert "| controls: false alarms | 1 of 1 | 0 of 1 |" in text
     assert f"### {single}: pad" in text and "Answer: *named (probability 0.80)" in text
@@ -398,8 +399,8 @@ def test_an_unknown_kind_is_rejected_before_anything_is_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_findings_at_a_wheel_or_a_second_position_are_on_the_map():
-    """What has no place is written with its wheel, and every name of a finding is drawn, not the first alone."""
+def test_the_track_plot_shows_findings_at_wheels_and_all_names_of_a_finding():
+    """An effect without a position is labelled with its wheel. All names of a finding are drawn."""
     figure, axis = pyplot().subplots()
     truth = {"effects": [{"kind": "flat", "where": {"train": "railcar", "axle": 2}}], "sensors": {"A1": 2.0}}
     terms = [

@@ -83,7 +83,7 @@ def wheel_forces():
     return forces, (recorded, *simulated)
 
 
-def test_both_codes_change_the_wheel_alike(wheel_forces):
+def test_both_codes_agree_on_the_change_of_the_wheel_to_the_blade(wheel_forces):
     """Finite differences and elements, explicit and implicit: the force over 15 cm within 4 % of the load."""
     x, generator, library = wheel_forces[0]
     smooth = [np.convolve(f, np.ones(5) / 5.0, "same") for f in (generator, library)]
@@ -119,7 +119,7 @@ def test_the_file_of_the_owner_has_the_blade_and_both_tops(tmp_path):
 
 
 @pytest.mark.parametrize(("panel", "asked"), [(SWITCH, True), (PLAIN, False)])
-def test_a_proof_asks_for_the_names_that_are_withheld_at_switch_panels(tmp_path, panel, asked):
+def test_a_proof_requests_unproven_names_at_switch_panels(tmp_path, panel, asked):
     write_configuration(tmp_path, "t", draw_site(np.random.default_rng(3), panel=panel))
     assert load_configuration(tmp_path).turnout("t").settings["mismatch"].unproven_names is asked
 
@@ -156,7 +156,7 @@ def test_histories_of_switch_panels_have_its_effects_and_grow(tmp_path):
 
 
 def test_every_bearer_that_the_file_puts_under_the_blade_has_a_chair_in_the_generator():
-    """A toe less than 0.2 m before a bearer left it without a chair, which is a defect that no truth mentions."""
+    """Formerly a toe less than 0.2 m before a bearer left it without a chair: a defect that the truth did not state."""
     positions, grid = np.arange(-45.0, 57.0, 0.6), Grid(start=-48.0, n=1001)
     rail = Rail(6.378e6, 60.2, 2.435e8, 0.2384, 4000.0)
     values = [SUPPORTS[name] for name in ("pad", "pad_damping", "mass", "ballast", "ballast_damping")]
@@ -176,14 +176,14 @@ def test_every_bearer_that_the_file_puts_under_the_blade_has_a_chair_in_the_gene
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_blade_begins_at_the_toe_that_the_truth_states(seed):
-    """It began at the nearest node, up to 5 cm from it, and receptances beside it were another panel's."""
+    """Formerly it began at the nearest node, up to 5 cm away, and receptances beside it were those of another panel."""
     world = draw_site(np.random.default_rng(seed), panel=SWITCH).world
     first_node = world.grid.start + world.grid.step * world.blade_inputs().start
     assert first_node == pytest.approx(world.blade.switch.toe, abs=1e-9)
 
 
 def changes_by_open_chairs(toe, toe_of_library):
-    """What chairs that open change in receptances at 1.8 m, by the generator and by the library [m/N].
+    """Change of receptances at 1.8 m by chairs that open, from the generator and from the library [m/N].
 
     Two (3, n_line) arrays from 120 to 480 Hz, for sensors at the impact, 2.1 and 4.5 m behind it.
     """
@@ -198,7 +198,7 @@ def changes_by_open_chairs(toe, toe_of_library):
     under = np.flatnonzero(world.position > toe + module.FIRST_CHAIR)
     chairs = np.full(under.size, geometry.chair), np.full(under.size, geometry.chair_damping)
     by_generator, by_library = [], []
-    for slides in (0.0, -1.0):  # chairs that press alone, chairs that pull as well
+    for slides in (0.0, -1.0):  # chairs that only press, and chairs that also pull
         gap = np.where(world.position[under] < geometry.heel, slides, -1.0)
         world.blade = TrueBlade(geometry, under, *chairs, gap)
         force, signals, _ = simulate_impacts(world, [p.place for p in probes], impact, [0.005], [0.8], duration)
@@ -219,7 +219,7 @@ def changes_by_open_chairs(toe, toe_of_library):
 
 @pytest.mark.parametrize("toe", [1.3, 1.5])
 def test_both_codes_open_the_chairs_alike_under_an_impact(toe):
-    """11 kN beside the toe. The error that is left, 0.08 to 0.24, is that of the grid, as on plain track.
+    """11 kN beside the toe. The remaining error of 0.08 to 0.24 is that of the grid, as on plain track.
 
     With a toe 5 cm away it is as large as the change itself: 0.35 to 1.2.
     """

@@ -1,4 +1,4 @@
-"""Effects that are called not identifiable are: another site without the effect leaves the same recordings."""
+"""Effects of the stratum "unidentifiable" are not identifiable: a site without the effect gives equal recordings."""
 
 from dataclasses import replace
 
@@ -47,12 +47,12 @@ def impact_difference(site, world, other):
     return _relative_difference(_impact_signals(site, other, [1]), _impact_signals(site, world, [1]), HAMMER_BAND, 3)
 
 
-def test_no_kind_is_called_so_without_a_test_here():
+def test_every_unidentifiable_kind_has_a_test_here():
     kinds = {k for k, e in EFFECTS.items() if e.stratum == "unidentifiable"}
     assert kinds == {"one_temperature", "bottomless_void", "common_gain", "beyond_reach"}
 
 
-def test_pads_softened_by_warmth_are_soft_pads_where_it_is_always_warm():
+def test_at_constant_temperature_warm_pads_give_the_recordings_of_soft_pads():
     site, world, drawn = concealed("one_temperature")
     rival = site.world.copy()
     warm = np.mean(site.temperatures) - rival.reference
@@ -62,7 +62,7 @@ def test_pads_softened_by_warmth_are_soft_pads_where_it_is_always_warm():
     assert impact_difference(site, world, site.world) > HIDDEN  # recordings show it, but do not identify it
 
 
-def test_a_gap_that_never_closes_is_no_ballast_at_all():
+def test_a_gap_that_never_closes_gives_the_recordings_of_missing_ballast():
     site, world, drawn = concealed("bottomless_void", rung=0)
     rival = site.world.copy()
     rival.ballast[drawn.where["sleeper"]] = rival.ballast_damping[drawn.where["sleeper"]] = 0.0
@@ -71,7 +71,7 @@ def test_a_gap_that_never_closes_is_no_ballast_at_all():
     assert impact_difference(site, world, rival) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_channels_all_too_sensitive_are_heavier_trains_on_rougher_rails():
+def test_a_common_gain_of_all_channels_gives_the_recordings_of_heavier_trains_on_rougher_rails():
     site, world, drawn = concealed("common_gain")
     gain = drawn.parameters["gain"]
 

@@ -1,4 +1,4 @@
-"""Leave one effect out: the list covers the library, and each kind of answer is counted as what it is."""
+"""Leave one effect out: the list covers the library, and the table counts each kind of answer correctly."""
 
 import json
 
@@ -22,7 +22,7 @@ def test_every_effect_of_the_library_has_a_kind_or_the_reason_why_it_has_none():
 
 
 def test_every_kind_with_a_right_name_belongs_to_that_effect():
-    """Only cases that nobody can identify have none."""
+    """Only kinds that are not identifiable have no right name."""
     for kind, effect in kinds_of_effects().items():
         for name in right_names(kind, OWN_NAMES) if effect.stratum != "unidentifiable" else ():
             assert kind in library()[name].kinds
@@ -36,7 +36,7 @@ def test_relatives_are_mutual_and_are_effects_of_one_component_or_part():
     assert not relatives["sensor_gain"] and not relatives["local_pad"]
 
 
-def test_each_question_has_sites_of_every_effect_that_it_can_name(monkeypatch):
+def test_each_question_has_sites_of_every_effect_that_can_be_its_answer(monkeypatch):
     monkeypatch.setenv("TURNOUT_LEFT_OUT_SITES", "2")
     visits, changes = ({site.effect for site in bench.sites(q)} for q in ("visit", "change"))
     in_switches = {"slide_chair_gap", "heel_support", "worn_toe"}
@@ -55,8 +55,8 @@ def test_each_question_has_sites_of_every_effect_that_it_can_name(monkeypatch):
         (None, {("local_ballast", ("local_ballast", 1)), ("", ())}),
     ],
 )
-def test_what_is_left_out_is_no_form_of_another_effect(families, forms):
-    """A gap that is known from below was called a gap or soft ballast, although soft ballast was left out."""
+def test_an_effect_that_is_left_out_is_no_form_of_another_effect(families, forms):
+    """Formerly the answer to a gap with only a lower bound named soft ballast, although that was left out."""
     effects = [c.effect for c in PlannedCase(small_plan(), families=families).candidates]
     assert {(effect.unbounded_form, effect.simpler_form) for effect in effects} == forms
 
@@ -106,7 +106,7 @@ def test_answers_of_a_visit_without_the_effect(monkeypatch, effect, answers, out
 
 
 @pytest.mark.parametrize("visible", [[0.5, 20.0], [20.0, 0.5], 20.0])
-def test_an_effect_is_as_clear_as_in_the_visit_that_shows_it_best(monkeypatch, visible):
+def test_the_clarity_of_an_effect_is_that_of_the_visit_with_the_largest_visibility(monkeypatch, visible):
     """A single visit has one pair of shares, a history one for each visit."""
     shares = [{"hammer_pct": v, "passage_pct": 0.0} for v in (visible if isinstance(visible, list) else [visible])]
     truth = {"visible": shares if isinstance(visible, list) else shares[0]}
@@ -115,7 +115,7 @@ def test_an_effect_is_as_clear_as_in_the_visit_that_shows_it_best(monkeypatch, v
     assert bench.make_site(None, bench.Site("local_pad", "pad", 0, "plain")) is truth
 
 
-def test_answers_of_the_store_are_not_computed_again(monkeypatch, tmp_path):
+def test_stored_answers_are_not_computed_again(monkeypatch, tmp_path):
     site = bench.Site("hanging_sleeper", "void", 0, "plain")
     asked = []
 
@@ -141,7 +141,7 @@ def test_the_table_states_every_failure_and_the_interval():
     assert "Located: 1 of 3 (95 %: 1 to 91 %; bar 80 %)." in text
 
 
-def test_what_the_whole_library_does_not_see_is_counted_apart():
+def test_effects_that_the_whole_library_does_not_detect_are_counted_separately():
     sites = [bench.Site("local_pad", "pad", k, "plain") for k in range(3)]
     missing = [(s, bench.Answer(o, o)) for s, o in zip(sites, ("unknown", "none", "none"))]
     present = [(s, bench.Answer(o, o)) for s, o in zip(sites, ("right", "right", "none"))]

@@ -1,4 +1,4 @@
-"""Real hammer tests against too simple models: what was left out is found, or the answer is "unknown"."""
+"""Measured hammer tests with too simple models: the omitted effect is named, or the answer is "unknown"."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_shapes_of_a_free_beam():
     assert free_shape(LAMBDA[:1], 0.2242)[0] == pytest.approx(0.0, abs=2e-3)
 
 
-def test_a_resonance_is_read_off_a_made_response():
+def test_the_mode_of_a_synthetic_response_is_identified():
     """Two places, one mode of unit mass: frequency, damping and shape of -x²/(1 - x² + 2i zeta x)."""
     f = np.arange(50.0, 200.0, 0.25)
     x = f / 120.0
@@ -42,7 +42,7 @@ MODE = {"log_frequency": np.log(150.0), "log_damping": np.log(0.02)} | {f"shape_
         (Effect("impact_gain", "impact 2", {"gain": 0.3}), Effect("sensor_delay", "A1", {"delay": 1e-4})),
     ],
 )
-def test_derivatives_are_those_of_any_case(beam, terms):
+def test_derivatives_equal_those_by_finite_differences(beam, terms):
     """Two sensors, three impacts, one of them away from the sensors, two modes and a rigid body."""
     rng, f = np.random.default_rng(4), np.arange(50.0, 400.0, 0.5)
     shapes, h = rng.normal(size=(2, 3)), 0.0
@@ -59,14 +59,15 @@ def test_derivatives_are_those_of_any_case(beam, terms):
 
 
 @pytest.mark.slow
-def test_what_was_left_out_is_named_or_answered_unknown(shared_data):
+def test_an_omitted_effect_is_named_or_the_answer_is_unknown(shared_data):
     if not (shared_data / "frf_beam_sdypy").is_dir():
         pytest.skip(f"no recordings: {shared_data}/frf_beam_sdypy does not exist")
     found = real_frfs.analyse(shared_data, ("A1", "A2", "A3", "A4", "B1", "B2"))
     said = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
     assert said["A1"] == ("named", ("mode",))
     frequency, damping = real_frfs.identified_mode(found["A1"][2])
-    assert frequency == pytest.approx(477.4, abs=0.5)  # printed by the makers; half a line, impacts differ by 0.4
+    # printed by the authors of the recording; half a line, impacts differ by 0.4
+    assert frequency == pytest.approx(477.4, abs=0.5)
     assert damping == pytest.approx(0.20, abs=0.02)
     assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
     assert said["A2"][0] == "unknown"
@@ -77,7 +78,7 @@ def test_what_was_left_out_is_named_or_answered_unknown(shared_data):
     assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
     size, half, above = real_frfs.beam_printed()  # by six frequencies, three of which lie beyond the fitted band
     assert beam.verdict.scores[0].estimates[0][0] == pytest.approx(size, abs=half)
-    assert above > 0.01  # what no effect of the library describes: so B, not A
+    assert above > 0.01  # no effect of the library describes this part: so grade B, not A
     assert beam.verification.after > beam.verification.before + 10.0
     assert said["B1"] == ("named", ("impact_gain",))
     assert found["B1"][2].fit.terms[0].where == "impact 1"

@@ -1,4 +1,4 @@
-"""Bern-Niederwangen: the closed form against the meshed track, and whether the conclusions come out again."""
+"""Bern-Niederwangen: the closed form agrees with the meshed track, and the conclusions of the page are reproduced."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from turnout.simulate.track import uniform_track
 PADS = {"pad_stiffness": 8e8, "pad_loss_factor": 0.2, "sleeper_mass": 150.0, "ballast_stiffness": 1e8}
 
 
-def test_the_closed_form_is_the_meshed_track():
+def test_the_closed_form_agrees_with_the_meshed_track():
     """Vertical, 100 to 1600 Hz: 4 %, but 0.2 dB/m at the pinned-pinned band, whose depth is the mesh's damping."""
     rail = Rail(VERTICAL.bending, VERTICAL.mass, VERTICAL.shear, VERTICAL.rotary, damping=0.0)
     more = {"pad_damping": 0.0, "ballast_damping": 0.0, "ballast_loss_factor": 1.0, "elements_per_bay": 8}
@@ -24,7 +24,7 @@ def test_the_closed_form_is_the_meshed_track():
     assert np.all(np.abs(closed - meshed) < 0.04 * meshed + np.where(BANDS[:13] == 1000.0, 0.2, 0.0)), (closed, meshed)
 
 
-def test_a_free_rail_decays_by_its_loss():
+def test_the_decay_rate_of_a_free_rail_follows_from_its_loss_factor():
     """Far above the resonance of very soft pads: 8.686 eta k / 4, twice that as the near field doubles what the force's
     own place feels; k the wavenumber [rad/m]; 10 %."""
     beam, eta, f = LATERAL, 0.02, np.array([400.0])
@@ -54,7 +54,7 @@ def folder(shared_data):
 
 
 @pytest.mark.slow
-def test_the_conclusions_and_their_page_come_out_again(folder, tmp_path):
+def test_the_conclusions_and_their_page_are_reproduced(folder, tmp_path):
     """As by the method without a model, docs/niederwangen_decay_rate.md: S1, S4, S5 changed by 2013-01, S2 did not."""
     measured, answers = niederwangen.read(folder), niederwangen.analyse(folder, report=lambda line: None)
     said = {m.section: niederwangen.conclusion(answers[m.section][1]) for m in measured}
