@@ -1,4 +1,4 @@
-"""config/acknowledgements.csv: entered by command or by hand, rejected with place and remedy."""
+"""config/acknowledgements.csv: lines entered by command or by hand; errors state the line and the remedy."""
 
 import shutil
 from datetime import UTC, datetime, time
@@ -44,7 +44,7 @@ def test_an_alarm_is_acknowledged_and_silenced_by_command(configuration):
     assert first["acknowledgement_id"] != second["acknowledgement_id"]
 
 
-def test_a_line_that_was_written_is_done_though_the_registry_cannot_be_read(configuration, tmp_path, capsys):
+def test_the_command_succeeds_after_writing_a_line_although_the_registry_is_unreadable(configuration, tmp_path, capsys):
     """The comparison with the open alarms is a remark: exit code 2 would state that nothing was written."""
     turnout, _ = place_of(configuration)
     register([], tmp_path / "registry", read=iter)
@@ -56,8 +56,8 @@ def test_a_line_that_was_written_is_done_though_the_registry_cannot_be_read(conf
     assert len(load_configuration(configuration).acknowledgements) == 1
 
 
-def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys):
-    """An alarm of the ballast, open since February: only the one said after it, of its band, changes the list."""
+def test_an_acknowledgement_without_a_matching_alarm_is_reported(configuration, tmp_path, capsys):
+    """An alarm of the ballast is open since February. Only a later acknowledgement of its band changes the list."""
     turnout, label = place_of(configuration)
     alarm = {
         "alarm_id": "a", "turnout_id": turnout, "section_id": f"{turnout}/{label}", "band": "ballast",
@@ -77,7 +77,7 @@ def test_an_acknowledgement_of_no_alarm_is_said(configuration, tmp_path, capsys)
         assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
-def test_a_suppression_may_be_planned_and_an_alarm_is_not_seen_before_its_day(configuration, capsys):
+def test_a_suppression_may_begin_later_and_an_acknowledgement_may_not(configuration, capsys):
     turnout, label = place_of(configuration)
     said = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
     assert main(["acknowledge", f"{turnout}/{label}", *said]) == 2
@@ -97,7 +97,7 @@ CHART = {
 
 
 @pytest.mark.parametrize("band", ["amplitude", "ballast", "railpad"])
-def test_each_band_of_a_section_is_silenced_by_itself(configuration, band):
+def test_a_suppression_of_one_band_leaves_the_other_bands(configuration, band):
     turnout, label = place_of(configuration)
     place = {"turnout_id": turnout, "section_id": f"{turnout}/{label}"}
     said = ["--by", "me", "--reason", "sensor loose", "--at", "2026-05-30", "--configuration", str(configuration)]
@@ -123,7 +123,7 @@ def test_each_band_of_a_section_is_silenced_by_itself(configuration, band):
     assert charted == dict.fromkeys(bands, "inspect this week") | {band: "suppressed"}
 
 
-def test_the_registry_takes_what_is_said_of_passing_trains(tmp_path):
+def test_the_registry_accepts_an_acknowledgement_of_amplitudes_of_trains(tmp_path):
     cells = dict(
         turnout="T1", section="A", band="amplitude", action="acknowledge", by="me", at="2026-06-02", reason="x"
     )
@@ -134,7 +134,7 @@ def test_the_registry_takes_what_is_said_of_passing_trains(tmp_path):
         assert con.execute("select section_id, band from acknowledgements").fetchall() == [("T1/A", "amplitude")]
 
 
-def test_a_registry_knows_the_day_on_which_it_was_made(tmp_path):
+def test_a_registry_states_the_day_on_which_it_was_computed(tmp_path):
     before = datetime.now(UTC).date()
     register([], tmp_path / "registry", read=iter)
     with open_registry(tmp_path / "registry") as con:
@@ -142,7 +142,7 @@ def test_a_registry_knows_the_day_on_which_it_was_made(tmp_path):
     assert before <= at.date() <= datetime.now(UTC).date() and at.time() == time()
 
 
-def test_no_file_means_that_nobody_has_said_anything(tmp_path):
+def test_a_missing_file_means_that_there_are_no_acknowledgements(tmp_path):
     assert read_acknowledgements(tmp_path / "acknowledgements.csv") == ([], [])
 
 
@@ -171,7 +171,7 @@ def test_a_bad_line_is_rejected_with_its_place(tmp_path, line, complaint):
     assert "line 3" in str(errors[0]) and complaint.lower() in str(errors[0]).lower()
 
 
-def test_every_error_of_a_line_is_said(tmp_path):
+def test_every_error_of_a_line_is_reported(tmp_path):
     path = tmp_path / "acknowledgements.csv"
     path.write_text(HEADER + "T1,,ballst,suppres,me,1.1.2026,,x\n", encoding="utf-8")
     _, errors = read_acknowledgements(path, turnout_ids=("T1",), variants=SECTIONS)
@@ -201,8 +201,8 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     assert "acknowledgements.csv, line 3, column 1: turnout 'nowhere' has no row" in capsys.readouterr().out
 
 
-def test_a_suppression_ends_on_its_day_though_no_file_has_come(configuration, tmp_path):
-    """The same registry, asked on the day before and on the day that a silence ends; work that is planned begins."""
+def test_a_suppression_ends_on_its_day_also_without_new_files(configuration, tmp_path):
+    """The same registry on the days before and after the end of a suppression, and on a day of planned work."""
     import numpy as np
     from benchmarks.trend_fleet import Fleet, drift, modes
     from benchmarks.trend_registry import small_registry
@@ -237,14 +237,14 @@ def test_a_suppression_ends_on_its_day_though_no_file_has_come(configuration, tm
     assert listed["2018-05-02"] == listed["2018-05-03"] == ["inspect this week"]
 
 
-def test_a_suppression_that_is_over_is_not_written(configuration, capsys):
+def test_the_command_rejects_a_suppression_that_has_ended(configuration, capsys):
     turnout, _ = place_of(configuration)
     said = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]
     assert main(["acknowledge", turnout, "--suppress-until", "2020-01-01", *said]) == 2
     assert "is not after at" in capsys.readouterr().err and not (configuration / "acknowledgements.csv").exists()
 
 
-def test_an_unknown_section_is_not_written(configuration, capsys):
+def test_the_command_rejects_an_unknown_section(configuration, capsys):
     turnout, _ = place_of(configuration)
     code = main(
         ["acknowledge", f"{turnout}/nowhere", "--by", "me", "--reason", "x", "--configuration", str(configuration)]
@@ -253,7 +253,7 @@ def test_an_unknown_section_is_not_written(configuration, capsys):
     assert not (configuration / "acknowledgements.csv").exists()
 
 
-def test_maintenance_is_entered_by_command_and_a_bad_one_taken_back(configuration, capsys):
+def test_a_command_enters_maintenance_and_rejects_an_unknown_kind(configuration, capsys):
     turnout, label = place_of(configuration)
     before = (configuration / "events.csv").read_text()
     base = ["--configuration", str(configuration)]

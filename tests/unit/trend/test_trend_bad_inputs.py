@@ -1,4 +1,4 @@
-"""Every bad input of a chart has one defined outcome. docs/trends.md explains each to the user."""
+"""Every bad input of a chart has one defined result. docs/trends.md explains each to the user."""
 
 import numpy as np
 import pandas as pd
@@ -51,7 +51,7 @@ def test_two_events_on_one_day_make_one_epoch(settings):
     assert b.prepared.epoch.max() == 1 and np.array_equal(a.z, b.z, equal_nan=True)
 
 
-def test_three_points_are_learning_and_raise_nothing(settings):
+def test_a_chart_with_three_points_learns_and_raises_no_alarm(settings):
     rows = modes(Fleet(turnouts=1, weeks=3), 1)
     status, charts = status_of(rows, settings)
     sections = status[status["section_id"] != "*"]
@@ -85,7 +85,7 @@ def test_a_gap_of_two_years_holds_the_chart_and_a_change_across_it_is_found(sett
     assert set(in_gap["state"]) == {"not_measured"}
 
 
-def test_half_of_the_temperatures_missing_makes_those_campaigns_silent_not_wrong(settings):
+def test_campaigns_without_a_temperature_are_not_judged(settings):
     rows = modes(FLEET, 1)
     week = ((rows["measured_at_utc"] - rows["measured_at_utc"].min()).dt.days // 7).to_numpy()
     rows.loc[week % 2 == 0, "rail_temperature_c"] = np.nan
@@ -107,7 +107,7 @@ def test_without_any_temperature_the_chart_cannot_tell(settings):
 
 
 def test_a_thermometer_that_stops_after_the_baseline_leaves_charts_that_cannot_tell(settings):
-    """Fourteen months with temperatures, sixteen without: nothing was judged. A fall by a fifth is no temperature."""
+    """Fourteen months have temperatures; the other sixteen are not judged. A fall by a fifth has another cause."""
     rows = plain(modes(FLEET, 1))
     cold = rows["measured_at_utc"] >= rows["measured_at_utc"].min() + pd.Timedelta(weeks=60)
     rows.loc[cold, "rail_temperature_c"] = np.nan
@@ -117,20 +117,21 @@ def test_a_thermometer_that_stops_after_the_baseline_leaves_charts_that_cannot_t
     assert set(status.loc[fallen, "state"]) == {"confirm_now"}
     assert set(status.loc[~fallen, "state"]) == {"cannot_tell"}
     assert set(status.loc[~fallen & (status["section_id"] != "*"), "reason"]) == {"no_temperature"}
-    # 70 days after the last temperature it is a gap like others: 90 days make a chart stale
+    # 70 days after the last temperature the gap is like any other: a chart is stale after 90 days
     soon, _ = status_of(rows, settings, as_of=rows.loc[~cold, "measured_at_utc"].max() + pd.Timedelta(days=70))
     assert set(soon.loc[~soon["section_id"].isin(["*", "T00000/S5"]), "state"]) == {"ok"}
 
 
 def test_a_thermometer_that_stood_still_during_the_baseline_raises_no_alarms(settings):
-    """20 turnouts whose thermometer showed 20 °C for a year and works since: nobody knows their slopes."""
+    """20 turnouts whose thermometer showed 20 °C for a year and works since: their slopes are unknown."""
     fleet = Fleet(turnouts=20, weeks=156, phi=0.0)
     rows = modes(fleet, 3)
     stuck = (rows["measured_at_utc"] < pd.Timestamp("2017-01-16")).to_numpy()
     noise = 0.1 * np.random.default_rng(4).standard_normal(len(rows))
     rows.loc[stuck, "rail_temperature_c"] = 20.0 + noise[stuck]
     status, charts = status_of(rows, settings)
-    assert len(alarm_rows(charts, settings)) <= 2  # of 180 charts over two years; such a fleet is promised one
+    # of 180 charts over two years; one false alarm is promised for such a fleet
+    assert len(alarm_rows(charts, settings)) <= 2
     # a slope of 0 ± 0.5 %/°C in seasons of ±15 °C: no change of 1.5 % can be distinguished from the season
     assert set(status["state"]) == {"cannot_tell"} and set(status["reason"]) == {"too_noisy"}
     assert status["detectable_pct"].min() > 4.0
@@ -163,7 +164,7 @@ def test_a_turnout_whose_sections_are_in_alarm_is_not_called_unmeasured(settings
     assert set(late[late["section_id"] == "*"]["reason"]) == {"too_long_ago"}
 
 
-def test_missing_campaigns_do_not_wake_the_chart(settings):
+def test_missing_campaigns_raise_no_alarm(settings):
     # Taking a third of the campaigns of every section away must not raise alarms in an intact turnout.
     rows = modes(Fleet(turnouts=40, weeks=156, phi=0.2, missing=0.33), 3)
     _, charts = status_of(rows, settings)
@@ -181,7 +182,7 @@ def test_of_two_values_in_one_campaign_the_later_counts(settings):
     assert charts.prepared.panel.frequency[0, -1] == 444.0
 
 
-def test_an_open_alarm_closes_with_the_work_and_learns_again(settings):
+def test_maintenance_closes_an_open_alarm_and_the_chart_learns_again(settings):
     which = np.zeros((1, 8), bool)
     which[0, 2] = True
     rows = modes(FLEET, 4, step(FLEET, which, -3.0, 80))
@@ -212,7 +213,7 @@ def test_a_noisier_campaign_weighs_less(settings):
     assert a.down_open[2].any() and not b.down_open[2].any()
 
 
-def test_sections_that_fall_far_raise_no_alarm_in_a_sound_one(settings):
+def test_large_falls_of_some_sections_raise_no_alarm_in_an_intact_section(settings):
     # Three of eight fall by 10 %: the median of the others moves by .9 sd (order statistics of four of seven).
     which = np.zeros((1, 8), bool)
     which[0, [1, 4, 6]] = True
@@ -223,7 +224,7 @@ def test_sections_that_fall_far_raise_no_alarm_in_a_sound_one(settings):
         assert not charts.is_sibling[which[0], 90:].any() and charts.is_sibling[~which[0], 90:].all()
 
 
-def test_ballast_as_noisy_as_printed_in_the_paper_cannot_see(settings):
+def test_with_the_spread_of_the_paper_a_chart_of_the_ballast_is_too_noisy(settings):
     # Table 3 of the paper, ballast: frequency and printed spread, taken as one sigma of a campaign.
     printed = {"OT": (154.6, 11.7), "SP": (167.2, 7.0), "CLP": (105.9, 20.0), "CP A7": (99.6, 5.2),
                "CP A8": (174.0, 2.7), "CP A9": (115.8, 17.6), "AS main": (155.6, 24.4),
@@ -240,13 +241,13 @@ def test_ballast_as_noisy_as_printed_in_the_paper_cannot_see(settings):
 
 
 def dated(rows, days):
-    """The campaigns of some weeks with other dates, {week: day}, as somebody may have typed them."""
+    """The campaigns of some weeks with other dates, {week: day}, like typing errors."""
     week = ((rows["measured_at_utc"] - rows["measured_at_utc"].min()).dt.days + 1) // 7
     return rows.assign(measured_at_utc=week.map(pd.to_datetime(pd.Series(days))).fillna(rows["measured_at_utc"]))
 
 
 def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(settings):
-    """2000 for 2016: with it a baseline had its year after twelve weeks, before it had seen a summer."""
+    """2000 for 2016: formerly a baseline was then complete after twelve weeks, without a summer."""
     rows = modes(FLEET, 1)
     far = dated(rows, {5: "2000-02-08 10:00"})
     status, charts = status_of(far, settings)
@@ -267,8 +268,8 @@ def test_an_acceptance_test_some_years_before_counts_and_so_do_two_old_campaigns
     assert not (shown["state"] == "wrong_time").any()
 
 
-def followed_alone(since, bad_first=1.0, fall=0.0):
-    """S2 is tamped before week 60 and visited alone from week ``since`` to 73; from week 90 on it may have fallen."""
+def measured_alone(since, bad_first=1.0, fall=0.0):
+    """S2 is tamped before week 60 and measured alone from week ``since`` to 73; from week 90 on it may fall."""
     fleet = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.6)
     one = (np.arange(8) == 2)[None, :]
     rows = plain(modes(fleet, 1, step(fleet, one, fall, 90)))
@@ -278,8 +279,8 @@ def followed_alone(since, bad_first=1.0, fall=0.0):
     return rows[~alone], events(["T00000/S2", "2017-02-27", "tamping"])
 
 
-def test_a_section_that_was_followed_alone_after_its_work_is_judged_with_the_others_again(settings):
-    rows, work = followed_alone(60, fall=-6.0)
+def test_a_section_measured_alone_after_maintenance_is_later_compared_with_the_others_again(settings):
+    rows, work = measured_alone(60, fall=-6.0)
     status, charts = status_of(rows, settings, work)
     changed = section(status)
     assert tuple(changed[["state", "direction"]]) == ("alarm", "down")
@@ -289,9 +290,9 @@ def test_a_section_that_was_followed_alone_after_its_work_is_judged_with_the_oth
     assert before < 0.75 < after
 
 
-def test_one_campaign_does_not_say_how_a_section_differs_from_the_others_after_its_work(settings):
-    """Its first value after the work, the only one beside the others, is 3 % too high: a twelfth of its level."""
-    rows, work = followed_alone(61, bad_first=1.03)
+def test_one_common_campaign_after_maintenance_does_not_fix_the_level_of_a_section(settings):
+    """Only the first value after maintenance is measured with the others. It is 3 % too high: a twelfth of the level."""
+    rows, work = measured_alone(61, bad_first=1.03)
     status, charts = status_of(rows, settings, work)
     raised = alarm_rows(charts, settings)
     assert raised[raised["section_id"] == "T00000/S2"].empty and section(status)["state"] in ("ok", "cannot_tell")

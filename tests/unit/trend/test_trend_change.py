@@ -1,4 +1,4 @@
-"""Date and size of a change: against statsmodels and ruptures, and do the intervals hold the truth."""
+"""Date and size of a change: against statsmodels and ruptures; and the intervals contain the true values."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from turnout.trend.change_point import find_change, fit_onsets
 
 
 def irregular(rng, n, spacing):
-    """Campaigns that come up to 40 % of their spacing too early or too late, an eighth of them missing."""
+    """Campaigns up to 40 % of their spacing too early or too late; an eighth of them is missing."""
     time = np.arange(n) * spacing + rng.uniform(-0.4, 0.4, n) * spacing
     return time[rng.random(n) > 0.125]
 
@@ -49,7 +49,7 @@ def test_every_onset_equals_generalised_least_squares(phi, warm):
             assert found.weight[j] == pytest.approx(oracle.scale / oracle.bse[1] ** 2, rel=1e-8)
 
 
-def test_a_slope_known_beforehand_is_one_more_measurement_of_it():
+def test_a_prior_of_the_slope_acts_like_one_more_measurement():
     # Ridge regression is least squares with a further row, 0 = sqrt(known) b + noise.
     rng = np.random.default_rng(5)
     time, temperature = np.arange(20) * 35.0, rng.normal(10.0, 9.0, 20)
@@ -64,7 +64,7 @@ def test_a_slope_known_beforehand_is_one_more_measurement_of_it():
         assert found.rss[j] == pytest.approx(oracle.ssr, rel=1e-8)
 
 
-def test_the_best_step_is_where_ruptures_puts_it():
+def test_the_best_step_agrees_with_ruptures():
     ruptures = pytest.importorskip("ruptures")
     rng = np.random.default_rng(6)
     for n in (9, 40, 301):
@@ -77,7 +77,7 @@ def test_the_best_step_is_where_ruptures_puts_it():
             assert time[break_at - 1] < best < time[break_at]
 
 
-def test_the_interval_of_the_size_is_that_of_the_mixture_by_brute_force():
+def test_the_interval_of_the_size_agrees_with_a_numerical_integration():
     # The posterior on a grid of onset, size and scatter, nothing integrated in closed form.
     rng = np.random.default_rng(4)
     time = np.arange(14) * 35.0
@@ -106,7 +106,7 @@ CASES = [
 ]  # fmt: skip
 
 
-def test_intervals_of_date_and_size_hold_the_truth_in_95_of_100():
+def test_95_percent_of_the_intervals_of_date_and_size_contain_the_truth():
     rng, n = np.random.default_rng(12), 150
     held = []
     for kind, percent, phi, after in CASES:
@@ -124,7 +124,7 @@ def test_intervals_of_date_and_size_hold_the_truth_in_95_of_100():
     assert np.mean(held, axis=0) == pytest.approx([0.95, 0.95], abs=0.02 + 2 * 0.0067)
 
 
-def test_the_kind_is_named_where_it_can_be_told():
+def test_clear_steps_and_drifts_are_distinguished():
     rng, time = np.random.default_rng(7), np.arange(104) * 7.0
     right = []
     for i in range(60):
@@ -147,7 +147,7 @@ def test_a_change_without_scatter_is_found_exactly():
     assert (found.low, found.high) == pytest.approx((-2.0, -2.0), abs=1e-4)
 
 
-def test_the_size_of_a_clear_step_has_students_interval():
+def test_the_interval_of_a_clear_step_is_that_of_students_t():
     """The two-sample interval in closed form, with one degree of freedom less for the onset."""
     values = 0.1 * np.array([1, -2, 0.5, 1.5, -1, 0, 2, -1.5, 0.5, -0.5, 1, -1.5])
     values[6:] -= 10.0

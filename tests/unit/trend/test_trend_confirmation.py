@@ -1,4 +1,4 @@
-"""A campaign far outside is named the same day, and raises no alarm alone."""
+"""A campaign far outside its expected range is listed on the same day, and raises no alarm alone."""
 
 import numpy as np
 import pandas as pd
@@ -44,7 +44,7 @@ def test_a_loss_of_twenty_percent_is_on_the_list_the_same_day(settings, weeks, e
     assert len(found) <= 21  # nothing else of 160 charts; the sections of one turnout share a row
 
 
-def test_what_the_row_says_and_what_to_repeat(settings):
+def test_the_row_states_the_deviation_and_the_campaign_to_repeat(settings):
     fleet = Fleet(turnouts=2, weeks=60, band="ballast", frequency=150.0)
     with evaluated_views(with_loss(fleet, 5, 33.0, [-1]), settings) as con:
         row = con.execute("select * from worklist order by rank limit 1").df().iloc[0]
@@ -58,7 +58,7 @@ def test_what_the_row_says_and_what_to_repeat(settings):
     assert ("confirm now", 2) in states
 
 
-def test_a_loss_of_the_whole_turnout_is_named_too(settings):
+def test_a_loss_of_the_whole_turnout_is_listed_as_well(settings):
     fleet = Fleet(turnouts=2, weeks=60)
     with evaluated_views(with_loss(fleet, 5, 20.0, [-1], range(8)), settings) as con:
         rows = listed(con)
@@ -67,7 +67,7 @@ def test_a_loss_of_the_whole_turnout_is_named_too(settings):
     assert all(s.startswith("whole turnout: the campaign of") and "; likewise S0, S1, S2" in s for (s,) in sentences)
 
 
-def test_two_campaigns_are_an_alarm_and_a_normal_one_ends_it(settings):
+def test_two_low_campaigns_raise_an_alarm_and_a_normal_campaign_ends_the_confirmation(settings):
     fleet = Fleet(turnouts=5, weeks=60)
     with evaluated_views(with_loss(fleet, 5, 20.0, [-2, -1]), settings) as con:
         assert not listed(con) and len(listed(con, "inspect this week")) == 5
@@ -75,8 +75,8 @@ def test_two_campaigns_are_an_alarm_and_a_normal_one_ends_it(settings):
         assert not listed(con) and not listed(con, "inspect this week")
 
 
-def test_the_day_of_the_campaign_is_remembered(settings):
-    """A list of an earlier day names what stood out then."""
+def test_the_list_of_an_earlier_day_names_the_campaign_of_that_day(settings):
+    """The list of that day still asks for the confirmation, also after later campaigns."""
     rows = with_loss(Fleet(turnouts=3, weeks=60), 5, 20.0, [-3])
     day = sorted(rows["measured_at_utc"].unique())[-3]
     with evaluated_views(rows, settings) as con:
@@ -84,7 +84,7 @@ def test_the_day_of_the_campaign_is_remembered(settings):
         assert sorted(then.fetchall()) == [(f"T{i:05d}", "S0") for i in range(3)]
 
 
-def test_work_after_the_campaign_and_a_suppression_take_it_off(settings):
+def test_later_maintenance_or_a_suppression_removes_the_request_for_a_confirmation(settings):
     rows = with_loss(Fleet(turnouts=2, weeks=60), 5, 20.0, [-1])
     newest = rows["measured_at_utc"].max()
     work = {"event_id": ["e"], "turnout_id": ["T00000"], "section_id": [None], "kind": ["tamping"]}
@@ -127,7 +127,7 @@ def test_no_single_outlier_of_ten_thousand_raises_an_alarm():
     limits = (np.full(z.shape, k), np.full(n, h), np.full(z.shape, 3.0), np.full(n, 0.6 * h))
     alarms = [cusum(values, *limits, on, off)[1] for values in (bad, gone)]
     new = (alarms[0] & ~alarms[1]).any(axis=1)
-    # Only a second outlier next to it, by chance, makes an alarm of it: 2 x P(z < -3.36 sd) = 8e-4.
+    # It raises an alarm only if a second outlier is next to it by chance: 2 x P(z < -3.36 sd) = 8e-4.
     assert (np.minimum(z[new, 29], z[new, 31]) < -3.0).all() and new.sum() < 20
 
 
@@ -151,7 +151,7 @@ def test_outliers_in_sql_equal_the_chart_and_a_loop(settings):
     assert np.abs(loop - chart).max() < 1e-8 and (charts["z"].abs() > 3.0).sum() > 20
 
 
-def test_the_page_has_a_colour_of_its_own():
+def test_confirm_now_has_its_own_colour_on_the_page():
     section = {"section_id": "t/S0", "label": "S0", "position_m": 1.0, "track": "main", "panel": "open_track"}
     svg = diagram([section], {"t/S0": "confirm now"})
     assert "state-confirm" in svg and badge("confirm now") == "confirm"
@@ -164,7 +164,7 @@ def test_the_page_has_a_colour_of_its_own():
 
 
 @pytest.mark.parametrize(("percent", "state"), [(1.0, "plan"), (3.0, "inspect this week")])
-def test_nobody_is_sent_out_for_a_change_below_the_target(settings, percent, state):
+def test_a_change_below_the_target_needs_no_inspection(settings, percent, state):
     """A precise chart raises an alarm for 1 %; the target is 1.5 %."""
     fleet = Fleet(turnouts=2, weeks=110, sigma=0.1, campaign=0.1, thermometer=0.1, phi=0.0)
     rows = with_loss(fleet, 5, percent, range(56, 110))

@@ -1,4 +1,4 @@
-"""A curved temperature law raises no alarms of turnouts or of sections without siblings; a true loss is still seen."""
+"""A curved temperature law raises no alarms of turnouts or lone sections; a true loss is still detected."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ YEAR, TURNOUTS = 52, 120
 
 
 def alarms_of_turnouts(curvature, change=None):
-    """Alarms that open in the charts of whole turnouts, over the number promised; share of turnouts in alarm."""
+    """Alarms in the charts of whole turnouts over their promised number, and the share of turnouts in alarm."""
     fleet = Fleet(turnouts=TURNOUTS, weeks=4 * YEAR, phi=0.2, curvature=curvature)
     charts = evaluate(modes(fleet, 9412, change), None, SETTINGS)
     n = fleet.charts
@@ -27,16 +27,16 @@ def alarms_of_turnouts(curvature, change=None):
 
 @pytest.mark.parametrize("curvature", [0.0, -0.005])  # %/°C²
 def test_a_curved_law_raises_no_more_alarms_of_turnouts_than_promised(curvature):
-    """Before, 2.5 times the promised number at -0.005 %/°C²; three alarms are promised here."""
+    """Formerly there were 2.5 times the promised number at -0.005 %/°C²; three alarms are promised here."""
     assert alarms_of_turnouts(curvature)[0] < 1.2
 
 
-def test_a_loss_of_a_whole_turnout_with_a_curved_law_is_seen():
+def test_a_loss_of_a_whole_turnout_with_a_curved_law_is_detected():
     change = -1.5 * (np.arange(4 * YEAR) >= 2 * YEAR)
     assert alarms_of_turnouts(-0.005, change)[1] > 0.95
 
 
-def test_of_a_straight_law_the_curvature_by_chance_is_shrunk_and_a_clear_one_is_kept():
+def test_a_curvature_by_chance_shrinks_and_a_clear_curvature_stays():
     """Shrinkage by 1 - 1/F leaves a fifth to a half of the mean square of a curvature by chance (0.33 of F(1, 49))."""
     rng = np.random.default_rng(1)
     temperature = 12.0 + 15.0 * rng.standard_normal((4000, 52))
@@ -52,7 +52,7 @@ def test_of_a_straight_law_the_curvature_by_chance_is_shrunk_and_a_clear_one_is_
     assert np.mean(curved.quadratic) == pytest.approx(-0.02, rel=0.005)
 
 
-def test_the_term_is_that_of_a_polynomial_fit():
+def test_the_temperature_term_is_that_of_a_polynomial_fit():
     rng = np.random.default_rng(2)
     temperature = rng.uniform(-10.0, 40.0, (1, 30))
     values = 0.3 - 0.1 * temperature - 0.01 * temperature**2 + 0.1 * rng.standard_normal((1, 30))
@@ -64,21 +64,21 @@ def test_the_term_is_that_of_a_polynomial_fit():
 
 
 def lone_sections(curvature, turnouts, change=None):
-    """Charts of turnouts of two sections, none of which has siblings enough."""
+    """Charts of turnouts with two sections, none of which has enough siblings."""
     fleet = Fleet(turnouts=turnouts, sections=2, weeks=4 * YEAR, phi=0.2, curvature=curvature)
     return evaluate(modes(fleet, 9413, change), None, SETTINGS)
 
 
 @pytest.mark.parametrize("curvature", [0.0, -0.005])  # %/°C²
 def test_a_curved_law_raises_no_more_alarms_of_lone_sections_than_promised(curvature):
-    """With straight laws 1.45 times the promised number at -0.005 %/°C²; 22 alarms are promised here."""
+    """Straight laws give 1.45 times the promised number at -0.005 %/°C²; 22 alarms are promised here."""
     charts = lone_sections(curvature, 360)
     opened = np.diff(np.stack([charts.down_open, charts.up_open]).astype(int), axis=2, prepend=0) > 0
     promised = 1.0 / SETTINGS.run_length_loss + 1.0 / SETTINGS.run_length_gain
     assert opened.sum() / (np.isfinite(charts.z[:, YEAR:]).sum() * promised) < 1.2
 
 
-def test_a_loss_of_a_lone_section_with_a_curved_law_is_seen():
+def test_a_loss_of_a_lone_section_with_a_curved_law_is_detected():
     change = -3.0 * (np.arange(4 * YEAR) >= 2 * YEAR)
     assert lone_sections(-0.005, 60, change).down_open[:120].any(axis=1).mean() > 0.95
 

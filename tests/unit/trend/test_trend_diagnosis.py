@@ -1,4 +1,4 @@
-"""An alarm and the diagnosis of the same section: one statement in the worklist, or why there is none."""
+"""An alarm and the diagnosis of the same section: the worklist has one statement, or states why there is none."""
 
 import numpy as np
 import pandas as pd
@@ -81,12 +81,12 @@ def test_alarm_and_diagnosis_of_change_are_one_row_with_one_result(settings, row
     ],
     ids=["no track file", "cannot tell", "unknown", "too old"],
 )
-def test_a_diagnosis_without_a_result_says_why(settings, rows, more, weeks_ago, expected):
+def test_a_diagnosis_without_a_result_states_the_reason(settings, rows, more, weeks_ago, expected):
     found_at = rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago)
     assert expected in diagnosis_of(rows, settings, change_findings=change(found_at, **more))[0]
 
 
-def test_where_alarm_and_diagnosis_differ_the_row_says_in_what(settings, rows):
+def test_the_row_states_how_alarm_and_diagnosis_differ(settings, rows):
     newest = rows["measured_at_utc"].max()
     early, late = diagnosis_of(rows, settings)[1]
     after = {"onset_after_utc": late + pd.Timedelta(days=9), "onset_by_utc": late + pd.Timedelta(days=30)}
@@ -109,7 +109,7 @@ def test_where_alarm_and_diagnosis_differ_the_row_says_in_what(settings, rows):
     ],
     ids=["component", "direction", "position", "a stretch around it"],
 )
-def test_another_component_direction_or_position_is_no_decision(settings, rows, more, expected):
+def test_a_diagnosis_of_another_component_direction_or_position_gives_no_decision(settings, rows, more, expected):
     sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
     findings = change(rows["measured_at_utc"].max(), **more)
     with evaluated_views(rows, settings, change_findings=findings, sections=sections) as con:
@@ -122,8 +122,8 @@ def test_another_component_direction_or_position_is_no_decision(settings, rows, 
     assert diagnosis.startswith("no decision: ") == (expected is not None)
 
 
-def test_more_impacts_are_no_advice_for_a_chart_of_trains(settings, rows):
-    """Only the recordings of a chart can show more."""
+def test_the_advice_for_a_chart_of_trains_is_more_trains(settings, rows):
+    """Only recordings of the same kind improve a chart."""
     noise = np.exp(np.random.default_rng(1).normal(0.0, 0.3, len(rows)))
     peaks = rows.assign(band="amplitude", source="passage", frequency_hz=100.0 * noise)
     query = "select distinct source, look_at from worklist where state = 'cannot tell'"
@@ -175,8 +175,8 @@ SLEEPERS = "voids and wet or fouled ballast under the sleepers from 20.4 to 22.2
     ],
     ids=["a sleeper", "a stretch", "without a name", "no support", "more than 3 m away", "older than the alarm"],
 )
-def test_what_to_look_at_are_the_sleepers_of_the_diagnosis(settings, rows, weeks_ago, more, expected):
-    """Of the alarms alone one would look at the pads of the section, and of trains at its running surface."""
+def test_the_worklist_names_the_sleepers_of_the_diagnosis(settings, rows, weeks_ago, more, expected):
+    """Alarms alone would name the pads of the section, and alarms of trains its running surface."""
     sections = pd.DataFrame([{"section_id": SECTION, "turnout_id": "T00001", "label": "S4", "position_m": 21.6}])
     findings = change(rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago), **more)
     tables = {"change_findings": findings, "sections": sections}

@@ -1,4 +1,4 @@
-"""What the page of the fleet says of charts that learn: the first baseline apart from a level after recorded work."""
+"""The page of the fleet counts charts with a first baseline and charts that learn after maintenance separately."""
 
 import pandas as pd
 from benchmarks.trend_fleet import Fleet, modes
@@ -40,6 +40,6 @@ def test_twenty_weekly_campaigns_are_nineteen_weeks_of_a_baseline(settings):
     assert kinds["resonance"] == 8 * kinds["whole turnout"] and set(kinds) <= {"resonance", "whole turnout", "damping"}
 
 
-def test_charts_that_learn_a_level_after_tamping_are_counted_apart(settings):
+def test_charts_that_learn_a_level_after_tamping_are_counted_separately(settings):
     learning = source_of(80, settings, tamped=4).learning()
     assert learning["n"] == 0 and learning["n_again"] > 0 and learning["n_campaigns"] == 0

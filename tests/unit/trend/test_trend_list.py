@@ -1,4 +1,4 @@
-"""The list of the morning: nothing that is open goes missing, what is planned or silenced ends on its day."""
+"""The worklist keeps all open alarms, and plans and suppressions end on their day."""
 
 import shutil
 from dataclasses import replace
@@ -40,7 +40,7 @@ def fallen(weeks=120):
     return modes(fleet, 3, drift(fleet, which, -4.0, 60))
 
 
-def test_a_fresh_collapse_comes_before_old_drifts_and_no_open_alarm_is_cut(settings):
+def test_a_recent_large_loss_precedes_old_drifts_and_no_open_alarm_is_cut_off(settings):
     fleet, which = Fleet(turnouts=30, weeks=156, phi=0.1), np.zeros((30, 8), bool)
     which[:25, 4] = True
     change = np.array(np.broadcast_to(drift(fleet, which, -1.5, 60), (30, 8, 156)))
@@ -57,7 +57,7 @@ def test_a_fresh_collapse_comes_before_old_drifts_and_no_open_alarm_is_cut(setti
     assert short == len(inspect) and rows[0][3] == long >= len(rows)
 
 
-def test_an_open_alarm_does_not_end_because_nobody_measures(settings):
+def test_an_open_alarm_stays_open_without_new_measurements(settings):
     rows = fallen()
     then = rows["measured_at_utc"].max() - pd.Timedelta(weeks=20)
     silent = rows[(rows["turnout_id"] != "T00001") | (rows["measured_at_utc"] <= then)]
@@ -81,8 +81,8 @@ def registry_of_fallen(tmp_path_factory):
     ("days", "state"),
     [(400, "inspect this week"), (1, "inspect this week"), (-40000, "inspect this week"), (0, "learning")],
 )
-def test_work_that_is_planned_resets_nothing_yet(registry_of_fallen, tmp_path, settings, days, state):
-    """An event of next year, of tomorrow, of before the first campaign, of today: that came after the last campaign."""
+def test_planned_maintenance_does_not_reset_a_chart_before_its_day(registry_of_fallen, tmp_path, settings, days, state):
+    """An event of next year, tomorrow, before the first campaign, and today after the last campaign."""
     shutil.copytree(registry_of_fallen, tmp_path, dirs_exist_ok=True)
     at = pd.Timestamp.now("UTC").tz_localize(None).floor("D") + pd.Timedelta(days=days)
     publish(tmp_path, {"events": arrow_rows("events", work("T00001", at))})
@@ -116,22 +116,22 @@ def test_a_test_before_and_one_after_work_are_two_campaigns(settings, hours):
     assert one["change_pct"] == pytest.approx(5.0, abs=3.0 * one["change_se_pct"]) and one["change_se_pct"] < 1.5
 
 
-def test_work_without_a_date_splits_nothing(settings):
+def test_maintenance_without_a_date_does_not_split_a_campaign(settings):
     rows, events = before_and_after_a_night(24)
     undated = events.assign(event_at_utc=pd.NaT)
     assert panel_of(rows, settings, events=undated).time.shape == panel_of(rows, settings).time.shape
 
 
-def test_who_measures_daily_has_campaigns_and_not_one(settings):
-    """36 hours from the first value: two days make a campaign."""
+def test_daily_measurements_form_campaigns_of_two_days(settings):
+    """A campaign lasts 36 hours from its first value."""
     rows = modes(Fleet(turnouts=1, weeks=60, phi=0.1), 3, None)
     weeks = rows["measured_at_utc"].rank(method="dense").astype(int) - 1
     daily = rows.assign(measured_at_utc=pd.Timestamp("2020-01-01") + pd.to_timedelta(weeks, unit="D"))
     assert panel_of(daily, settings).time.shape == (1, 30)
 
 
-def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
-    """Every six weeks, 1.2 % of scatter: the target is not seen within a year, half a percent a year is in six."""
+def test_a_drift_is_listed_as_plan_although_its_chart_is_too_noisy(settings):
+    """With 1.2 % of scatter every six weeks a year does not show the target, but six years show 0.5 % a year."""
     fleet = Fleet(turnouts=12, weeks=312, phi=0.0, every=6, sigma=1.2, campaign=0.3, band="ballast", frequency=150.0)
     weeks, change = np.arange(0, 312, 6), np.zeros((12, 8, 52))
     change[:8, 2, :] = -0.7 / 52.0 * np.clip(weeks - 52, 0, None)
@@ -157,10 +157,10 @@ def test_a_drift_is_planned_though_its_chart_is_too_noisy(settings):
 
 
 @pytest.mark.parametrize("named", [("T00000", "T00001"), ("T00000", "T00002"), ()])
-def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(settings, named):
+def test_a_removed_turnout_is_not_listed_and_its_history_stays(settings, named):
     rows = fallen()
     turnouts = pd.DataFrame({"turnout_id": list(named), "name": "", "line": ""})
-    kept = set(named or rows["turnout_id"])  # a registry of results alone leaves none out
+    kept = set(named or rows["turnout_id"])  # a registry without a configuration lists all turnouts
     with evaluated_views(rows, settings, turnouts=turnouts) as con:
         for asof in ("newest_measurement()", "newest_measurement() - interval 1 day"):
             listed = con.execute(
@@ -180,8 +180,8 @@ def test_a_turnout_that_was_taken_out_is_off_the_list_and_its_history_stays(sett
         assert con.execute("select count(*) from alarms where turnout_id = 'T00001'").fetchall()[0][0] >= 1
 
 
-def test_a_section_that_left_its_layout_is_off_the_list_and_its_history_stays(settings):
-    """Nobody could take it off: neither an acknowledgement nor work is accepted for a section without a layout."""
+def test_a_section_without_a_layout_is_not_listed_and_its_history_stays(settings):
+    """No user could remove it: acknowledgements and maintenance of a section without a layout are rejected."""
     rows = fallen()
     sections = pd.DataFrame({"section_id": [f"T00001/S{i}" for i in range(8)]})
     sections = sections.assign(turnout_id="T00001", label="S", left_layout=[None] * 4 + [True] + [False] * 3)
@@ -199,7 +199,7 @@ def test_a_section_that_left_its_layout_is_off_the_list_and_its_history_stays(se
         assert con.execute("select count(*) from alarms where section_id = 'T00001/S4'").fetchall()[0][0] >= 1
 
 
-def test_what_is_silenced_comes_back_on_its_day(settings):
+def test_a_suppressed_alarm_returns_on_its_day(settings):
     rows = fallen()
     newest = rows["measured_at_utc"].max()
     said = pd.DataFrame(
@@ -220,8 +220,8 @@ def test_what_is_silenced_comes_back_on_its_day(settings):
         assert con.execute(states.format(3)).fetchall() == [("inspect this week",)]
 
 
-def test_a_fleet_that_falls_silent_is_not_measured_and_its_alarm_stays(settings):
-    """Weekly charts are stale after 90 days; one that is learning after work falls silent as others."""
+def test_a_fleet_without_new_campaigns_is_not_measured_and_its_alarm_stays(settings):
+    """Weekly charts are stale after 90 days, also a chart that learns after maintenance."""
     rows = fallen()
     newest = rows["measured_at_utc"].max()
     with evaluated_views(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:
@@ -252,7 +252,7 @@ def test_sections_measured_the_day_after_are_of_the_same_campaign(settings):
     pd.testing.assert_frame_equal(*found)
 
 
-def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path, settings, capsys, monkeypatch):
+def test_the_printed_list_states_its_newest_data_and_the_unmeasured_charts(tmp_path, settings, capsys, monkeypatch):
     from turnout.cli.main import main
 
     rows = fallen()
@@ -297,11 +297,11 @@ def test_the_list_in_words_says_what_it_rests_on_and_what_it_leaves_out(tmp_path
         (12, "No answer: no chart has recent measurements by which it can be judged."),
     ],
 )
-def test_an_empty_list_of_charts_without_recent_measurements_is_no_all_clear(n_unmeasured, first_line):
+def test_an_empty_list_states_that_charts_have_no_recent_measurements(n_unmeasured, first_line):
     assert as_text([], 12, 0, n_unmeasured, datetime(2026, 5, 13)).splitlines()[0] == first_line
 
 
-def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, capsys):
+def test_without_charts_the_list_does_not_state_that_there_is_nothing_to_do(tmp_path, capsys):
     from turnout.cli.main import main
 
     small_registry(tmp_path, fallen(weeks=3))
@@ -312,14 +312,14 @@ def test_without_a_trend_nobody_is_told_that_there_is_nothing_to_do(tmp_path, ca
 @pytest.mark.parametrize(
     ("slope", "weeks", "verdict"), [(-12.0, 104, "reached"), (-40.0, 20, "reached"), (-1.0, 104, "line")]
 )
-def test_a_limit_that_is_passed_has_no_date(settings, slope, weeks, verdict):
+def test_a_limit_that_has_been_passed_has_no_date(settings, slope, weeks, verdict):
     """A straight fall of 12 %/a over two years stands at -24 %, one of 40 %/a over 20 weeks at -15 %; limit -5 %."""
     time = 7.0 * np.arange(weeks)
     values = slope * time / 365.25 + np.random.default_rng(2).normal(0.0, 0.1, weeks)
     assert forecast(time, values, 0.0, settings).verdict == verdict
 
 
-def test_points_of_a_campaign_of_two_days_are_all_red():
+def test_all_points_of_a_two_day_campaign_in_alarm_are_red():
     day = datetime(2020, 3, 1)
     chart = {"expected_low_hz": None, "expected_high_hz": None}
     charts = [
@@ -340,8 +340,8 @@ def test_points_of_a_campaign_of_two_days_are_all_red():
     assert svg.count('class="alarm"') == 2 and svg.count('class="point"') == 1
 
 
-def test_a_loss_after_a_gain_is_called_a_loss(settings):
-    """Frost lifts a section for thirty weeks; a sum sinks slowly, so the alarm is open yet when it falls."""
+def test_a_loss_after_a_gain_is_reported_as_a_loss(settings):
+    """Frost stiffens a section for thirty weeks. The cumulative sum falls slowly, so that alarm is still open."""
     fleet = Fleet(turnouts=1, weeks=106, phi=0.0, campaign=0.3, band="ballast", frequency=150.0)
     which = (np.arange(8) == 4)[None, :]
     change = step(fleet, which, 4.0, 66) + step(fleet, which, -7.0, 96)
@@ -360,7 +360,7 @@ def test_a_loss_after_a_gain_is_called_a_loss(settings):
         assert abs(since - fell) < pd.Timedelta(weeks=4)
 
 
-def test_work_on_a_whole_turnout_that_resets_nothing_is_not_hidden_by_the_siblings(settings):
+def test_the_effect_of_work_on_a_whole_turnout_is_not_removed_with_the_siblings(settings):
     """New sensors of the same type, entered as such, read 2 % more in all sections."""
     fleet = Fleet(turnouts=1, weeks=120, phi=0.0, campaign=0.3)
     rows = modes(fleet, 7, step(fleet, np.ones((1, 8), bool), 2.0, 85))

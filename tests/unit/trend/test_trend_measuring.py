@@ -1,4 +1,4 @@
-"""What docs/measuring.md promises of so many campaigns a year is what the charts can see."""
+"""The detectable changes in docs/measuring.md are those of the charts."""
 
 import re
 
@@ -11,7 +11,7 @@ from turnout.trend.detectability import detectable_shift
 from turnout.trend.threshold import threshold_for
 
 
-def seen(spread, campaigns, settings):
+def smallest_change(spread, campaigns, settings):
     """Smallest change [%] of a chart without memory, after a baseline of a year."""
     plain = settings.target_percent >= settings.allowance_switch * spread * settings.guard_large
     allowance = settings.allowance_large if plain else settings.allowance_small
@@ -20,12 +20,12 @@ def seen(spread, campaigns, settings):
     return spread * guard * detectable_shift(threshold, allowance, campaigns, max(12, campaigns), 0, round(guard, 2))
 
 
-def test_the_table_is_what_the_charts_can_see(repository):
+def test_the_table_states_the_detectable_changes_of_the_charts(repository):
     page = (repository / "docs" / "measuring.md").read_text(encoding="utf-8")
     head, *_ = re.findall(r"\| scatter \|(.*)\|", page)
     campaigns = [int(cell.split()[0]) for cell in head.split("|")]
     rows = re.findall(r"^\| ([\d.]+) % \|(.*)\|$", page, re.M)
     assert len(rows) == 4
     for spread, cells in rows:
-        expected = [seen(float(spread), n, TrendSettings()) for n in campaigns]
+        expected = [smallest_change(float(spread), n, TrendSettings()) for n in campaigns]
         assert [float(c) for c in cells.split("|")] == pytest.approx(expected, abs=0.05001)

@@ -1,4 +1,4 @@
-"""The registry of simulated modes on which the benchmark measures the night is one that the update reads."""
+"""The nightly update reads the registry of simulated modes of its benchmark."""
 
 from benchmarks.trend_registry import registry_of_modes
 

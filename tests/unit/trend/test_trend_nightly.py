@@ -1,4 +1,4 @@
-"""From a registry to a registry: derived tables, years kept, the worklist, commands."""
+"""The nightly update of a registry: derived tables, files by year, the worklist, and commands."""
 
 import shutil
 import sys
@@ -34,7 +34,7 @@ def registry(tmp_path_factory, rows, settings):
 
 @pytest.fixture(scope="module")
 def week_before(tmp_path_factory, rows, settings):
-    """The registry of a week before, and what its night remembers."""
+    """The registry of a week before, and the digests of its update."""
     root = tmp_path_factory.mktemp("week_before") / "registry"
     small_registry(root, rows[rows["measured_at_utc"] < rows["measured_at_utc"].max()])
     return root, update(root, settings)
@@ -51,13 +51,13 @@ def test_every_mode_has_its_row_and_every_chart_its_state(registry, rows):
         assert con.execute("select count(*) from chart_states").fetchall() == [(27,)]
 
 
-def test_the_same_again_commits_nothing(registry, settings):
+def test_a_second_update_of_the_same_data_commits_nothing(registry, settings):
     root, done = registry
     before = load(root)
     again = update(root, settings, done.digests)
     assert again.written == () and again.generation == done.generation
     assert load(root) == before
-    whole = update(root, settings)  # without the digests it writes, and writes the same
+    whole = update(root, settings)  # without the digests it writes the same files again
     assert load(root) == before and whole.digests == done.digests
 
 
@@ -70,7 +70,7 @@ def test_rows_in_another_order_give_the_same_files(registry, rows, settings, tmp
     }
 
 
-def test_one_more_week_writes_only_its_year(rows, week_before, settings, tmp_path):
+def test_a_further_week_rewrites_only_its_year(rows, week_before, settings, tmp_path):
     last, (backup, first) = rows["measured_at_utc"].max(), week_before
     shutil.copytree(backup, tmp_path, dirs_exist_ok=True)
     assert first.written == (2016, 2017, 2018)
@@ -83,7 +83,7 @@ def test_one_more_week_writes_only_its_year(rows, week_before, settings, tmp_pat
 
 
 def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, week_before, settings, tmp_path):
-    """The folder of the pipeline remembers the last night; the registry is that of a week before it."""
+    """The folder of the workflow holds the digests of the last night; the registry is a week older."""
     last, (backup, _) = rows["measured_at_utc"].max(), week_before
     shutil.copytree(backup, tmp_path / "registry")
     small_registry(tmp_path / "registry", rows, 5)
@@ -96,13 +96,13 @@ def test_charts_of_a_backup_that_was_put_back_are_written_again(rows, week_befor
         assert con.execute("select max(measured_at_utc) from charts").fetchall() == [(last,)]
 
 
-def test_parts_of_the_fleet_share_one_memory(registry, settings, monkeypatch):
+def test_a_split_of_the_fleet_does_not_change_the_results(registry, settings, monkeypatch):
     root, done = registry
     monkeypatch.setattr("turnout.trend.update.CELLS_PER_PART", 960)
     assert update(root, settings).digests == done.digests
 
 
-def test_an_empty_registry_is_no_fault(tmp_path, settings):
+def test_an_empty_registry_is_no_error(tmp_path, settings):
     generation = Generation()
     commit(tmp_path, generation)
     build_database(tmp_path, generation)
@@ -110,7 +110,7 @@ def test_an_empty_registry_is_no_fault(tmp_path, settings):
     assert done.rows == {"chart_status": 0, "baselines": 0, "alarms": 0, "charts": 0} and done.newest is None
 
 
-def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys, tmp_path):
+def test_the_printed_list_states_position_cause_and_certainty(registry, capsys, tmp_path):
     from turnout.cli.main import main
 
     root, _ = registry
@@ -124,7 +124,7 @@ def test_the_list_on_the_terminal_says_where_what_and_how_sure(registry, capsys,
     assert "YYYY-MM-DD" in capsys.readouterr().err
 
 
-def test_a_list_of_a_day_before_the_first_measurement_says_so(registry, rows, capsys, tmp_path):
+def test_a_list_of_a_day_before_the_first_measurement_states_that(registry, rows, capsys, tmp_path):
     from turnout.cli.main import main
 
     root, _ = registry
@@ -140,7 +140,7 @@ def test_a_list_of_a_day_before_the_first_measurement_says_so(registry, rows, ca
     assert main(["worklist", "--registry", str(root), "--asof", f"{first:%Y-%m-%dT%H:%M:%S}"]) == 0
 
 
-def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
+def test_the_export_writes_tables_in_common_formats(registry, tmp_path, capsys):
     from turnout.cli.main import main
 
     root, _ = registry
@@ -155,7 +155,7 @@ def test_tables_go_out_as_files_that_others_read(registry, tmp_path, capsys):
     assert "no table or view 'nonsense'" in capsys.readouterr().err
 
 
-def test_a_lake_holds_what_the_registry_says_in_versions(registry, tmp_path):
+def test_a_delta_lake_holds_the_tables_of_the_registry_in_versions(registry, tmp_path):
     deltalake = pytest.importorskip("deltalake", reason="the extra 'lakehouse' is not installed")
     from turnout.cli.main import main
 
@@ -173,7 +173,7 @@ def test_a_lake_holds_what_the_registry_says_in_versions(registry, tmp_path):
             assert (len(lake.to_pyarrow_table()), same) == (n, 0) and n > 0
 
 
-def test_a_lake_without_its_package_says_what_to_install(registry, tmp_path, capsys, monkeypatch):
+def test_an_export_without_the_package_states_what_to_install(registry, tmp_path, capsys, monkeypatch):
     from turnout.cli.main import main
 
     monkeypatch.setitem(sys.modules, "deltalake", None)
@@ -182,7 +182,7 @@ def test_a_lake_without_its_package_says_what_to_install(registry, tmp_path, cap
 
 
 @pytest.mark.parametrize("stamp", ["1970-01-01 00:00:10", "2031-05-05"], ids=["never set", "ahead"])
-def test_one_wrong_clock_does_not_stop_the_night(registry, rows, settings, tmp_path, stamp):
+def test_one_wrong_clock_does_not_stop_the_nightly_update(registry, rows, settings, tmp_path, stamp):
     root, _ = registry
     extra = rows[(rows["measured_at_utc"] == rows["measured_at_utc"].max()) & (rows["turnout_id"] == "T00001")]
     wrong = pd.concat([rows, extra.assign(measured_at_utc=np.datetime64(stamp, "us"))], ignore_index=True)
@@ -212,8 +212,8 @@ def weekly(rng, turnout, section, phi, drop=0.0):
     )
 
 
-def test_an_alarm_that_is_not_raised_again_is_closed_in_sight(settings, tmp_path, caplog):
-    """Forty turnouts with more memory come to six with none: what was an alarm is none by the memory they share."""
+def test_an_alarm_that_is_not_raised_again_is_closed_and_stays_listed(settings, tmp_path, caplog):
+    """Forty turnouts with more memory join six without. With the common memory a former alarm is none."""
     rng = np.random.default_rng(5)
     few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.016 * (k == 0)) for k in range(6) for s in "AB"])
     many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.8) for k in range(40) for s in "AB"]], ignore_index=True)
@@ -249,8 +249,8 @@ STATES = "select * from chart_status order by turnout_id, section_id, band, sour
 
 
 @pytest.mark.parametrize("ahead", [["2019-03-05"], ["2099-01-05", "2099-01-12"]], ids=["a month mistyped", "2099"])
-def test_a_campaign_of_days_to_come_is_shown_and_not_used(registry, rows, settings, tmp_path, ahead):
-    """Eleven months ahead, and further but not alone: nobody can have measured then, whatever its neighbours say."""
+def test_a_campaign_with_a_future_date_is_shown_and_not_used(registry, rows, settings, tmp_path, ahead):
+    """Eleven months ahead, and further ahead with neighbours: a future date is wrong in both cases."""
     own = rows[(rows["section_id"] == "T00000/S3")].tail(len(ahead))
     wrong = own.assign(measured_at_utc=np.array(ahead, "datetime64[us]"), frequency_hz=[400.0, 390.0][: len(own)])
     small_registry(tmp_path, pd.concat([rows, wrong], ignore_index=True))
@@ -262,15 +262,15 @@ def test_a_campaign_of_days_to_come_is_shown_and_not_used(registry, rows, settin
         assert shown.fetchall() == [("T00000/S3", day) for day in ahead]
 
 
-def test_where_most_charts_are_ahead_it_is_the_clock_of_this_machine_that_is_late(registry, settings, tmp_path, rows):
+def test_if_most_charts_are_ahead_the_clock_of_this_machine_is_late(registry, settings, tmp_path, rows):
     small_registry(tmp_path, rows)
     update(tmp_path, settings, day=pd.Timestamp("2017-03-01"))
     with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
         assert con.execute(STATES).fetchall() == sound.execute(STATES).fetchall()
 
 
-def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, settings, tmp_path):
-    """Nothing of a turnout, or of the whole fleet, can be used: its charts say so, and the night goes on."""
+def test_a_registry_with_wrong_dates_alone_is_shown_and_is_no_error(rows, settings, tmp_path):
+    """No campaign can be used: the charts state that, and the update continues."""
     only = rows[(rows["turnout_id"] == "T00001") & (rows["measured_at_utc"] == rows["measured_at_utc"].max())]
     small_registry(tmp_path, only.assign(measured_at_utc=np.datetime64("1970-01-01T10:00:00", "us")))
     done = update(tmp_path, settings)
@@ -283,7 +283,7 @@ def test_campaigns_of_a_clock_never_set_alone_are_in_sight_and_no_fault(rows, se
         assert con.execute("select count(*) from worklist").fetchall() == [(0,)]
 
 
-def test_a_year_before_which_no_clock_is_believed_leaves_its_campaigns_in_sight(rows, tmp_path):
+def test_campaigns_before_the_earliest_accepted_year_are_shown_and_not_used(rows, tmp_path):
     small_registry(tmp_path, rows)
     done = update(tmp_path, TrendSettings(earliest_year=2017))
     with open_registry(tmp_path) as con:
@@ -291,7 +291,7 @@ def test_a_year_before_which_no_clock_is_believed_leaves_its_campaigns_in_sight(
     assert all(early == wrong for early, wrong in found) and len(found) == done.rows["charts"]
 
 
-def test_a_look_back_equals_the_night_of_that_day(rows, settings, tmp_path):
+def test_the_evaluation_of_an_earlier_day_equals_the_update_of_that_day(rows, settings, tmp_path):
     then = pd.Timestamp("2018-01-15 12:00")
     small_registry(tmp_path / "then", rows[rows["measured_at_utc"] <= then])
     small_registry(tmp_path / "now", rows)
@@ -302,7 +302,7 @@ def test_a_look_back_equals_the_night_of_that_day(rows, settings, tmp_path):
         assert a.execute(question).fetchall() == b.execute(question).fetchall()
 
 
-def test_parts_with_few_and_with_many_sections_make_one_table(settings, tmp_path, monkeypatch):
+def test_parts_with_few_and_many_sections_give_one_table(settings, tmp_path, monkeypatch):
     monkeypatch.setattr("turnout.trend.update.CELLS_PER_PART", 300)
     small = modes(Fleet(turnouts=1, sections=4, weeks=70, prefix="A"), 5)
     large = modes(Fleet(turnouts=1, sections=140, weeks=2, prefix="B"), 6)

@@ -1,4 +1,4 @@
-"""Parts of the chart against the slow way of computing them, or another library."""
+"""Parts of the chart against direct computations or another library."""
 
 from types import SimpleNamespace
 
@@ -64,7 +64,7 @@ def test_cusum_is_the_running_sum_above_its_lowest_point():
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 7, 8])
-def test_median_of_others_equals_leaving_each_out(size):
+def test_the_median_of_the_others_equals_a_direct_computation(size):
     rng = np.random.default_rng(size)
     values = np.round(rng.standard_normal((3 * size, 20)), 1)
     mask = rng.random(values.shape) < 0.7
@@ -99,7 +99,7 @@ def test_baseline_equals_regression_with_a_level_for_each_epoch(settings):
     f0 = frequency[0, inside & (epoch[0] == 0)].mean()
     percent = 100 * (frequency[0, inside] / f0 - 1)
     scale = sm.OLS(percent, design).fit().scale
-    # what is known of the slope beforehand, 0 ± 0.5 %/°C, is one more observation of it
+    # the prior of the slope, 0 ± 0.5 %/°C, is one more observation of it
     known = np.vstack([design, [0.0, 0.0, np.sqrt(scale) / 0.5]])
     fit = sm.OLS(np.append(percent, 0.0), known).fit()
     assert base.frequency[0] == pytest.approx(f0, rel=1e-12)
@@ -109,7 +109,7 @@ def test_baseline_equals_regression_with_a_level_for_each_epoch(settings):
     assert spread[0] == pytest.approx(np.sqrt(np.sum(fit.resid[:-1] ** 2) / (50 - 3)), rel=1e-9)
 
 
-def test_the_slope_of_a_year_is_that_of_the_data_and_without_temperatures_that_of_other_tracks(settings):
+def test_the_slope_follows_from_the_data_of_a_year_and_without_temperatures_from_the_prior(settings):
     """100 charts of one slope, scatter s = 0.6 %: its error is s / sqrt(52 var(T) + (s / 0.5)²) by Gauss."""
     rng = np.random.default_rng(8)
     time = np.tile(np.arange(60) * 7.0, (100, 1))
@@ -119,7 +119,7 @@ def test_the_slope_of_a_year_is_that_of_the_data_and_without_temperatures_that_o
         frequency = 450.0 * (1.0 + (-0.3 * (reading - reading.mean()) + 0.6 * rng.standard_normal(time.shape)) / 100.0)
         base, _ = fit_baseline(frequency, reading, time, np.zeros(time.shape, int), settings)
         assert base.slope_se == pytest.approx(error, rel=0.35)  # the scatter of 52 values is known to a tenth
-        # within the stated error of the truth, drawn from what is known beforehand: a chi-squared with 100
+        # within the stated error of the truth, which is drawn from the prior: a chi-squared with 100
         assert np.mean(((base.slope + 0.3) / base.slope_se) ** 2) < 1.6
 
 
@@ -142,8 +142,8 @@ def test_pooled_memory_is_unbiased_where_a_single_chart_is_not():
 
 
 @pytest.mark.parametrize(("n", "phi", "within"), [(52, 0.4, 0.02), (26, 0.4, 0.04), (13, 0.4, 0.06), (13, 0.2, 0.06)])
-def test_pooled_memory_of_a_short_baseline_whose_temperature_slope_is_fitted_too(n, phi, within):
-    """A mean and a season are taken out: the estimate falls short by (2 + 4 phi) / n, 0.28 at 13 campaigns.
+def test_pooled_memory_of_a_short_baseline_with_a_fitted_temperature_slope(n, phi, within):
+    """A mean and a season are removed: the estimate is too small by (2 + 4 phi) / n, 0.28 at 13 campaigns.
 
     Terms of 1/n^2 are left, and the ends at 0 and 0.9, which raise what scatters by 0.25 about 0.2.
     """
@@ -222,7 +222,7 @@ def test_line_equals_generalised_least_squares():
     assert freedom == fit.df_resid and rss / freedom == pytest.approx(fit.scale, rel=1e-8)
 
 
-def test_crossing_holds_exactly_the_times_that_fieller_admits():
+def test_the_interval_of_a_crossing_is_that_of_fieller():
     coefficient, covariance, freedom = np.array([-1.0, -0.8]), np.array([[0.02, 0.01], [0.01, 0.03]]), 30
     low, high = crossing_interval(coefficient, covariance, freedom, -5.0, 0.8)
     q = stats.t.isf(0.1, freedom)
@@ -237,7 +237,7 @@ def test_crossing_holds_exactly_the_times_that_fieller_admits():
     assert crossing_interval(np.array([-6.0, -0.1]), np.eye(2) * 1e-4, 30, -5.0, 0.8) == (0.0, 0.0)
 
 
-def test_forecast_says_no_date_for_what_settles_and_none_for_what_stands(settings):
+def test_a_forecast_has_no_date_for_constant_and_settling_charts(settings):
     rng = np.random.default_rng(12)
     time = np.arange(0, 3 * 365.0, 7.0)
     noise = 0.3 * rng.standard_normal(time.size)
@@ -252,7 +252,7 @@ def test_forecast_says_no_date_for_what_settles_and_none_for_what_stands(setting
     assert "too early" in forecast(time[:8], noise[:8], 0.0, settings).sentence
 
 
-def test_campaigns_a_year_are_those_of_the_usual_interval():
+def test_the_number_of_campaigns_a_year_follows_from_the_usual_interval():
     interval = np.array([365.25, 46.0, 7.0, 1.0, 0.5, 800.0, np.nan])
     counts = campaigns_a_year(SimpleNamespace(interval=interval))
     assert counts.tolist() == [1, 8, 52, 365, 366, 0, 0]

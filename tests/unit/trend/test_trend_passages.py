@@ -1,4 +1,4 @@
-"""Trends from ordinary trains: weekly values with their own error bars, beside the hammer and never mixed."""
+"""Trends from ordinary trains: weekly values with their own errors, separate from those of hammer tests."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ NEWEST = "2018-12-31"
 
 @pytest.fixture(scope="module")
 def trains():
-    """Three passages a day for two years at four sections; one resonance falls, one section grows louder."""
+    """Three passages a day for two years at four sections; one resonance falls, one amplitude grows."""
     rng = np.random.default_rng(1)
     when = pd.Timestamp("2017-01-02 05:00") + pd.to_timedelta(np.arange(3 * 728) * 8, unit="h")
     year = (when - when[0]).days.to_numpy() / 365.25
@@ -41,7 +41,7 @@ def trains():
                                       "model_id": "m", "turnout_id": "T1", "passed_at_utc": when, "status": "accepted",
                                       "peak_ms2": peak}))  # fmt: skip
     fits = pd.concat(fits)
-    # Channel b0, six times as loud as its neighbour, falls silent after a year and a half.
+    # Channel b0 has six times the amplitude of its neighbour and fails after a year and a half.
     fits = fits[(fits["channel"] != "b0") | (fits["passed_at_utc"] < "2018-07-01")]
     return {"passages": passages, "modes": pd.concat(modes), "passage_fits": fits}
 
@@ -70,13 +70,13 @@ def test_amplitudes_are_taken_at_the_usual_speed(weekly):
     assert (loud["frequency_se_hz"] / loud["frequency_hz"]).median() == pytest.approx(0.046, rel=0.15)
 
 
-def test_a_sensor_that_falls_silent_does_not_shift_the_level(weekly):
+def test_a_failed_sensor_does_not_shift_the_level(weekly):
     value = weekly.query("band == 'amplitude' and section_id == 'T1/S0'").set_index("measured_at_utc")["frequency_hz"]
     before, after = np.log(value[:"2018-06-24"]), np.log(value["2018-07-02":])
     assert abs(before.mean() - after.mean()) < 4 * np.hypot(before.sem(), after.sem())
 
 
-def test_trains_show_what_happened_with_their_own_spread(weekly, settings):
+def test_charts_of_trains_alarm_at_the_changed_sections_alone(weekly, settings):
     charts = evaluate(weekly, None, settings)
     status = chart_status(charts, settings).set_index(["section_id", "band"])
     assert status.loc[("T1/S2", "ballast"), "state"] == "alarm"
@@ -107,8 +107,8 @@ def amplitudes(*parts):
 
 
 @pytest.mark.parametrize("wrong", [["2000-01-01 00:05"], ["2000-01-01 00:05", "2000-01-01 00:15"]])
-def test_passages_of_a_clock_that_was_reset_are_no_first_year(wrong):
-    """Ten trains a week for 60 weeks, their peaks with the speed to the power 1.2; one or two more of the year 2000."""
+def test_passages_with_a_reset_clock_do_not_change_the_amplitudes(wrong):
+    """Ten trains a week for 60 weeks, with peaks ~ speed to the power 1.2; one or two trains of the year 2000."""
     rng = np.random.default_rng(7)
     weeks, k = np.divmod(np.arange(600), 10)
     when = np.datetime64("2017-01-02T06:00", "us") + weeks * np.timedelta64(7, "D") + k * np.timedelta64(3, "h")
@@ -121,7 +121,7 @@ def test_passages_of_a_clock_that_was_reset_are_no_first_year(wrong):
 
 
 @pytest.mark.parametrize("speed", [np.full(6, 100.0), np.linspace(99.9, 100.1, 6)], ids=["one speed", "like one"])
-def test_like_speeds_tell_no_exponent_and_peaks_are_taken_as_they_are(speed):
+def test_equal_speeds_give_no_exponent_and_peaks_are_not_corrected(speed):
     """A week of one speed, and one at 60 km/h two years later: a line through points of one abscissa has no slope."""
     peak, hours = np.array([4.0, 5.0, 6.0, 7.0, 8.0, 9.0]), np.arange(6) * np.timedelta64(1, "h")
     first, later = np.datetime64("2016-01-05T06:00", "us") + hours, np.datetime64("2018-01-02T06:00", "us") + hours

@@ -50,14 +50,14 @@ def test_steps_and_slopes_are_those_of_ordinary_regression():
     assert np.isnan(step[:, [0, 2, 3]]).all()
 
 
-def test_left_out_error_equals_fitting_again_without_the_campaign():
+def test_the_error_of_a_left_out_campaign_equals_that_of_a_new_fit():
     b, splits = block(4, (0, 4, 0, 0)), (0, 4, 0, 0)
     matrix = design(splits, b.temperature)
     campaign, section = np.tile(np.arange(5), 4), np.repeat(np.arange(4), 5)
     for q in range(2):
         squares = []
         for c in range(5):
-            # The step of section 1 is known from campaign 4 alone: nothing can be said about that cell.
+            # Campaign 4 alone determines the step of section 1: that cell has no prediction.
             columns = [j for j in range(matrix.shape[1]) if not (c == 4 and j == 4)]
             fit = sm.OLS(b.values[q].ravel()[campaign != c], matrix[campaign != c][:, columns]).fit()
             ahead = (campaign == c) & ~((c == 4) & (section == 1))
@@ -65,13 +65,13 @@ def test_left_out_error_equals_fitting_again_without_the_campaign():
         assert left_out_error(b, splits)[q] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-8)
 
 
-def test_temperature_helps_where_it_matters_and_only_there():
+def test_a_temperature_term_reduces_the_error_only_if_temperature_has_an_effect():
     warm, cold = block(5, slope=0.05, noise=0.1), block(6, slope=0.0, noise=0.1)
     assert (left_out_error(warm, (0,) * 4) < left_out_error(warm, (0,) * 4, "")).all()
     assert np.mean(left_out_error(cold, (0,) * 4, "") < left_out_error(cold, (0,) * 4)) > 0.5
 
 
-def test_like_quantities_are_not_counted_twice():
+def test_equal_quantities_are_not_counted_twice():
     b = block(7, n_quantity=1)
     copies = Block(np.repeat(b.values, 10, axis=0), b.temperature)
     assert independent_quantities([copies], (0,) * 4) == pytest.approx(1.0)
@@ -79,14 +79,14 @@ def test_like_quantities_are_not_counted_twice():
     assert 4.0 < independent_quantities([many], (0,) * 4) <= 10.0
 
 
-def test_a_changed_section_is_named_and_a_sound_one_is_not():
+def test_a_changed_section_is_reported_and_an_intact_one_is_not():
     found = verdicts([block(9, (0, 2, 0, 0), n_campaign=6)], n_permutation=400)
     assert found[1].split == 2
     assert found[1].probability[2] > 0.95 and found[1].p_value < 0.02
     assert all(v.p_value > 0.02 for i, v in enumerate(found) if i != 1)
 
 
-def test_p_values_of_sound_sections_are_not_too_small():
+def test_p_values_of_intact_sections_are_not_too_small():
     p_values = [v.p_value for seed in range(20) for v in verdicts([block(100 + seed, n_quantity=4)], n_permutation=59)]
     # 80 of them; under the null at most 5 % lie at 0.05 or below: 4 expected, 11 or more once in 500 times.
     assert np.mean(np.array(p_values) <= 0.05) < 11 / 80

@@ -1,4 +1,4 @@
-"""Which stiffness changed: the pair of resonances of one section names ballast, pads, both, or neither of them."""
+"""The pair of resonances of a section tells whether the stiffness of ballast, pads or both has changed."""
 
 import numpy as np
 import pandas as pd
@@ -36,7 +36,7 @@ def test_the_sensitivities_are_those_of_the_chain(pad, ballast, sleeper):
     assert coupling_limits(high / low)[1] >= share
 
 
-def test_resonances_that_the_masses_do_not_allow_tell_nothing():
+def test_resonances_that_contradict_the_masses_give_no_component():
     assert coupling_limits(1.1) == (0.0, 0.5) and coupling_limits(float("nan")) == (0.0, 0.5)
     assert judged_change(np.log([0.95, 0.95]), np.full(2, 1e-6), (0.0, 0.5)).component == "either"
 
@@ -95,7 +95,7 @@ def test_one_campaign_of_another_mode_does_not_name_its_component():
     assert stiffness_change(None, "step", since).component == "either"
 
 
-def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):
+def test_softer_ballast_lists_no_inspection_of_the_railpads(settings):
     rows = both_bands(1.0, 0.5, 7, turnouts=2)
     with evaluated_views(rows, settings) as con:
         listed = con.execute(
@@ -110,8 +110,8 @@ def test_the_railpad_is_not_on_the_list_for_softer_ballast(settings):
     assert all(state != "inspect this week" for state, _ in coupled)
 
 
-def test_each_component_is_looked_at_by_its_own_sign(settings):
-    """Pads were exchanged for harder ones while the ballast lost stiffness: chance of both by the closed form."""
+def test_the_advice_for_each_component_follows_its_own_sign(settings):
+    """Pads were exchanged for stiffer ones while the ballast lost stiffness; probabilities by the closed form."""
     rows = both_bands(1.4, 0.6, 9, turnouts=2)
     with evaluated_views(rows, settings) as con:
         looks = con.execute(
@@ -121,7 +121,7 @@ def test_each_component_is_looked_at_by_its_own_sign(settings):
     assert all("voids" in look and "exchanged or hardened" in look and "worn" not in look for (look,) in looks)
 
 
-def test_both_rows_of_a_section_say_the_same_of_its_stiffness(settings):
+def test_both_rows_of_a_section_state_the_same_change_of_stiffness(settings):
     """The railpad resonance moves by 0.6 %, too little for an onset of its own; half of the stiffness is truly lost."""
     with evaluated_views(both_bands(1.0, 0.5, 7, turnouts=2), settings) as con:
         sizes = con.execute(
@@ -132,7 +132,7 @@ def test_both_rows_of_a_section_say_the_same_of_its_stiffness(settings):
     assert all(low <= -50.0 <= high for low, high, _ in sizes)
 
 
-def test_a_coupled_alarm_is_referred_to_the_other_one_only_where_that_one_is_listed(settings):
+def test_a_coupled_alarm_refers_to_the_other_one_only_if_that_is_listed(settings):
     rows = both_bands(1.0, 0.5, 7, turnouts=2)
     at = rows["measured_at_utc"].max()
     silence = pd.DataFrame(

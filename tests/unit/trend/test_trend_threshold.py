@@ -1,4 +1,4 @@
-"""Thresholds against published run lengths, and against another way of computing them."""
+"""Thresholds against published run lengths, and against another computation."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_run_lengths_are_the_published_ones(threshold, published):
 
 @pytest.mark.parametrize("allowance", [0.5, 1.0])
 @pytest.mark.parametrize("length", [336.0, 5600.0, 56000.0])
-def test_threshold_keeps_the_false_alarms_asked_for(allowance, length):
+def test_the_threshold_gives_the_requested_rate_of_false_alarms(allowance, length):
     h = threshold_for(length, allowance)
     assert run_length(h, allowance) == pytest.approx(length, rel=1e-6)
     # Siegmund's overshoot is derived for small k; at k = 1 it is 8 % off.
@@ -64,7 +64,7 @@ def test_an_estimated_baseline_detects_less_and_more_campaigns_detect_more():
 
 
 @pytest.mark.parametrize(("days", "campaign"), [(7.0, 0.6), (46.0, 0.0)], ids=["weekly", "46 d"])
-def test_nine_of_ten_charts_find_the_change_that_they_say_they_detect(days, campaign):
+def test_nine_of_ten_charts_detect_their_stated_detectable_change(days, campaign):
     """Whole charts, with everything estimated: baselines, temperature slopes, memory, siblings."""
     share, n = share_seen(days, campaign, 0.2, turnouts=150, seed=77)
     assert n > 140 and abs(share - 0.9) < 3.0 * np.sqrt(0.09 / n)

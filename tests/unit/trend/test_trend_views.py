@@ -1,4 +1,4 @@
-"""The views equal an independent computation: numpy, pandas."""
+"""The views equal independent computations with numpy and pandas."""
 
 import re
 from dataclasses import replace
@@ -36,7 +36,7 @@ def frames(settings):
     rows = rows.astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
     rows.loc[rows.sample(frac=0.05, random_state=1).index, "rail_temperature_c"] = np.nan
     rows = rows.sample(frac=0.95, random_state=2).sort_index()
-    # One section that starts to be measured late: it learns while its siblings are settled.
+    # One section is measured from a later day on: it learns while its siblings have a baseline.
     rows = rows[(rows["section_id"] != "T00002/S7") | (rows["measured_at_utc"] > "2017-01-01")]
     work = pd.DataFrame(
         {
@@ -116,7 +116,7 @@ def test_another_allowance_in_sql_equals_a_loop(con, frames):
     assert np.allclose(found["cusum_down"], expected, atol=1e-10) and max(expected) > 1
 
 
-def test_change_since_event_equals_pandas_and_is_not_fooled_by_summer(con, frames):
+def test_change_since_event_equals_pandas_and_does_not_depend_on_the_season(con, frames):
     found = con.execute("select * from change_since_event('tamping', 200) order by section_id").df()
     found = found[found["event_id"] == "e1"].set_index("section_id")
     base = frames["baselines"].astype({k: object for k in KEYS[:4]}).query("epoch == 0").set_index("section_id")
@@ -149,7 +149,7 @@ def test_change_since_event_equals_pandas_and_is_not_fooled_by_summer(con, frame
         ("select gain_pct, gain_high_pct - gain_pct, verdict <> 'cannot tell' from maintenance_effect", True),
     ],
 )
-def test_campaigns_with_a_large_error_do_not_make_a_change(settings, query, resets):
+def test_campaigns_with_a_large_error_do_not_cause_a_change(settings, query, resets):
     """Two of the campaigns after the work took another mode, with an error as large as its frequency."""
     rows = modes(Fleet(turnouts=1, sections=2, weeks=110, phi=0.0), 5)
     at = rows["measured_at_utc"].min() + pd.Timedelta(weeks=90, days=3)
@@ -179,9 +179,10 @@ def test_summer_before_and_winter_after_is_no_change(frames):
     assert 100 * (side[True] / side[False] - 1) > 1.5
 
 
-def test_maintenance_effect_says_whether_it_helped(con):
+def test_the_maintenance_effect_states_the_gain_of_stiffness(con):
     rows = con.execute("select * from maintenance_effect order by section_id").df()
-    lifted = rows[rows["turnout_id"] == "T00001"]  # a row of the median would say 0: its sections begin again at 0
+    # a row of the median would state 0, since its sections start at 0 again
+    lifted = rows[rows["turnout_id"] == "T00001"]
     assert len(lifted) == 8 and (lifted["verdict"] == "stiffer").mean() >= 0.75
     # 95 % intervals of eight sections that share their campaigns; all but one at least hold 2 %.
     assert ((lifted["gain_low_pct"] <= 2.0) & (lifted["gain_high_pct"] >= 2.0)).sum() >= 7
@@ -192,7 +193,7 @@ def test_maintenance_effect_says_whether_it_helped(con):
 
 
 @pytest.mark.parametrize("sections", [1, 6])
-def test_intervals_of_work_that_did_nothing_hold_zero_where_the_slope_is_hardly_known(settings, sections):
+def test_intervals_of_work_without_effect_contain_zero_even_if_the_slope_is_uncertain(settings, sections):
     # Fourteen weeks of a winter are the baseline, the work is done in June: the slope's error times 15 to 25 degrees.
     fleet = Fleet(turnouts=240 // sections, sections=sections, weeks=60)
     rows = modes(fleet, 5)
@@ -224,7 +225,7 @@ def test_quantile_in_sql_is_students_t(con):
         )
 
 
-def test_the_true_drift_is_first_and_the_learning_section_is_named(con):
+def test_the_true_drift_is_first_and_the_learning_section_is_listed(con):
     rows = con.execute("select * from worklist").df()
     first = rows.iloc[0]
     assert (first["section_id"], first["state"], first["direction"]) == ("T00003/S2", "inspect this week", "down")
@@ -248,7 +249,7 @@ def test_the_page_on_trends_shows_the_row_that_is_printed(con, frames, repositor
     assert n_left_out > 1 and sample.split() == printed.split(), printed
 
 
-def test_the_list_of_an_earlier_day_knows_nothing_of_later(con, frames):
+def test_the_list_of_an_earlier_day_does_not_use_later_campaigns(con, frames):
     early = con.execute("select * from worklist(timestamp '2017-07-01')").df()
     assert "T00003/S2" not in set(early["section_id"])
     raised = frames["alarms"].query("section_id == 'T00003/S2' and direction == 'down'")["raised_at_utc"].min()
@@ -261,7 +262,7 @@ def test_the_list_of_an_earlier_day_knows_nothing_of_later(con, frames):
     assert row["change_pct"] == pytest.approx(window["residual_pct"].dropna().tail(8).mean(), abs=1e-8)
 
 
-def test_cannot_see_names_every_chart_that_cannot_answer(con, frames):
+def test_cannot_see_lists_every_chart_without_an_answer(con, frames):
     rows = con.execute("select * from cannot_see()").df()
     status = frames["chart_status"]
     silent = status[status["state"].isin(["learning", "cannot_tell", "not_measured"])]
@@ -294,10 +295,10 @@ def test_an_acknowledged_alarm_is_planned_and_a_suppressed_one_silent_but_both_s
     old = said.assign(at_utc=pd.Timestamp("2017-01-01"))
     with connect_views(frames | {"acknowledgements": old}, newest) as con:
         row = con.execute("select state from worklist where section_id = 'T00003/S2'").fetchall()
-        assert row == [("inspect this week",)]  # said before the alarm was raised
+        assert row == [("inspect this week",)]  # entered before the alarm was raised
 
 
-def test_every_view_answers_an_empty_registry():
+def test_every_view_works_on_an_empty_registry():
     with connect_views({}, "2026-01-01") as con:
         for question in (
             "worklist", "worklist(timestamp '2026-01-01')", "cannot_see()", "chart_states", "time_to_threshold",
@@ -307,7 +308,7 @@ def test_every_view_answers_an_empty_registry():
             assert con.execute(f"select * from {question}").fetchall() == []
 
 
-def test_no_view_uses_what_an_older_duckdb_cannot_open():
+def test_no_view_uses_functions_that_an_older_duckdb_does_not_have():
     # DuckDB 2 stores if(...) in the database file as a function call, which DuckDB 1.5 does not have.
     from turnout.registry.view_texts import view_files
 
@@ -331,14 +332,14 @@ COUNTED = ["state", "reason", "last_measured_at_utc", "n_campaigns", "n_baseline
 
 
 @pytest.mark.parametrize("day", DAYS)
-def test_a_look_back_equals_what_that_night_said(con, frames, settings, day):
+def test_the_state_of_an_earlier_day_equals_the_update_of_that_day(con, frames, settings, day):
     then = pd.Timestamp(day)
     made = frames_at(frames, settings, then)
     found = con.execute("select * from chart_status_at(?)", [then.to_pydatetime()]).df()
     both = found.merge(
         made["chart_status"].astype(dict.fromkeys(KEYS[:4], object)), on=KEYS[:4], suffixes=("", "_night")
     )
-    # A section that is not there yet has no row that night; the turnout's median of siblings is not its business.
+    # A section without campaigns has no row that night; the median of the turnout is not compared.
     assert len(both) == len(made["chart_status"]) and len(found) - len(both) <= 1
     for name in COUNTED:
         assert (both[name].fillna(0) == both[f"{name}_night"].fillna(0)).all(), name
@@ -350,7 +351,7 @@ def test_a_look_back_equals_what_that_night_said(con, frames, settings, day):
     assert len(told) >= 40 or day < "2017"
 
 
-def test_a_look_back_on_a_turnout_in_alarm_does_not_call_it_unmeasured(frames, settings):
+def test_the_state_of_an_earlier_day_of_a_turnout_in_alarm_is_not_unmeasured(frames, settings):
     """Five of eight sections in alarm leave too few for the median, though every week is measured."""
     fleet = Fleet(turnouts=1, weeks=130, phi=0.0, campaign=0.3)
     three, two = (np.arange(8) < 3)[None, :], np.isin(np.arange(8), (3, 4))[None, :]
@@ -367,7 +368,7 @@ def test_a_look_back_on_a_turnout_in_alarm_does_not_call_it_unmeasured(frames, s
 
 
 @pytest.mark.parametrize(("days", "reason"), [(15, "no_temperature"), (500, "")])
-def test_a_look_back_knows_that_nothing_was_judged_without_temperatures(settings, days, reason):
+def test_the_state_of_an_earlier_day_states_missing_temperatures(settings, days, reason):
     fleet = Fleet(turnouts=1, weeks=150, phi=0.0, campaign=0.3)
     rows = modes(fleet, 1).astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
     newest = rows["measured_at_utc"].max()
@@ -400,7 +401,7 @@ def test_the_list_of_an_earlier_day_is_the_list_of_that_night(con, frames, setti
     assert words == [r[:2] if "within a year" in r[2] else r for r in silent if r[0] != late]
 
 
-def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
+def test_a_sentence_states_frequency_and_stiffness_and_no_impossible_figure(frames):
     status = frames["chart_status"].assign(state="cannot_tell", reason="too_noisy", detectable_pct=1.9)
     status.loc[status["section_id"] == "T00000/S1", "detectable_pct"] = 149.0
     status.loc[status["section_id"] == "T00000/S2", "detectable_pct"] = 1.53
@@ -415,14 +416,14 @@ def test_one_quantity_in_one_sentence_and_no_impossible_figure(frames):
     assert why["T00000/S2"].startswith("a change below 1.6 % of frequency (about 3.1 % in stiffness)")
 
 
-def test_rows_of_several_sections_name_them(con):
+def test_a_row_of_several_sections_names_them(con):
     rows = con.execute("select turnout_id, section_id, sections from worklist(timestamp '2017-08-25')").df()
     tamped = rows[rows["turnout_id"] == "T00001"].iloc[0]
     assert pd.isna(tamped["section_id"]) and tamped["sections"] == "S0, S1, S2, S3, S4, S5, S6, S7"
 
 
 def test_sql_equals_loops_pandas_and_statsmodels(settings):
-    """Nothing of the trend's own arithmetic stands on the right-hand side: see benchmarks/trend_oracle.py."""
+    """The expected values do not use code of the trend: see benchmarks/trend_oracle.py."""
     rows = modes(Fleet(turnouts=2, weeks=90, phi=0.3, missing=0.05), 81).astype({k: object for k in KEYS[:4]})
     charts = evaluate(rows, None, settings)
     frames = {"modes": rows.assign(method="joint"), "charts": chart_rows(charts)}
@@ -443,8 +444,8 @@ def test_sql_equals_loops_pandas_and_statsmodels(settings):
             assert (both["sql"] - both["oracle"]).abs().max() < 1e-8
 
 
-def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier_day(frames):
-    """A monthly fleet is not asked again every morning until its next campaign."""
+def test_an_acknowledgement_after_the_newest_campaign_counts_now_and_not_on_earlier_days(frames):
+    """A fleet with monthly campaigns does not list the alarm again every day until its next campaign."""
     newest = frames["modes"]["measured_at_utc"].max()
     said = pd.DataFrame(
         {
@@ -465,8 +466,8 @@ def test_what_is_said_after_the_newest_campaign_counts_now_and_not_on_an_earlier
 
 
 @pytest.mark.parametrize(("action", "until"), [("acknowledge", None), ("suppress", 10)])
-def test_what_is_said_of_a_day_that_has_not_come_changes_nothing_until_then(frames, action, until):
-    """Dated half a year ahead, by 12/03 taken for 3 December: nobody has seen that, and a planned silence waits."""
+def test_an_acknowledgement_or_suppression_with_a_future_date_counts_from_that_day_on(frames, action, until):
+    """A date half a year ahead, as when 12/03 is read as 3 December, or that of a planned suppression."""
     newest = frames["modes"]["measured_at_utc"].max()
     at = newest + pd.Timedelta("180D")
     said = pd.DataFrame(
@@ -487,8 +488,8 @@ def test_what_is_said_of_a_day_that_has_not_come_changes_nothing_until_then(fram
 
 
 @pytest.mark.parametrize(("n", "words"), [(1, "1 campaign with a rail temperature"), (2, "2 campaigns with a rail")])
-def test_a_baseline_counts_campaigns_with_a_rail_temperature_and_says_so(frames, n, words):
-    """One campaign of two without a temperature reads as a mistake where "1 campaigns so far" is all that is said."""
+def test_a_baseline_counts_campaigns_with_a_rail_temperature_and_states_that(frames, n, words):
+    """With one of two campaigns without a temperature, "1 campaigns so far" alone would look like a mistake."""
     status = frames["chart_status"].assign(state="learning", reason="baseline", n_baseline=n)
     with connect_views(frames | {"chart_status": status}, frames["modes"]["measured_at_utc"].max()) as con:
         (why, *_) = con.execute("select distinct why from cannot_see()").fetchall()

@@ -1,4 +1,4 @@
-"""Alarms that are taken back stay in sight as closed, through later alarms of their chart, too."""
+"""Withdrawn alarms stay in the table as closed alarms, also after later alarms of their chart."""
 
 import pandas as pd
 import pytest
@@ -25,43 +25,45 @@ def alarms(*rows, section="T1/A", direction="down"):
     return pd.DataFrame(times)
 
 
-def said(frame):
-    """(day of raising, day of closing, by what) of all rows."""
+def history_of(frame):
+    """(day of raising, day of closing, cause of closing) of all rows."""
     found = frame.sort_values(["raised_at_utc", "alarm_id"])[["raised_at_utc", "closed_at_utc", "closed_by"]]
     return [tuple(None if pd.isna(v) else str(v)[:10] for v in row) for row in found.itertuples(index=False)]
 
 
 @pytest.mark.parametrize("closed", [None, "2026-08-03"])
-def test_a_later_alarm_of_the_chart_does_not_take_the_row_of_one_that_was_taken_back(closed):
+def test_a_later_alarm_of_a_chart_does_not_replace_the_row_of_a_withdrawn_alarm(closed):
     taken = alarms(("2025-01-06", "2025-03-03", "recomputed"))
     later = alarms(("2026-06-01", closed, closed and "recovered"))
-    assert said(with_withdrawn(later, taken, NEWEST)) == [
+    assert history_of(with_withdrawn(later, taken, NEWEST)) == [
         ("2025-01-06", "2025-03-03", "recomputed"),
         ("2026-06-01", closed, closed and "recovered"),
     ]
 
 
 @pytest.mark.parametrize("raised", ["2025-01-06", "2024-12-30", "2025-02-03"])
-def test_one_that_is_raised_again_within_its_time_has_its_row_alone(raised):
+def test_a_withdrawn_alarm_that_is_raised_again_within_its_time_has_one_row(raised):
     taken = alarms(("2025-01-06", "2025-03-03", "recomputed"))
     again = alarms((raised, None, None))
-    assert said(with_withdrawn(again, taken, NEWEST)) == [(raised, None, None)]
+    assert history_of(with_withdrawn(again, taken, NEWEST)) == [(raised, None, None)]
 
 
-def test_an_open_one_that_is_raised_later_now_is_that_alarm_and_one_of_another_chart_or_way_is_not():
+def test_an_open_alarm_stays_the_same_if_its_start_moves_but_not_in_another_chart_or_direction():
     before = alarms(("2026-01-05", None, None))
-    assert said(with_withdrawn(alarms(("2026-02-02", None, None)), before, NEWEST)) == [("2026-02-02", None, None)]
+    assert history_of(with_withdrawn(alarms(("2026-02-02", None, None)), before, NEWEST)) == [
+        ("2026-02-02", None, None)
+    ]
     for other in ({"section": "T1/B"}, {"direction": "up"}):
-        assert said(with_withdrawn(alarms(("2026-02-02", None, None), **other), before, NEWEST)) == [
+        assert history_of(with_withdrawn(alarms(("2026-02-02", None, None), **other), before, NEWEST)) == [
             ("2026-01-05", "2026-09-07", "recomputed"),
             ("2026-02-02", None, None),
         ]
 
 
-def test_one_that_recovered_before_the_open_one_was_raised_is_another():
+def test_an_alarm_that_recovered_before_an_open_alarm_was_raised_is_a_different_one():
     before = alarms(("2026-01-05", None, None))
     early = alarms(("2025-03-03", "2025-06-02", "recovered"))
-    assert said(with_withdrawn(early, before, NEWEST)) == [
+    assert history_of(with_withdrawn(early, before, NEWEST)) == [
         ("2025-03-03", "2025-06-02", "recovered"),
         ("2026-01-05", "2026-09-07", "recomputed"),
     ]
