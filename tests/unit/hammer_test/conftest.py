@@ -1,4 +1,4 @@
-"""One synthetic hammer test whose truth is known in closed form, and the faults that may befall it."""
+"""One synthetic hammer test with a closed-form truth, and possible faults of it."""
 
 from dataclasses import dataclass
 
@@ -44,11 +44,11 @@ class HammerTest:
         return Recording(samples, rate, channels, source=source, record=record)
 
     def impacts(self, recordings, **settings):
-        """Its impacts, found with settings other than the usual ones where given."""
+        """Its impacts, found with the default settings except for those given."""
         return find_impacts(recordings, "hammer", "rail", ReceptanceSettings(**settings))
 
     def recordings(self, n=6, noise=(1e-4, 1e-3), **force):
-        """One sound impact each, peaks between 4 and 6 kN, starts anywhere between two samples."""
+        """One intact impact each, with a peak between 4 and 6 kN and a start at any time between two samples."""
         return [
             self.recording(self.samples(self.force(
                 peak=self.rng.uniform(4000, 6000), start=5e-3 + self.rng.uniform() / RATE, **force), noise), k)

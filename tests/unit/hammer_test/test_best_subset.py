@@ -27,7 +27,7 @@ def test_no_other_subset_has_a_larger_mean_coherence(seed):
     assert mean(best_subset(pairs, 5)) == pytest.approx(max(map(mean, combinations(range(9), 5))), rel=1e-9)
 
 
-def test_impacts_beside_the_axis_are_not_selected_and_say_why():
+def test_impacts_beside_the_axis_are_not_selected_and_the_reason_is_stated():
     settings = replace(ReceptanceSettings(), best_impacts=N_WANTED)
     impacts = find_impacts(recordings_of(3), "hammer", "rail", settings)
     assert sum(i.accepted for i in impacts) == N_WANTED

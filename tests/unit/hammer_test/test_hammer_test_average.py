@@ -15,24 +15,24 @@ def measured(hammer, n=10, settings=None, noise=(0.0, 0.0), **force):
     return receptance_of(find_impacts(hammer.recordings(n, noise, **force), "hammer", "rail", settings), settings)
 
 
-def test_without_noise_every_estimator_is_the_structure_itself(hammer):
+def test_without_noise_every_estimator_gives_the_true_receptance(hammer):
     result = measured(hammer, 4)
     keep = (result.frequency > 20) & (result.frequency < 800)
     truth = (hammer.accelerance(result.frequency) / -((2 * np.pi * result.frequency) ** 2))[keep]
-    # What is left is the decay beyond the record: exp(-180 * 0.195) of it.
+    # The remaining error is the decay beyond the record: exp(-180 * 0.195) of it.
     for estimate in (result.h1, result.h2, result.hv):
         assert estimate[keep] == pytest.approx(truth, rel=1e-6, abs=0.0)
     assert result.coherence[keep] == pytest.approx(1.0, abs=1e-9)
     assert result.frequency[0] > 0.0 and result.n == 4
 
 
-def test_phase_is_that_of_a_response_that_follows_its_cause(hammer):
+def test_the_response_lags_the_force(hammer):
     # At resonance a displacement lags the force; conj(H2), as eq. 3 reads with the usual convention, would lead.
     result = measured(hammer, 4)
     truth = hammer.accelerance(result.frequency) / -((2 * np.pi * result.frequency) ** 2)
     at = np.argmin(np.abs(result.frequency - 616.0))
     assert np.angle(result.h2[at]) == pytest.approx(np.angle(truth[at]), abs=1e-6)
-    assert abs(np.sin(np.angle(truth[at]))) > 0.3  # else the sign of the phase would prove nothing
+    assert abs(np.sin(np.angle(truth[at]))) > 0.3  # otherwise the test could not show the sign of the phase
 
 
 def noisy_spectra(rng, sigma_f, sigma_a, h=0.6 - 1.7j, n=200_000):
@@ -113,7 +113,7 @@ def pole_and_residue(frequency, accelerance):
     return np.log(z) * RATE, 2.0 * (b0 * z + b1) / (z - np.conj(z))
 
 
-def test_exponential_window_needs_the_pole_corrected_and_nothing_rescaled():
+def test_an_exponential_window_needs_a_correction_of_the_pole_alone():
     from scipy.signal import fftconvolve
 
     from turnout.records import Channel, Recording

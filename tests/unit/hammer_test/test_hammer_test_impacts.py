@@ -1,4 +1,4 @@
-"""Impacts are found, measured and judged: one per record or many, sound or not."""
+"""Impacts are found, measured, and accepted or rejected: one or many in a record."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_a_contact_of_few_samples_has_the_measures_of_its_polygon(hammer, polari
 def test_a_continuous_record_is_cut_into_its_impacts(hammer):
     starts = (0.4, 1.3, 2.9)
     force = sum(hammer.force(peak=p, start=s, n=70_000) for s, p in zip(starts, (4000.0, 6000.0, 5000.0)))
-    force += hammer.force(peak=60.0, start=2.1, n=70_000)  # the hammer is put down and taken up again
+    force += hammer.force(peak=60.0, start=2.1, n=70_000)  # the user puts the hammer down and takes it again
     impacts = hammer.impacts([hammer.recording(hammer.samples(force))])
     assert [round(i.peak, -2) for i in impacts] == [4000, 6000, 5000]
     assert [i.record for i in impacts] == [0, 1, 2] and all(i.accepted for i in impacts)
@@ -69,14 +69,14 @@ def test_impacts_are_numbered_within_their_file(hammer):
     ]  # fmt: skip
 
 
-def test_a_reversed_hammer_is_named_on_every_impact(hammer):
+def test_a_reversed_hammer_is_reported_on_every_impact(hammer):
     recordings = [replace(r, samples=r.samples * [[-1], [1]]) for r in hammer.recordings(4)]
     for impact in hammer.impacts(recordings):
         assert reasons(impact) == ["sign_reversed"] and impact.peak < 0
         assert impact.rejections[0].detail.endswith("its sign is reversed, or it is another channel")
 
 
-def test_records_without_a_usable_impact_say_why(hammer):
+def test_records_without_a_usable_impact_have_a_reason(hammer):
     sound = hammer.recordings(4)
     broken = sound[0].samples.copy()
     broken[1, 700:705] = np.nan
@@ -95,7 +95,7 @@ def test_records_without_a_usable_impact_say_why(hammer):
     assert impacts[4].rejections[0].time == pytest.approx(700 / RATE)
 
 
-def test_a_gap_in_a_continuous_record_costs_one_impact(hammer):
+def test_a_gap_in_a_continuous_record_rejects_one_impact(hammer):
     samples = hammer.samples(hammer.force(start=0.1, n=40_000) + hammer.force(start=1.2, n=40_000))
     samples[1, 26_000:26_010] = np.nan
     assert [reasons(i) for i in hammer.impacts([hammer.recording(samples)])] == [[], ["not_finite"]]
@@ -111,7 +111,7 @@ def test_a_weak_impact_is_rejected_and_a_strong_one_whose_response_grew_with_it_
     assert impacts[6].rejections[0].value < impacts[6].rejections[0].limit
 
 
-def test_a_force_far_above_the_median_whose_response_did_not_grow_with_it_left_its_range(hammer):
+def test_a_force_far_above_the_median_with_a_usual_response_exceeded_its_range(hammer):
     usual = hammer.samples(hammer.force())
     recordings = [*hammer.recordings(6), hammer.recording(usual * np.array([[5.0], [1.0]]), 6)]
     impacts = hammer.impacts(recordings)
@@ -142,8 +142,8 @@ def test_late_and_cut_off_records_are_rejected(hammer):
 
 
 @pytest.mark.parametrize("begun", [2, 6, 14, 20])
-def test_an_impact_that_had_begun_before_its_record_is_rejected(hammer, begun):
-    """The response to the force that is missing is there; at 14 of 30 samples H1 would be wrong by four fifths."""
+def test_an_impact_that_began_before_its_record_is_rejected(hammer, begun):
+    """The record lacks a part of the force but has its response. At 14 of 30 samples H1 would be wrong by 80 %."""
     sound = hammer.recordings(4, noise=(1e-5, 1e-5))
     cut_short = hammer.samples(hammer.force(start=5e-3), (1e-5, 1e-5))[:, 100 + begun :]
     impacts = hammer.impacts([*sound, hammer.recording(cut_short, 9)])
@@ -182,8 +182,8 @@ def test_the_same_test_exported_twice_counts_once(hammer, digits):
     assert receptance_of(both).n == 5
 
 
-def test_impacts_alike_are_no_repeats(hammer):
-    """Equal forces and 80 dB between peak and noise: what tells them apart is their noise."""
+def test_similar_impacts_are_no_duplicates(hammer):
+    """Equal forces and 80 dB between peak and noise: only their noise differs."""
     force = hammer.force()
     recordings = [hammer.recording(hammer.samples(force, (1e-4, 1e-4)), k) for k in range(6)]
     assert [i.accepted for i in hammer.impacts(recordings)] == [True] * 6
@@ -194,7 +194,7 @@ def test_one_impact_alone_is_measured_and_not_compared(hammer):
     assert impact.accepted and impact.peak > 3900
 
 
-def test_a_significant_zero_line_is_taken_off_and_a_sound_one_left_alone(hammer):
+def test_a_significant_zero_offset_is_subtracted_and_an_insignificant_one_stays(hammer):
     sound = hammer.recordings(3)
     shifted = [replace(r, samples=r.samples + np.array([[40.0], [25.0]])) for r in sound]
     for a, b in zip(hammer.impacts(sound), hammer.impacts(shifted)):
@@ -205,14 +205,14 @@ def test_a_significant_zero_line_is_taken_off_and_a_sound_one_left_alone(hammer)
     assert sum(np.array_equal(i.acceleration, r.samples[1]) for i, r in zip(hammer.impacts(sound), sound)) >= 2
 
 
-def test_order_of_recordings_changes_nothing_but_the_order(hammer):
+def test_the_order_of_recordings_does_not_change_the_impacts(hammer):
     recordings = hammer.recordings(7)
     forward, backward = hammer.impacts(recordings), hammer.impacts(recordings[::-1])[::-1]
     for a, b in zip(forward, backward):
         assert a.force.tobytes() == b.force.tobytes() and a.rejections == b.rejections and a.band_edge == b.band_edge
 
 
-def test_a_missing_channel_is_a_key_error_that_lists_what_there_is(hammer):
+def test_a_missing_channel_is_a_key_error_that_lists_the_channels(hammer):
     with pytest.raises(KeyError, match="hammer"):
         find_impacts(hammer.recordings(1), "hammr", "rail")
 

@@ -1,4 +1,4 @@
-"""Double hits, overloads and outlying impacts: found when there, silent when not. Statistics are in the benchmarks."""
+"""Double impacts, overloads and outlying impacts are found, without false ones. Benchmarks have the statistics."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def with_limits(recording, *limits):
 @pytest.mark.parametrize(
     "contact, delay", [(1e-4, 4e-3), (1e-4, 50e-3), (5e-4, 4e-3), (1.5e-3, 4e-3), (3e-3, 6e-3), (3e-3, 50e-3)]
 )
-def test_a_second_hit_of_five_percent_is_found_and_measured(hammer, contact, delay):
+def test_a_second_impact_of_five_percent_is_found_and_measured(hammer, contact, delay):
     recordings = hammer.recordings(3, contact=contact)
     both = hammer.force(contact=contact) + hammer.force(peak=250.0, contact=contact, start=5e-3 + delay)
     impacts = hammer.impacts([*recordings, hammer.recording(hammer.samples(both), 3)])
@@ -32,32 +32,32 @@ def test_a_second_hit_of_five_percent_is_found_and_measured(hammer, contact, del
     found = (*impacts[3].rejections, *impacts[3].notes)[0]
     assert found.value == pytest.approx(0.05, rel=0.1) and f"{1e3 * delay:+.1f} ms" in found.detail
     after = impacts[3].contact_end >= (5e-3 + delay) * RATE
-    assert after or impacts[3].force.size < (5e-3 + delay) * RATE  # no decay contains it
+    assert after or impacts[3].force.size < (5e-3 + delay) * RATE  # no decay contains the second impact
     assert impacts[3].contact < 1.2 * contact + 1e-4
 
 
-def test_a_light_touch_ahead_of_the_impact_is_a_double_hit_too(hammer):
+def test_a_weak_contact_before_the_impact_is_a_double_impact(hammer):
     both = hammer.force(start=15e-3) + hammer.force(peak=800.0, start=5e-3)
     (impact,) = hammer.impacts([hammer.recording(hammer.samples(both))])
     assert findings(impact) == ["double_hit"] and "-10.0 ms" in (*impact.rejections, *impact.notes)[0].detail
 
 
-def test_policy_of_double_hits(hammer):
+def test_the_settings_decide_whether_double_impacts_are_used(hammer):
     strong = hammer.force() + hammer.force(peak=4500.0, start=15e-3)
     recording = [hammer.recording(hammer.samples(strong))]
     (moved,), (rejected,) = hammer.impacts(recording), hammer.impacts(recording, double_hit="reject")
     assert moved.accepted and moved.notes[0].reason == "double_hit" and "starts after" in moved.notes[0].detail
     assert moved.decay_start / RATE > 16.5e-3
     assert not rejected.accepted and rejected.rejections[0].reason == "double_hit"
-    # A second contact in the middle of a damped decay leaves nothing worth using.
+    # After a second contact in the middle of a damped decay no usable part remains.
     (too_late,) = hammer.impacts(
         [hammer.recording(hammer.samples(hammer.force() + hammer.force(peak=300.0, start=25e-3)))]
     )
     assert not too_late.accepted and "of the decay is left" in too_late.rejections[0].detail
 
 
-def test_quick_impacts_of_a_machine_are_said_to_be_separable(hammer):
-    """Six even impacts 150 ms apart: one with further contacts, unless impacts may follow each other so soon."""
+def test_a_note_states_that_fast_impacts_of_a_machine_can_be_separated(hammer):
+    """Six equal impacts 150 ms apart count as one with further contacts, unless the settings allow this separation."""
     many = sum(hammer.force(start=5e-3 + 0.15 * k, n=round(0.9 * RATE)) for k in range(6))
     recording = [hammer.recording(hammer.samples(many))]
     (one,) = hammer.impacts(recording)
@@ -66,7 +66,7 @@ def test_quick_impacts_of_a_machine_are_said_to_be_separable(hammer):
     assert [i.accepted for i in hammer.impacts(recording, separation=0.1)] == [True] * 6
 
 
-def test_a_second_hit_after_the_decay_ends_the_record_and_no_more(hammer):
+def test_a_second_impact_after_the_decay_only_ends_the_record(hammer):
     late = hammer.samples(hammer.force() + hammer.force(peak=300.0, start=90e-3))
     (cut,) = hammer.impacts([hammer.recording(late)])
     assert cut.accepted and findings(cut) == ["double_hit"] and "cut before it" in cut.notes[0].detail
@@ -76,7 +76,7 @@ def test_a_second_hit_after_the_decay_ends_the_record_and_no_more(hammer):
     assert not strict.accepted
 
 
-def test_hum_and_a_drifting_zero_are_no_second_hits(hammer):
+def test_hum_and_a_drifting_zero_are_no_second_impacts(hammer):
     t = np.arange(4000) / RATE
     recordings = hammer.recordings(4)
     hum = [replace(r, samples=r.samples + np.stack([100 * np.sin(314.16 * t + 1), 0 * t])) for r in recordings]
@@ -90,7 +90,7 @@ def test_hum_and_a_drifting_zero_are_no_second_hits(hammer):
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("contact", [6e-4, 3e-3])
 @pytest.mark.parametrize("steps", [100, 2000])
-def test_sound_pulses_are_no_overload_on_a_quiet_converter(hammer, family, contact, steps):
+def test_intact_pulses_are_no_overload_on_a_quiet_converter(hammer, family, contact, steps):
     recordings = []
     for r in hammer.recordings(6, noise=(0.0, 1e-3), family=family, contact=contact):
         step = r.samples[0].max() / steps
@@ -99,7 +99,7 @@ def test_sound_pulses_are_no_overload_on_a_quiet_converter(hammer, family, conta
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_clipping_is_found_hard_analog_and_soft(hammer, family):
+def test_hard_analog_and_soft_clipping_are_found(hammer, family):
     def test_with(distort, noise):
         force = distort(hammer.force(peak=8000.0, family=family))
         return hammer.impacts([*hammer.recordings(6, family=family), hammer.recording(hammer.samples(force, noise), 6)])
@@ -113,7 +113,7 @@ def test_clipping_is_found_hard_analog_and_soft(hammer, family):
 
 
 @pytest.mark.parametrize(("level", "is_flat"), [(0.9, True), (1.0, False)])
-def test_a_test_in_which_all_impacts_are_cut_alike_is_no_shape_of_the_tip(hammer, level, is_flat):
+def test_equal_clipping_of_all_impacts_is_not_mistaken_for_the_shape_of_the_tip(hammer, level, is_flat):
     """A half-sine cut at 0.9 of its peak is flat over acos(0.855) / acos(0.45) = 0.49 of its half width, all alike."""
     force = np.minimum(hammer.force(peak=8000.0, family="half-sine"), 8000.0 * level)
     impacts = hammer.impacts([hammer.recording(hammer.samples(force, (5e-3, 1e-3)), k) for k in range(6)])
@@ -132,8 +132,8 @@ def test_a_clipped_response_and_a_known_range_are_overloads(hammer):
 
 
 @pytest.mark.parametrize("zero", [-60.0, -30.0, 0.0, 30.0, 60.0])
-def test_a_range_is_reached_by_what_was_recorded_not_by_what_the_zero_line_leaves(hammer, zero):
-    """Impacts of 4.5 to 6.5 kN in 0.3 ms, 3 samples at the rail of 3 kN: too few to be told by their shape."""
+def test_the_recorded_signal_reaches_a_range_and_not_the_signal_less_its_zero_offset(hammer, zero):
+    """Impacts of 4.5 to 6.5 kN in 0.3 ms have 3 samples at the limit of 3 kN: too few to be detected by their shape."""
 
     def recordings(peaks):
         for k, peak in enumerate(peaks):
@@ -158,7 +158,7 @@ def test_the_range_of_a_response_is_that_of_its_recording(hammer, share):
         assert [findings(i) for i in hammer.impacts([with_limits(hammer.recording(samples), None, limit)])] == [found]
 
 
-def test_three_equal_samples_by_chance_are_no_rail():
+def test_three_equal_samples_by_chance_are_no_limit_of_the_converter():
     rng = np.random.default_rng(8)
     t = np.arange(4000)
     alarms = [rail_code(np.round(40 * np.sin(t / 9.0 + p) * np.exp(-t / 500) + rng.normal(size=4000)), 1.0, 1.0)
@@ -176,7 +176,7 @@ def test_top_share_has_its_closed_form(family, share):
     assert top_share(pulse, About) == pytest.approx(share, abs=2e-3)
 
 
-def test_the_odd_impact_is_named_with_both_coherences(hammer):
+def test_an_outlying_impact_is_reported_with_both_coherences(hammer):
     recordings = hammer.recordings(6)
     other = hammer.samples(hammer.force())
     other[1] = np.convolve(other[1], [0.2, -0.5, 0.9, 0.4, -0.8], mode="same")[::1] + 0.3 * np.roll(other[1], 55)
@@ -185,7 +185,7 @@ def test_the_odd_impact_is_named_with_both_coherences(hammer):
     assert "with it" in impacts[3].rejections[0].detail and "without" in impacts[3].rejections[0].detail
 
 
-def test_a_response_of_opposite_sign_is_named_even_if_a_third_of_the_test_has_it(hammer):
+def test_a_response_of_opposite_sign_is_reported_even_if_a_third_of_the_test_has_it(hammer):
     recordings = hammer.recordings(9)
     turned = [replace(r, samples=r.samples * [[1], [-1]]) if r.record % 3 == 0 else r for r in recordings]
     impacts = hammer.impacts(turned)
@@ -194,7 +194,7 @@ def test_a_response_of_opposite_sign_is_named_even_if_a_third_of_the_test_has_it
 
 
 @pytest.mark.parametrize("n, is_found", [(2, False), (3, False), (4, True)])
-def test_an_odd_impact_needs_three_others_that_agree(hammer, n, is_found):
+def test_an_outlying_impact_is_found_only_if_three_others_agree(hammer, n, is_found):
     recordings = hammer.recordings(n)
     recordings[1] = replace(recordings[1], samples=recordings[1].samples * [[1], [-1]])
     assert [findings(i) for i in hammer.impacts(recordings)] == [
@@ -202,19 +202,19 @@ def test_an_odd_impact_needs_three_others_that_agree(hammer, n, is_found):
     ]
 
 
-def test_pairs_are_symmetric_and_between_nothing_and_one():
+def test_coherences_of_pairs_are_symmetric_and_between_0_and_1():
     rng = np.random.default_rng(3)
     force, acceleration = rng.standard_normal((2, 7, 40, 2)) @ [1.0, 1j]
     pairs = pairwise_coherence(force, acceleration)
     assert np.array_equal(pairs, pairs.T) and (np.diag(pairs) == 1.0).all()
-    # Two records of nothing in common: z = 1 - (1 - p) at the median, 0.5, here the median of 40 lines.
+    # Two unrelated records: z = 1 - (1 - p) at the median, 0.5, here the median of 40 lines.
     assert 0.2 < np.median(pairs[pairs < 1.0]) < 0.8
 
 
-def test_a_shifted_resonance_is_no_change_of_size():
+def test_a_shifted_resonance_is_no_change_of_amplitude():
     f = np.arange(20.0, 1200.0, 5.0)
     force = np.outer([5.0, 4.0, 6.0, 5.0, 5.5], np.ones(f.size))
     own = 616.0 * np.array([[1.0], [1.0], [1.0], [1.03], [0.97]])
     acceleration = force * (1j * f) ** 2 / (own**2 - f**2 + 2j * 0.066 * own * f)
-    # Area under a resonance of acceleration goes with the frequency: 3 % shift, some percent of size and no more.
+    # The area under a resonance of acceleration is proportional to the frequency: a shift of 3 % changes it by as much.
     assert response_gain(force, acceleration) == pytest.approx(1.0, abs=0.05)

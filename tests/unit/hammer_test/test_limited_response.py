@@ -1,4 +1,4 @@
-"""A response limited before its filter in some impacts only: these are rejected, intact and misplaced ones are not."""
+"""Impacts whose response is limited before its filter are rejected; intact and misplaced impacts are not."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ N_IMPACTS = 10
 
 
 def hammer_test(seed, n_limited=0, beside=0.0):
-    """Ten impacts of 1 to 6 kN, shorter the harder they are, and how far each response exceeds the limit.
+    """Ten impacts of 1 to 6 kN, shorter at larger forces, and the excess of each response over the limit.
 
     The limit lies below the largest peaks. ``beside`` is the share of impacts beside the mark, on other supports.
     """
@@ -57,7 +57,7 @@ def test_limited_impacts_are_rejected_with_reason_and_advice_and_the_rest_is_use
     assert "choose a larger range or hit less hard" in rejected[0].rejections[0].detail
 
 
-def test_of_the_limited_impacts_those_that_matter_are_found_and_no_intact_one():
+def test_strongly_limited_impacts_are_found_and_intact_ones_are_not():
     found = over = 0
     for seed in range(4000, 4040):
         recordings, excess = hammer_test(seed, n_limited=1 + seed % 3)
@@ -69,7 +69,7 @@ def test_of_the_limited_impacts_those_that_matter_are_found_and_no_intact_one():
 
 
 @pytest.mark.parametrize("beside", [0.0, 0.2])
-def test_intact_impacts_of_different_force_also_beside_the_mark_are_not_called_limited(beside):
+def test_intact_impacts_of_different_force_and_position_are_not_rejected_as_limited(beside):
     """Promised: at most 0.3 % of impacts; 0 of 1,200 has an upper 95 % limit of 0.25 %."""
     wrong = sum(len(newly_rejected(hammer_test(seed, beside=beside)[0])[0]) for seed in range(6000, 6060))
     assert wrong == 0
@@ -85,7 +85,7 @@ def test_intact_impacts_of_different_force_also_beside_the_mark_are_not_called_l
     ],
 )
 def test_impacts_beside_the_mark_are_intact_for_two_reasons(seed, kind):
-    """A cut explains their misfit badly (first two tests), or at another level than that of the others (last two)."""
+    """A limit hardly explains their misfit (first two tests), or only one at another level (last two)."""
     recordings, excess = hammer_test(seed, **kind)
     rejected, _ = newly_rejected(recordings)
     assert all(excess[k] > 1.0 for k in rejected) and bool(rejected) == ("n_limited" in kind)

@@ -1,4 +1,4 @@
-"""Overloads, couplings and windows as loggers and analysers leave them in recordings of one known track.
+"""Overloads, couplings and windows of loggers and analysers in recordings of one known track.
 
 The programs in ``shared/inputs/recordings/16_signal`` write them: 160 Hz with 0.08 and 560 Hz with 0.06.
 """
@@ -68,7 +68,7 @@ def test_the_other_impacts_give_the_true_modes(folder, name, n_accepted, n_overl
         assert found[band] == (pytest.approx(frequency, abs=0.3), pytest.approx(damping, abs=2e-3))
 
 
-def test_an_exponential_window_adds_its_decay_rate_to_each_mode_as_the_guide_on_measuring_says(folder):
+def test_an_exponential_window_adds_its_decay_rate_to_each_mode_as_docs_measuring_states(folder):
     """Decay rate 50 1/s: damping rises by 50/(2π f), to 0.130 and 0.074."""
     _, _, model = identify_accepted(judged(folder, "exp_window.npz"), ReceptanceSettings(), IdentifySettings())
     for mode, (frequency, damping) in zip(model.modes, ((160.0, 0.08), (560.0, 0.06))):

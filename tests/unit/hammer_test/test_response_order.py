@@ -1,4 +1,4 @@
-"""The force feeds energy into a passive structure: the phase tells an acceleration from a velocity."""
+"""The force supplies energy to a passive structure, so the phase distinguishes an acceleration from a velocity."""
 
 import numpy as np
 import pytest
@@ -67,7 +67,7 @@ def beam_receptance(distance, pad, ballast, sleeper):
 
 @pytest.mark.parametrize("supports", [(4e8, 1e8, 250.0), (1e9, 3e8, 300.0), (1e8, 3e7, 250.0)])
 @pytest.mark.parametrize("distance", [0.0, 0.2, 0.5, 0.7, 1.0, 1.5])
-def test_beside_the_hammer_no_acceleration_is_taken_for_a_velocity(distance, supports):
+def test_near_the_hammer_no_acceleration_is_mistaken_for_a_velocity(distance, supports):
     """A velocity is found up to half a metre from the hammer. Farther away nothing is stated."""
     receptance = beam_receptance(distance, *supports)
     velocity, acceleration = (PhaseLines(FREQUENCY, (1j * OMEGA) ** n * receptance, np.zeros(155)) for n in (1, 2))
@@ -91,7 +91,7 @@ def hammer_test(section, factors, order, n=5, delay=0, sign=1.0, noise=0.01):
 
 @pytest.mark.parametrize("section", SECTIONS)
 @pytest.mark.parametrize("factors", TRACKS)
-def test_a_velocity_in_mm_s_is_rejected_by_name_and_an_acceleration_is_not(section, factors):
+def test_a_velocity_in_mm_s_is_rejected_with_its_reason_and_an_acceleration_is_accepted(section, factors):
     recordings = hammer_test(section, factors, 1)
     impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
     reasons = {(r.reason, r.channel) for i in impacts for r in i.rejections}
@@ -102,8 +102,8 @@ def test_a_velocity_in_mm_s_is_rejected_by_name_and_an_acceleration_is_not(secti
         assert judge_response_order(impacts, "rail") == tuple(impacts)
 
 
-def test_a_velocity_is_of_the_size_of_an_acceleration():
-    """What the scale alone shows: 2.2 times as many rails as there are, which a crossing has too."""
+def test_the_scale_of_a_response_alone_does_not_reveal_a_velocity():
+    """The scale alone corresponds to 2.2 times the actual number of rails, as at a crossing."""
     impacts = [i for i in find_impacts(hammer_test("SP", (1.0, 1.0), 1), "force", "rail") if i.accepted]
     assert rails_that_resist(impacts).is_track
 

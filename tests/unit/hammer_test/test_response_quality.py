@@ -1,4 +1,4 @@
-"""The response of a track: factors of units, saturation before a filter, and lag are found; intact tests stay."""
+"""Factors of units, saturation before a filter and lag are found in the response; intact tests are accepted."""
 
 import runpy
 
@@ -31,7 +31,7 @@ def reasons_of(samples, settings=None):
 
 
 def test_an_intact_test_is_accepted_with_the_mobility_of_its_modes(hits):
-    """Two masses on springs are no rail: what they add from one rate to the other is taken as a delay."""
+    """Two masses on springs are no rail: their additional phase is taken as a delay."""
     impacts = impacts_of(hits)
     assert all(i.accepted for i in impacts)
     modes = [(250.0, 2 * np.pi * 160.0, 0.08), (90.0, 2 * np.pi * 560.0, 0.06)]
@@ -53,7 +53,7 @@ def test_factors_of_units_are_found(hits, factor):
     assert "rails 54E1" in detail and "receptance.softest_blow: 0" in detail
 
 
-def test_a_small_hammer_on_a_beam_has_no_limits_of_a_track(hits):
+def test_the_limits_of_a_track_do_not_apply_to_a_small_hammer_on_a_beam(hits):
     assert not reasons_of(hits[:5] * [[0.01], [1.0]], ReceptanceSettings(softest_blow=0.0))
 
 
@@ -68,7 +68,7 @@ def test_a_response_that_saturates_before_its_filter_is_found(hits):
 
 
 @pytest.mark.parametrize(("shift", "word"), [(-8, "before"), (200, "after")])
-def test_a_response_that_is_not_simultaneous_is_given_with_its_lag(hits, shift, word):
+def test_a_response_that_is_not_simultaneous_is_reported_with_its_lag(hits, shift, word):
     shifted = hits.copy()
     shifted[:, 1] = np.roll(hits[:, 1], shift, axis=1)
     undisturbed = np.median([response_lag(i) for i in impacts_of(hits)])
@@ -78,13 +78,13 @@ def test_a_response_that_is_not_simultaneous_is_given_with_its_lag(hits, shift, 
     assert "rail begins" in rejection.detail and f"{word} the force" in rejection.detail
 
 
-def test_a_shift_by_the_filters_of_two_channels_is_accepted(hits):
+def test_a_lag_by_the_filters_of_two_channels_is_accepted(hits):
     shifted = hits.copy()
     shifted[:, 1] = np.roll(hits[:, 1], 3, axis=1)
     assert not reasons_of(shifted)
 
 
-def test_a_stronger_impact_on_a_linear_track_is_used(hits):
+def test_stronger_impacts_on_a_linear_track_are_used(hits):
     """Three impacts in the ratio 3.9, 3.1 and 14, and four even ones with one of three and a half times their force."""
     for peaks in ([3.9, 3.1, 14.0], [3.9, 3.8, 3.9, 4.0, 14.0]):
         scaled = hits[: len(peaks)] * (np.array(peaks) * 100.0 / hits[: len(peaks), 0].max(axis=1))[:, None, None]
@@ -112,6 +112,6 @@ def test_a_response_whose_slope_is_limited_in_all_impacts_is_found(hits):
 
 
 @pytest.mark.parametrize("seed", range(2, 6))
-def test_an_intact_response_is_never_limited(shared_recordings, seed):
+def test_an_intact_response_is_not_rejected_as_limited(shared_recordings, seed):
     samples = np.array(runpy.run_path(str(shared_recordings / "gen.py"))["hits"](seed=seed))
     assert "overload" not in reasons_of(samples)

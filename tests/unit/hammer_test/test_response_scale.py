@@ -1,4 +1,4 @@
-"""An impact first meets a rail: free rails are the bound of every track, and the factors of units leave the range."""
+"""At first an impact moves the rail alone: free rails bound every track, and wrong units leave this range."""
 
 from dataclasses import replace
 from datetime import date
@@ -25,7 +25,7 @@ from turnout.hammer_test.response_scale import (
 from turnout.records import Channel, Recording
 
 SECTIONS = "OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"
-# Response read too large or too small by the confusions lbf/N, g/(m/s²), inch/mm, kN/N; a force the other way round.
+# Factors of the response by the confusions lbf/N, g/(m/s²), inch/mm, kN/N; the inverse ones apply to the force.
 FACTORS = 4.448, 1 / 4.448, 9.81, 1 / 9.81, 25.4, 1 / 25.4, 1000.0, 1 / 1000.0
 CHANNELS = Channel("force", "force"), Channel("rail", "acceleration")
 
@@ -59,7 +59,7 @@ def test_the_closed_form_is_the_integral_over_the_wave_number(s, foundation):
     assert free_rail_mobility(s, foundation) == pytest.approx(integral, rel=3e-3)
 
 
-def test_every_track_of_rails_or_crossings_is_inside_and_leaves_with_the_least_factor():
+def test_rails_and_crossings_are_within_the_range_and_outside_with_the_smallest_factor():
     """Rails 45 to 60 kg/m, or a crossing of up to twice the mass and four times the stiffness of 60E1."""
     rng, values = np.random.default_rng(20), []
     for k in range(4000):
@@ -91,7 +91,7 @@ def test_tracks_are_accepted_and_each_factor_is_found(section, ballast, railpad)
 
 @pytest.mark.parametrize("channel", [0, 1])
 @pytest.mark.parametrize("factor", FACTORS)
-def test_a_factor_on_either_channel_rejects_the_test_by_name(channel, factor):
+def test_a_factor_on_either_channel_rejects_the_test_with_its_reason(channel, factor):
     scale = np.ones((2, 1))
     scale[channel] = factor
     limitless = [Recording(r.samples * scale, RATE, CHANNELS, "a", record=r.record) for r in track_test("SP")]
@@ -101,7 +101,7 @@ def test_a_factor_on_either_channel_rejects_the_test_by_name(channel, factor):
 
 @pytest.mark.parametrize("contact", [0.4e-3, 0.8e-3, 1.5e-3, 3e-3])
 @pytest.mark.parametrize("shift", [-2, 0, 3])
-def test_contact_and_lag_of_a_filter_leave_a_track_inside(contact, shift):
+def test_a_track_is_within_the_range_with_any_contact_time_and_lag_of_a_filter(contact, shift):
     rng, recordings = np.random.default_rng(3), []
     response = simulated_response("CLP", 1.0, 1.0)
     for k in range(5):

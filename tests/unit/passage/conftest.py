@@ -1,4 +1,4 @@
-"""Settings of the passage part, and the repository's root on the path for the truth in ``benchmarks``."""
+"""Settings of the passage stage, and the root of the repository on the path for the module ``benchmarks``."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Recordings with something wrong, or with something odd that is not wrong: named where it is, used where intact."""
+"""Faulty recordings, and unusual ones without a fault: faults are reported, and intact channels are used."""
 
 from dataclasses import replace
 
@@ -39,16 +39,16 @@ def test_a_sensor_may_record_an_irregularity_beside_it_instead_of_the_wheel_abov
     assert passage.speed.speed == pytest.approx(40.0, rel=3e-3)
 
 
-def test_an_impact_at_one_place_is_not_a_second_train(settings):
-    """Two of five sensors hear every wheel a second time, when it is at the nose."""
+def test_impacts_at_one_position_are_not_a_second_train(settings):
+    """Two of five sensors record every wheel a second time, when it is at the nose."""
     rng = np.random.default_rng(22)
     recording = impacts(rng, rolling_noise(rng, IC3, 15.0, PLACES), 19.0, 15.0, [3, 4])
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.n_axle == 8 and not findings(passage, "two_trains")
 
 
-def test_a_clock_that_runs_too_fast_is_named_with_its_channel(settings):
-    """A twelfth too fast, right in the middle of the train: its offset changes sign, and its mean says nothing."""
+def test_a_clock_that_runs_too_fast_is_reported_with_its_channel(settings):
+    """A twelfth too fast, and right at the middle of the train: the offset changes its sign, and its mean is 0."""
     recording = rolling_noise(np.random.default_rng(23), IC3, 25.0, PLACES)
     samples, n = recording.samples.copy(), recording.n_sample
     middle = (1.0 + (IC3.mean() + PLACES[1]) / 25.0) * RATE
@@ -61,8 +61,8 @@ def test_a_clock_that_runs_too_fast_is_named_with_its_channel(settings):
 
 
 @pytest.mark.parametrize("after", ["constant", "noise"])
-def test_a_sensor_that_falls_off_halfway_says_until_when_it_is_sound(after, settings):
-    """What it says afterwards is a constant, or the noise of an amplifier without a sensor."""
+def test_the_finding_about_a_lost_sensor_states_when_it_was_lost(after, settings):
+    """Afterwards the channel records a constant, or the noise of an amplifier without a sensor."""
     rng = np.random.default_rng(24)
     recording = rolling_noise(rng, IC3, 25.0, PLACES)
     samples, fell = recording.samples.copy(), int(2.0 * RATE)
@@ -76,8 +76,8 @@ def test_a_sensor_that_falls_off_halfway_says_until_when_it_is_sound(after, sett
     assert lost[0].value == pytest.approx(2.0, abs=0.1)
 
 
-def test_all_channels_clipped_still_tell_that_a_train_came(settings):
-    """Every sensor says nothing about the track; the axles are what the clipped parts let through."""
+def test_a_train_is_detected_although_all_channels_are_clipped(settings):
+    """No channel is used for the track. The axles are those that the clipped signals show."""
     recording = rolling_noise(np.random.default_rng(25), IC3, 40.0, PLACES)
     samples = np.clip(recording.samples, -0.05, 0.05)
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)

@@ -1,4 +1,4 @@
-"""Trains that brake or gain speed while sensors over half a hundred metres hear them."""
+"""Trains that brake or accelerate while sensors over fifty metres record them."""
 
 from types import SimpleNamespace
 
@@ -26,7 +26,7 @@ def passed(settings, offsets, speed, acceleration, direction):
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize(("speed", "acceleration"), [(20.0, -0.8), (12.0, 0.8), (15.0, 0.3)])
-def test_a_train_that_changes_its_speed_is_counted_named_and_finds_no_fault_in_clocks(
+def test_a_train_that_changes_its_speed_is_recognized_without_faults_of_clocks(
     speed, acceleration, direction, settings
 ):
     passage, middle = passed(settings, IC3, speed, acceleration, direction)
@@ -38,8 +38,8 @@ def test_a_train_that_changes_its_speed_is_counted_named_and_finds_no_fault_in_c
 
 
 @pytest.mark.parametrize(("speed", "acceleration"), [(18.0, -0.3), (10.0, 0.1)])
-def test_a_freight_train_without_template_too(speed, acceleration, settings):
-    """300 m of wagons: it is two fifths slower, or a third faster, when it has passed."""
+def test_a_freight_train_without_a_template_that_changes_its_speed_is_recognized(speed, acceleration, settings):
+    """300 m of wagons: the last wagon is two fifths slower or a third faster than the first."""
     passage, middle = passed(settings, FREIGHT, speed, acceleration, 1)
     assert not {f.reason for f in passage.findings} & {"clock_drift", "two_trains", "axles_uncertain"}
     assert (passage.n_axle, passage.type.type, len(passage.audible_sensors)) == (60, "unknown", 6)
@@ -49,9 +49,9 @@ def test_a_freight_train_without_template_too(speed, acceleration, settings):
 
 @pytest.mark.parametrize("acceleration", [0.1, -0.15])
 def test_exact_times_of_a_train_that_changes_its_speed_give_speed_and_acceleration(acceleration, settings):
-    """138 m at 9 m/s at first, up by a fifth or down by two: neither slowness nor way is a straight line."""
+    """138 m, at 9 m/s at first and a fifth faster or two fifths slower at the end: slowness and distance are curved."""
     times = passing_times(FREIGHT[:28], PLACES, 9.0, acceleration, 1, 3.0)
     heard = SimpleNamespace(positions=np.array(PLACES))
     speed, se, found, _, at = _sensor_speed(times, heard, 1, settings.place_error, settings)
     assert speed == pytest.approx(9.0 + acceleration * (at - 3.0), rel=1e-4) and se < 2e-3 * speed
-    assert found == pytest.approx(acceleration, rel=5e-3)  # the prior holds back a little
+    assert found == pytest.approx(acceleration, rel=5e-3)  # the prior reduces the estimate slightly

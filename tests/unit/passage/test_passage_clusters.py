@@ -1,4 +1,4 @@
-"""Clusters of passages: the true ones are found, they keep their names, and strangers belong to none."""
+"""Clusters of passages: the true ones are found and keep their ids; other trains belong to none."""
 
 import json
 
@@ -39,15 +39,15 @@ def labels(clusters, rows):
     return [clusters.assign(r["train_type"], r["speed_kmh"], r["axle_load_t"]) or "none" for r in rows]
 
 
-def test_clusters_are_those_of_the_traffic_and_their_number_is_found(settings):
+def test_clusters_and_their_number_are_those_of_the_traffic(settings):
     rows, truth = night(np.random.default_rng(1), 600)
     clusters = fit_clusters(rows, settings)
     assert len(clusters.clusters) == len(TRAFFIC)
     assert adjusted_rand_score(truth, labels(clusters, rows)) >= 0.95
 
 
-def test_the_number_of_a_traffic_that_ended_is_never_used_again(settings):
-    """Slow trains end, then their type itself, and another traffic of it begins years later."""
+def test_the_id_of_a_traffic_that_ended_is_not_used_again(settings):
+    """Slow trains end, then all trains of the type, and years later other trains of the type begin."""
     rng = np.random.default_rng(8)
 
     def fitted(groups, previous=None):
@@ -81,7 +81,7 @@ def test_ids_stay_when_a_night_is_added_and_the_clusters_are_fitted_again(settin
     assert adjusted_rand_score(truth, before) >= 0.9
 
 
-def test_a_new_kind_of_traffic_gets_a_number_that_was_never_used(settings):
+def test_new_traffic_gets_an_unused_id(settings):
     rng = np.random.default_rng(3)
     rows, _ = night(rng, 400)
     first = fit_clusters(rows, settings)
@@ -102,7 +102,7 @@ def test_the_order_of_the_passages_does_not_matter(settings):
     assert json.dumps(turned.document()) == json.dumps(fit_clusters(rows, settings).document())
 
 
-def test_strangers_belong_to_no_cluster_and_unknown_types_to_none(settings):
+def test_unusual_trains_and_unknown_types_belong_to_no_cluster(settings):
     rows, _ = night(np.random.default_rng(5), 300)
     clusters = fit_clusters(rows, settings)
     assert clusters.assign("IC3", 300.0, 12.0) is None
@@ -111,7 +111,7 @@ def test_strangers_belong_to_no_cluster_and_unknown_types_to_none(settings):
     assert clusters.assign("IC3", 160.0, None) == clusters.assign("IC3", 160.0, 12.0)
 
 
-def test_a_train_that_passed_once_has_a_cluster_and_costs_the_others_nothing(settings):
+def test_a_train_that_passed_once_has_its_own_cluster_and_leaves_the_others_unchanged(settings):
     rows, _ = night(np.random.default_rng(6), 200)
     alone = {"train_type": "measuring train", "speed_kmh": 60.0, "axle_load_t": 15.0}
     clusters, others = fit_clusters([*rows, alone], settings), fit_clusters(rows, settings)
@@ -120,7 +120,7 @@ def test_a_train_that_passed_once_has_a_cluster_and_costs_the_others_nothing(set
     assert clusters.assign("measuring train", 120.0, 15.0) is None
 
 
-def test_a_document_comes_back_as_it_went(settings):
+def test_clusters_stay_the_same_when_they_are_stored_and_loaded(settings):
     rows, _ = night(np.random.default_rng(6), 200)
     clusters = fit_clusters(rows, settings)
     back = Clusters.of(json.loads(json.dumps(clusters.document())))
@@ -128,7 +128,7 @@ def test_a_document_comes_back_as_it_went(settings):
     assert labels(back, rows) == labels(clusters, rows)
 
 
-def test_without_loads_the_speed_alone_makes_clusters(settings):
+def test_without_loads_the_clusters_follow_from_the_speed_alone(settings):
     rng = np.random.default_rng(7)
     rows = [
         {"train_type": "IC3", "speed_kmh": float(v * np.exp(0.03 * rng.standard_normal())), "axle_load_t": None}
@@ -169,7 +169,7 @@ def test_adjusted_effects_are_the_true_ones_where_raw_groups_mislead():
     assert misled == 60
 
 
-def test_what_the_other_factors_determine_has_no_adjusted_effect():
+def test_a_factor_that_the_other_factors_determine_has_no_adjusted_effect():
     rows = confounded(np.random.default_rng(9), 60)
     for r in rows:
         r["axle_load_t"] = 18.0 if r["train_type"] == "freight" else 11.0

@@ -1,4 +1,4 @@
-"""Combs with a free tooth: what they explain, which row of vehicles they find, and what they do not name."""
+"""Axle combs with a free tooth: explained shares, rows of vehicles that are found, and unknown trains."""
 
 import warnings
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ SHORT, LONG = Vehicle("short", 9.0, (1.4, 7.0)), Vehicle("long", 14.0, (1.8, 3.6
 
 
 def laid(places, noise=0.0, n=900, seed=0):
-    """Profiles of one sensor and one motion: the tooth at ``places`` [m] behind where hearing begins."""
+    """Profiles of one sensor and one motion: the tooth at ``places`` [m] behind the start of the profile."""
     row = np.zeros(n)
     for place in places:
         at = (place + 12.0) / COMB_STEP
@@ -35,8 +35,8 @@ def laid(places, noise=0.0, n=900, seed=0):
     return Profiles((Motion(1.0),), row[None, None], spectra, np.array([np.sum(row**2)]), length, np.zeros(1))
 
 
-def test_a_motion_that_would_turn_back_within_the_recording_has_no_length():
-    """A long quiet recording, and a train that brakes so hard that it would roll back: no metres, and no fault."""
+def test_a_motion_that_would_reverse_within_the_recording_has_no_length():
+    """A long quiet recording and a train that brakes so hard that it would roll back: length 0, and no error."""
     levels = SimpleNamespace(step=0.01, amplitude=np.abs(np.random.default_rng(0).normal(size=(1, 12_000))))
     listening = SimpleNamespace(levels=levels, positions=[3.0], begin=0.0, end=120.0)
     found = profiles_at(listening, [Motion(5.0, 10.0, -0.5), Motion(5.0, 10.0)])
@@ -75,7 +75,7 @@ def test_profiles_of_many_motions_are_those_of_each():
             assert found.values[i, k] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-def test_the_true_comb_explains_all_and_gives_its_tooth_back():
+def test_the_true_comb_explains_all_and_its_tooth_is_estimated():
     places = offsets((LONG, SHORT, LONG, LONG))
     profiles, comb = laid(places + 6.0), Comb.of(places)
     share, starts = explained_share(profiles, comb, np.arange(1))
@@ -88,7 +88,7 @@ def test_the_true_comb_explains_all_and_gives_its_tooth_back():
 
 
 @pytest.mark.parametrize("steps", [-2, 2])
-def test_a_row_may_start_two_steps_before_or_behind_and_no_further(steps):
+def test_a_row_may_start_up_to_two_steps_before_or_behind_its_position(steps):
     """Before the axles move, the share is the best of those at the five starts."""
     row = (LONG, SHORT, LONG, LONG)
     places = offsets(row)
@@ -122,14 +122,14 @@ def test_the_row_of_mixed_vehicles_is_found_with_its_start(seed):
     assert start == pytest.approx(5.0, abs=2 * COMB_STEP)
 
 
-def test_a_group_that_may_be_missing_is_left_out_where_it_is():
+def test_an_optional_group_is_left_out_if_it_is_missing():
     pattern = Pattern("t", (Group((SHORT,), 0, 2), Group((LONG,), 1, 9), Group((SHORT,), 0, 1)))
     for row in ((LONG,) * 3, (SHORT, LONG, LONG), (SHORT, SHORT, LONG, LONG, SHORT)):
         profiles = laid(offsets(row) + 5.0, 0.3)
         assert [v.name for v in likeliest_row(profiles, TOOTH[None], pattern, 5.0)[0]] == [v.name for v in row]
 
 
-def test_other_wheelbases_are_found_and_the_same_ones_left_alone():
+def test_other_wheelbases_are_found_and_correct_ones_stay():
     wide = Vehicle("long", 14.0, (1.6, 3.8, 10.2, 12.4))
     row, true = (LONG,) * 5, offsets((wide,) * 5)
     for places, moved in ((offsets(row), 0.0), (true, 0.2)):
@@ -137,7 +137,7 @@ def test_other_wheelbases_are_found_and_the_same_ones_left_alone():
         found, before, after = fit_shape(profiles, row, offsets(row), 6.0)
         base = np.diff(found)[::2]
         assert base == pytest.approx(1.8 + 2 * moved, abs=0.06)
-        # what four free numbers gain by chance, by Schwarz, parts the two
+        # the limit is the chance gain of four free numbers by Schwarz
         gain = evidence(after, 144.0, 1) - evidence(before, 144.0, 1)
         assert (gain > 0.5 * 4 * np.log(144.0 / 0.5)) == (moved > 0)
 
@@ -168,8 +168,8 @@ def test_the_stated_error_of_the_speed_covers_it(positions, settings):
     assert inside > 19
 
 
-def test_levels_of_a_silent_channel_have_an_amplitude():
-    """Without a warning of numpy about an empty mean."""
+def test_the_levels_of_a_silent_channel_have_an_amplitude():
+    """numpy must not warn of an empty mean."""
     recording = recording_of(np.zeros((1, int(RATE))), (0.0,))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

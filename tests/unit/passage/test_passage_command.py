@@ -30,7 +30,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def told(place, samples, capsys):
+def command_result(place, samples, capsys):
     """(exit code, what was printed) for a recording that lies behind a link."""
     recording = Recording(samples[None], 5000.0, (Channel("web", "acceleration"),), "passage", datetime(2026, 7, 25, 9))
     write([recording], place / "share/train.npz", "npz")
@@ -43,9 +43,9 @@ def told(place, samples, capsys):
     ("broken", "said"),
     [(None, "no_train: nothing stands out of the noise"), (np.nan, "1 of 20000 samples are missing or not finite")],
 )
-def test_a_file_that_tells_of_no_train_is_said_and_is_no_success(place, capsys, broken, said):
+def test_a_file_without_a_train_is_reported_with_exit_code_1(place, capsys, broken, said):
     samples = np.random.default_rng(7).normal(0.0, 0.1, 20000)
     if broken is not None:
         samples[7] = broken
-    code, printed = told(place, samples, capsys)
+    code, printed = command_result(place, samples, capsys)
     assert code == 1 and said in printed

@@ -1,4 +1,4 @@
-"""Continuous records cut into passages: where, how many, and with how much memory."""
+"""Continuous records are cut into passages: positions, number and memory."""
 
 import tracemalloc
 from dataclasses import replace
@@ -43,7 +43,7 @@ def test_every_train_is_in_one_piece_with_its_margins_whatever_the_blocks(block,
         )
 
 
-def test_a_train_that_the_record_cuts_off_is_handed_over_as_far_as_it_goes(settings):
+def test_a_train_that_the_record_cuts_off_is_returned_as_far_as_recorded(settings):
     samples = record((19.0,), (40.0,), 20.0)
     pieces = list(cut_passages([samples], RATE, settings))
     assert len(pieces) == 1
@@ -54,7 +54,7 @@ def test_a_quiet_record_has_no_passages(settings):
     assert list(cut_passages([0.02 * np.random.default_rng(3).standard_normal((3, 400000))], RATE, settings)) == []
 
 
-def test_what_is_longer_than_may_be_kept_is_cut_and_says_so(settings):
+def test_a_passage_longer_than_the_limit_is_cut_and_marked(settings):
     short = replace(settings, longest=10.0)
     rng = np.random.default_rng(4)
     samples = 0.02 * rng.standard_normal((1, int(60 * RATE)))
@@ -65,7 +65,7 @@ def test_what_is_longer_than_may_be_kept_is_cut_and_says_so(settings):
 
 
 @pytest.mark.parametrize(("before", "lasts"), [(200.0, 150.0), (30.0, 100.0), (4.0, 40.0)])
-def test_a_train_is_no_less_loud_for_lasting_long(before, lasts, settings):
+def test_a_long_train_is_detected_from_its_start_to_its_end(before, lasts, settings):
     """A freight train of 700 m at 17 km/h; another one shortly after a file began."""
     rate, rng = 2000.0, np.random.default_rng(6)
     samples = 0.1 * rng.standard_normal((2, int((before + lasts + 20.0) * rate)))
@@ -76,8 +76,8 @@ def test_a_train_is_no_less_loud_for_lasting_long(before, lasts, settings):
     assert stop == pytest.approx(before + lasts + settings.margin, abs=0.1)
 
 
-def test_noise_that_came_to_stay_becomes_what_is_quiet(settings):
-    """A machine beside the track runs until the record ends: one piece as long as may be kept, no endless row."""
+def test_permanent_noise_becomes_the_quiet_level(settings):
+    """A machine beside the track runs until the record ends. One piece of the longest duration is cut, not many."""
     rate, rng = 2000.0, np.random.default_rng(7)
     samples = 0.1 * rng.standard_normal((1, int(600.0 * rate)))
     samples[:, int(60.0 * rate) :] *= 4.0
@@ -100,7 +100,7 @@ def test_memory_does_not_grow_with_the_record(settings):
 
 
 def logged(folder, format, starts=(12.0, 28.6, 55.0), length=70.0):
-    """A file of one long record: the second train is across the border of two blocks, at 30 s."""
+    """A file of one long record: the second train is at the border of two blocks, at 30 s."""
     channels = (Channel("c0", "acceleration", 0.0), Channel("c1", "acceleration", 4.0))
     recording = Recording(record(starts, (40.0, 20.0, 33.0), length), RATE, channels, "passage")
     return write([recording], folder / f"x.{format}", {"uff": "uff58b"}.get(format, format)).name

@@ -1,4 +1,4 @@
-"""Trains over a crossing's nose: each wheel causes an impact there, stronger at all sensors than their own wheels."""
+"""Trains over a nose: each wheel has an impact there, which all sensors record stronger than wheels above them."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ STRANGER = np.array([0.0, 1.9, 11.2, 13.1, 19.7, 21.8, 33.0, 35.4])
 
 
 def with_impacts(rng, offsets, speed, direction, strength=6.0):
-    """Bursts that follow the wheels, and at each sensor a burst ``strength`` times as strong for a wheel at the nose,
-    ringing for 15 ms, all of it at the same moment; and (n_sensor, n_axle) when the wheels pass the sensors."""
+    """Bursts that follow the wheels, and at all sensors a burst of 15 ms, ``strength`` times as strong, for each wheel
+    at the nose; and (n_sensor, n_axle) times at which the wheels pass the sensors."""
     recording = rolling_noise(rng, offsets, speed, PLACES, direction)
     samples, time = recording.samples.copy(), np.arange(recording.samples.shape[1]) / RATE
     every = passing_times(offsets, (*PLACES, NOSE), speed, 0.0, direction, 1.0)
@@ -35,11 +35,11 @@ def test_a_known_train_with_nose_impacts_is_found_with_its_speed_and_direction(d
     # axles 0.4 m off at either end of 53 m would be 1.5 %
     assert passage.speed.speed == pytest.approx(speed, rel=0.01)
     at_sensors = np.array([passage.at_sensor[c.name] for c in recording.channels])
-    # a wheel's length on the rail either side: what an axle is placed by spreads over 0.4 m in the recording
+    # the recording shows an axle over 0.4 m on either side
     assert np.abs(at_sensors - times).max() * speed < 0.8
 
 
-def test_a_train_without_template_with_nose_impacts_is_counted_with_a_doubt():
+def test_a_train_without_template_with_nose_impacts_has_an_uncertain_count():
     recording, _ = with_impacts(np.random.default_rng(3), STRANGER, 33.0, 1)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert passage.type.type == UNKNOWN
@@ -47,16 +47,18 @@ def test_a_train_without_template_with_nose_impacts_is_counted_with_a_doubt():
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-def test_a_known_train_that_leaves_a_higher_peak_than_its_weakest_axle_is_doubted(seed):
+def test_a_known_train_with_a_higher_peak_than_its_weakest_axle_is_uncertain(seed):
     """Four axles carry little information: impacts at the nose look like a locomotive at 58 m/s instead of 44."""
     locomotive = Pattern("locomotive", (Group((Vehicle("unit", 18.0, (2.7, 5.7, 12.3, 15.3)),), 1, 1),))
     recording, _ = with_impacts(np.random.default_rng(seed), np.array([0.0, 3.0, 9.6, 12.6]), 44.0, 1)
     passage = analyse(recording, sensors_for(recording), [*PATTERNS, locomotive], PassageSettings())
-    assert passage.type.type == "locomotive" and passage.speed.speed > 55.0  # wrong, and therefore doubted
+    assert (
+        passage.type.type == "locomotive" and passage.speed.speed > 55.0
+    )  # wrong, and therefore reported as uncertain
     assert "axles_uncertain" in {f.reason for f in passage.findings}
 
 
-def test_the_same_train_without_nose_impacts_is_not_doubted():
+def test_the_same_train_without_nose_impacts_is_certain():
     recording = rolling_noise(np.random.default_rng(3), STRANGER, 33.0, PLACES)
     passage = analyse(recording, sensors_for(recording), PATTERNS, PassageSettings())
     assert (passage.type.type, passage.n_axle, passage.status) == (UNKNOWN, 8, "accepted")

@@ -1,4 +1,4 @@
-"""Loads and clusters are learnt from files and a registry, and serve the next passage."""
+"""Loads and clusters are learnt from files and a registry, and used for the next passage."""
 
 import json
 import re
@@ -66,7 +66,7 @@ def turnout(tmp_path_factory, repository):
     return found, raw, replace(found.settings["passage"], assets=str(raw / "assets"))
 
 
-def test_trains_of_known_weight_calibrate_the_sensors_and_weigh_the_next_train(turnout):
+def test_trains_of_known_weight_calibrate_the_sensors_that_weigh_the_next_train(turnout):
     config, raw, settings = turnout
     trains = weighed_trains(config, raw, PATTERNS, settings)
     assert len(trains) == 6 and [t["load"] for t in trains] == [19.0, 17.5, 16.0, 13.0, 11.5, 10.0]
@@ -93,8 +93,8 @@ def test_too_few_trains_of_known_weight_calibrate_nothing(turnout):
     assert not (raw / "none").exists()
 
 
-def test_a_train_lost_in_noise_says_nothing_about_the_gain():
-    """Slow trains leave v² w'' below the noise: their own axles disagree, so they are left out or count for little."""
+def test_a_train_below_the_noise_does_not_change_the_gain():
+    """For slow trains v² w'' is below the noise. Their axles disagree, so they are left out or have a low weight."""
     rng = np.random.default_rng(33)
     speeds, loads = np.repeat([12.0, 25.0, 40.0], 10), rng.uniform(10, 20, 30)
     axles = [0.01 * p * v**2 + 40.0 * rng.standard_normal(8) for p, v in zip(loads, speeds)]
@@ -109,9 +109,9 @@ def test_a_train_lost_in_noise_says_nothing_about_the_gain():
 
 
 @pytest.mark.parametrize("common, own", [(0.05, 0.005), (0.0, 0.05), (0.03, 0.03)])
-def test_an_error_that_all_sensors_share_is_not_averaged_away(common, own, monkeypatch):
-    """Nine sensors, thirty trains on file, 200 more to be weighed: what is said holds what happens. Thirty
-    trains tell the scatter to an eighth, 200 loads to a twentieth."""
+def test_the_stated_error_of_a_load_includes_an_error_common_to_all_sensors(common, own, monkeypatch):
+    """Nine sensors, thirty trains on file, 200 more to be weighed: the stated error is the actual one. Thirty
+    trains determine the scatter to an eighth, 200 loads to a twentieth."""
     rng, names = np.random.default_rng(34), [f"c{k}" for k in range(9)]
     monkeypatch.setattr("turnout.passage.axle_load.quasi_static", lambda own_, *_: own_ * np.array([1.001, 0.999] * 6))
     settings = PassageSettings(load_relative_error_maximum=1.0)
@@ -165,7 +165,7 @@ def test_clusters_come_from_the_registry_and_keep_their_ids_when_nights_are_adde
         assert first.assign("IC3", speed, load) == again.assign("IC3", speed, load) is not None
 
 
-def test_the_command_says_what_it_learnt(turnout, tmp_path, monkeypatch, repository, capsys):
+def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypatch, repository, capsys):
     import shutil
 
     _, raw, _ = turnout

@@ -1,4 +1,4 @@
-"""A row of axles that is only a part of the train: what runs before or behind it is heard."""
+"""A row of axles that is only a part of the train: signals before or behind it are detected."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,7 @@ SPEED, COACHES = 33.0, {"units": [{"any": ["coach"], "count": [2, 12]}]}
 
 
 def with_locomotive(width, seed):
-    """Five coaches whose wheels burst within 0.4 m, behind a locomotive that is heard ``width`` [m] around its own."""
+    """Five coaches whose wheels cause bursts of 0.4 m, behind a locomotive whose bursts are ``width`` [m] wide."""
     patterns = read_patterns({**PATTERN_FILE, "trains": {**PATTERN_FILE["trains"], "coaches": COACHES}})
     kinds = {v.name: v for p in patterns for g in p.groups for v in g.vehicles}
     places = offsets((kinds["loco"], *(kinds["coach"],) * 5))
@@ -29,8 +29,8 @@ def with_locomotive(width, seed):
     return recording_of(samples, (2.0,)), behind, patterns, len(places)
 
 
-def test_coaches_behind_a_locomotive_that_sounds_otherwise_are_not_named_alone(settings):
-    """Named whole, or said not to be known: never as the coaches alone."""
+def test_coaches_behind_a_locomotive_with_another_signal_are_not_recognized_alone(settings):
+    """The whole train is recognized or unknown, and never recognized as the coaches alone."""
     whole = 0
     for width in (1.2, 2.0, 3.0):
         recording, alone, patterns, n_axle = with_locomotive(width, 5)
@@ -44,7 +44,7 @@ def test_coaches_behind_a_locomotive_that_sounds_otherwise_are_not_named_alone(s
 
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("speed", [12.0, 50.0])
-def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
+def test_the_signal_beyond_a_row_is_compared_with_the_row(speed, direction):
     """Amplitude 2 along 60 m and 1.1, 1.3 or 1.45 over 40 m beyond it, quiet level 0.3: shares 0.47, 0.59 and 0.68."""
     step, motion, place = 0.01, Motion(speed, 4.0, 0.0, direction), 17.0
     way = motion.distance((np.arange(3000) + 0.5) * step) - direction * place
@@ -58,8 +58,8 @@ def test_what_is_heard_beyond_a_row_is_compared_with_the_row(speed, direction):
             assert continues_beyond(heard, motion, 0.0, 60.0) is told
 
 
-def test_the_neighbouring_track_is_not_heard_beside_one_sensor_of_its_own():
-    """One sensor that hears the train and two of the other track with 8 % of its amplitude: 22 dB below."""
+def test_sensors_of_the_neighbouring_track_are_not_used_beside_one_sensor_of_the_train():
+    """One sensor at the track of the train, and two at the other track with 8 % of its amplitude: 22 dB below."""
     rng = np.random.default_rng(3)
     samples = rolling_noise(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
     samples += 1e-3 * rng.standard_normal(samples.shape)

@@ -1,4 +1,4 @@
-"""Passages that are not scored keep their peak, count in the weekly values and in no score; wheels have their state."""
+"""Passages without a score have a peak and count in the weekly values alone; wheels have their state."""
 
 import sys
 from dataclasses import replace
@@ -52,7 +52,7 @@ def test_the_peak_is_that_of_the_scored_passage(fits):
     assert np.allclose(scored.times, AXLES, atol=0.005)
 
 
-def test_without_a_model_the_peak_is_sought_where_any_delay_may_put_it(fits):
+def test_without_a_model_the_peak_is_searched_over_all_possible_delays(fits):
     """The highest sample of the filtered record; a model finds the same one, since its windows hold all impacts."""
     without = find_peak(*RECORD, None, PassageSettings())
     assert without.status == "peak_only" and without.scores is None

@@ -1,4 +1,4 @@
-"""Electrical pulses are on all channels at one moment; what travels, lasts or stays with one sensor is vibration."""
+"""Electrical pulses are on all channels at one time. Travelling, long and single-channel signals are vibration."""
 
 from dataclasses import replace
 
@@ -35,14 +35,14 @@ def with_pulses(recording, times, size, last=3, delays=(0.0,) * 5):
     return replace(recording, samples=recording.samples + signal.filtfilt(b, 1.0, pulses, axis=1))
 
 
-def test_a_train_under_pulses_is_the_train_without(train, settings):
+def test_a_train_with_pulses_has_the_results_of_the_train_without_them(train, settings):
     clean = analyse(train, SENSORS, PATTERNS, settings)
     found = analyse(with_pulses(train, AT, 100.0), SENSORS, PATTERNS, settings)
     assert clean.status == "accepted" and clean.type.type == "IC3"
     assert found.status == "partly" and [f.reason for f in found.findings] == ["interference"]
     assert found.findings[0].value == 3 and "first at 0.30" in found.findings[0].detail
     assert (found.n_axle, found.type.type) == (8, "IC3")
-    # each pulse takes 6 ms out, a quarter of a metre: no axle may move by more than a tenth of that
+    # each pulse removes 6 ms, a quarter of a metre: no axle may move by more than a tenth of that
     assert found.speed.speed == pytest.approx(clean.speed.speed, abs=3 * clean.speed.se)
     np.testing.assert_allclose(found.times, clean.times, atol=0.6e-3)
 
@@ -54,27 +54,27 @@ def test_a_train_under_pulses_is_the_train_without(train, settings):
         lambda r: with_pulses(r, AT, 1.0),  # no larger than the wheels
         lambda r: with_pulses(
             r, AT, 100.0, delays=np.array(list(PLACES.values())) / 5200.0
-        ),  # as fast as steel carries it
+        ),  # as fast as a wave in steel
         lambda r: with_pulses(r, AT[:1], 100.0, last=600),  # 30 ms
     ],
 )
-def test_what_travels_lasts_or_is_small_is_left_alone(train, touched):
+def test_travelling_long_and_small_signals_stay(train, touched):
     recording = touched(train)
     assert without_pulses(recording, SENSORS) == (recording, ())
 
 
-def test_an_impact_at_one_sensor_is_left_alone(train):
+def test_an_impact_at_one_sensor_stays(train):
     samples = with_pulses(train, AT, 100.0).samples
     samples[1:] = train.samples[1:]
     assert without_pulses(replace(train, samples=samples), SENSORS)[1] == ()
 
 
-def test_sensors_at_one_place_cannot_tell(train):
+def test_sensors_at_one_position_do_not_distinguish_pulses_from_vibration(train):
     near = tuple(replace(s, position=0.01 * k) for k, s in enumerate(SENSORS))
     assert without_pulses(with_pulses(train, AT, 100.0), near)[1] == ()
 
 
-def test_a_dead_channel_has_no_say(train):
+def test_a_dead_channel_does_not_count(train):
     recording = with_pulses(train, AT, 100.0)
     recording.samples[2] = 0.0
     recording.samples[3, 7] = np.nan

@@ -1,4 +1,4 @@
-"""Scores of models and nulls: what is perfect, what is noise, and what must not depend on units or the future."""
+"""Scores of models and null models: perfect data, noise, and independence of units and of future samples."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def test_the_true_model_reaches_what_the_noise_allows(location, settings):
     assert fit.parameters_per_second == pytest.approx(16 / (8 * settings.score_window), rel=0.01)
 
 
-def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
+def test_a_model_of_another_section_scores_less_and_most_of_all_in_the_forecast(settings):
     passage = impact_record(np.random.default_rng(12), "CP A7")
     data = apply_filter(passage.samples, THROUGH)
     true, wrong = (
@@ -57,8 +57,8 @@ def test_a_wrong_place_scores_less_and_the_forecast_says_it_loudest(settings):
     assert true.forecast - wrong.forecast > true.fit - wrong.fit > 5
 
 
-def test_the_forecast_does_not_see_its_future(settings):
-    """Data behind the training part of the last wheel doubled: what is predicted there stays, so half is missing."""
+def test_the_forecast_does_not_use_future_samples(settings):
+    """Data behind the training part of the last wheel are doubled: the prediction stays, so half is missing."""
     rng = np.random.default_rng(13)
     passage = impact_record(rng, "CP A7", offsets=IC3[:4])
     data = apply_filter(passage.samples, THROUGH)
@@ -104,7 +104,7 @@ def test_noise_is_never_accepted(settings):
 
 
 @pytest.mark.parametrize("length, status", [(0.0015, "accepted"), (0.002, "not_an_impulse"), (0.004, "null_explains")])
-def test_the_longer_the_wheel_presses_the_less_is_along_b_and_the_less_is_explained(length, status, settings):
+def test_longer_forces_have_a_smaller_share_along_b_and_are_explained_less(length, status, settings):
     """Half-sine forces: a quarter of a period of the 616 Hz mode is 0.4 ms, a quarter of one of 99 Hz 2.5 ms."""
     rng = np.random.default_rng(16)
     passage = impact_record(rng, "CP A7", snr_db=120.0, start=1.2)
@@ -117,8 +117,8 @@ def test_the_longer_the_wheel_presses_the_less_is_along_b_and_the_less_is_explai
 
 
 @pytest.mark.parametrize("mode, factor", [(0, 0.95), (0, 0.9), (1, 0.98)])
-def test_a_model_that_is_a_little_off_is_not_taken_for_a_load_that_is_no_impulse(mode, factor, settings):
-    """The test of the direction fails for every wheel; nearly all of the jumps' power is along b all the same."""
+def test_a_model_with_a_small_error_is_not_rejected_as_not_an_impulse(mode, factor, settings):
+    """The test of the direction fails for most wheels, but nearly all of the power of the jumps is along b."""
     model = paper_model("CP A7")
     poles, vectors = np.linalg.eig(model.a)
     logs = np.log(poles.astype(complex))
@@ -131,7 +131,7 @@ def test_a_model_that_is_a_little_off_is_not_taken_for_a_load_that_is_no_impulse
     assert fit.status == "accepted"
 
 
-def test_wheels_cut_off_by_the_end_are_left_out(settings):
+def test_wheels_that_the_end_of_the_record_cuts_off_are_left_out(settings):
     passage = impact_record(np.random.default_rng(17), tail=0.01)
     fit = fit_channel(passage.samples, RATE, passage.times / RATE, 44.4, paper_model("CP A7"), settings)
     assert fit.times.size == 7
@@ -139,7 +139,7 @@ def test_wheels_cut_off_by_the_end_are_left_out(settings):
     assert short.status == "rejected" and "fewer than two wheels" in short.detail
 
 
-def test_a_wheel_that_is_heard_before_the_record_begins_costs_itself_only(settings):
+def test_a_wheel_before_the_start_of_the_record_is_left_out_alone(settings):
     """All impacts 8 ms before the detected axles, the first of which is 6 ms into the record."""
     passage = impact_record(np.random.default_rng(19), "CP A7")
     heard = passage.times / RATE + 0.008
@@ -148,7 +148,7 @@ def test_a_wheel_that_is_heard_before_the_record_begins_costs_itself_only(settin
     assert fit.status == "accepted" and fit.times.size == passage.times.size - 1
 
 
-def test_amplitudes_scatter_as_their_standard_errors_say(settings):
+def test_amplitudes_scatter_by_their_standard_errors(settings):
     """White noise of 4 % of the peak, 60 draws of 8 wheels: the ratio is known to 3 %. The filter's band holds a
     fourteenth of the noise's power, whose density there decides: errors from its rms alone are 3.7 times too small."""
     passage = impact_record(np.random.default_rng(20), "CP A7", snr_db=120.0, start=1.2)
@@ -163,7 +163,7 @@ def test_amplitudes_scatter_as_their_standard_errors_say(settings):
     assert ratio == pytest.approx(1.0, abs=0.2)  # the filter has no sharp edges, and times are found again
 
 
-def test_null_band_ignores_scores_that_are_not_finite():
+def test_the_null_band_ignores_scores_that_are_not_finite():
     from turnout.passage.scores import Scores
 
     made = [Scores(float(k), np.nan, float(k), np.zeros((1, 3)), 1, 2) for k in range(101)]

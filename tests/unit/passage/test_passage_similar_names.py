@@ -87,7 +87,7 @@ def test_a_clipped_sensor_is_not_fitted_if_one_with_a_similar_name_is_lost(names
 
 @pytest.mark.parametrize("names", SIMILAR_NAMES)
 def test_two_exchanged_sensors_are_both_left_out_and_neither_is_called_lost(names, settings):
-    """At its configured position the front one of them hears the train too early, and then nothing any more."""
+    """At its configured position the front sensor records the train too early, and nothing afterwards."""
     recording = rolling_noise(np.random.default_rng(16), IC3, 40.0, (0.0, 4.0, 9.0, 21.7, 30.0))
     labels = ("front", names[0], "middle", names[1], "rear")
     channels = tuple(replace(c, name=label) for c, label in zip(recording.channels, labels))

@@ -12,7 +12,7 @@ SPEED = 40.0
 
 
 def test_the_error_from_the_distances_of_a_train_is_the_scatter_of_its_speed(settings):
-    """Every axle lies off its place by a normal error."""
+    """The position of every axle has a normal error."""
     rng = np.random.default_rng(4)
     position_se = 0.03
     sigma = float(np.hypot(position_se, settings.type_tolerance / np.sqrt(2.0)))

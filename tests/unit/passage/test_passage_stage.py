@@ -1,4 +1,4 @@
-"""The whole passage chain: a file on disk in, rows of the registry out."""
+"""The whole passage stage: from a file on disk to rows of the registry."""
 
 import csv
 from dataclasses import replace
@@ -37,7 +37,7 @@ def lay_out(raw, recording, name="20240513T100000Z", trains=""):
 
 
 def on_main(seed=1, speed=44.4):
-    """An IC3 on the main track as the paper's models answer; the diverging sensors hear nothing."""
+    """Responses of the paper's models to an IC3 on the main track; sensors of the diverging track record nothing."""
     rng = np.random.default_rng(seed)
     recording, times = impact_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=speed)
     samples = recording.samples.copy()
@@ -66,7 +66,7 @@ def allowed(repository):
         return {(r["table"], r["column"]): r for r in csv.DictReader(file)}
 
 
-def test_rows_of_a_passage_follow_the_columns_and_tell_the_truth(tmp_path, repository):
+def test_rows_of_a_passage_have_the_stated_columns_and_the_true_values(tmp_path, repository):
     recording, _ = on_main()
     unit, turnout = lay_out(tmp_path, recording)
     rows = passage_unit(unit, turnout, tmp_path, context(PLACES))
@@ -113,7 +113,7 @@ def test_the_model_is_the_latest_before_the_passage(tmp_path):
     assert [f["model_id"] for f in with_model(rows)] == ["later"]
 
 
-def test_a_train_that_nobody_weighed_finds_its_cluster_by_its_speed(tmp_path):
+def test_a_train_without_a_load_has_a_cluster_by_its_speed(tmp_path):
     recording, _ = on_main()
     unit, turnout = lay_out(tmp_path, recording)
     slow, fast = (
@@ -124,7 +124,7 @@ def test_a_train_that_nobody_weighed_finds_its_cluster_by_its_speed(tmp_path):
     assert passage["axle_load_source"] == "unavailable" and passage["cluster_id"] == "IC3/2"
 
 
-def test_train_data_stand_beside_the_recording_and_differences_are_said(tmp_path):
+def test_train_data_are_listed_beside_the_recording_and_differences_are_reported(tmp_path):
     recording, _ = on_main()
     trains = (
         "passed_at_utc,train_type,speed_kmh,axle_load_t,track,n_axles\n"
@@ -161,7 +161,7 @@ def test_a_clipped_channel_is_quarantined_by_name_and_the_others_are_fitted(tmp_
     assert rows["passages"][0]["status"] == "partly"
 
 
-def test_a_rolling_train_is_no_impulse_and_its_scores_are_still_told(tmp_path):
+def test_a_rolling_train_is_no_impulse_and_has_scores_nevertheless(tmp_path):
     rng = np.random.default_rng(3)
     recording = rolling_noise(rng, IC3, 40.0, list(PLACES.values()))
     channels = tuple(Channel(name, "acceleration", x) for name, x in PLACES.items())
@@ -172,7 +172,7 @@ def test_a_rolling_train_is_no_impulse_and_its_scores_are_still_told(tmp_path):
     assert all(f["forecast_null_pct"] is not None for f in with_model(rows))
 
 
-def test_the_time_may_stand_in_the_name_of_the_file(tmp_path):
+def test_the_name_of_the_file_may_state_the_time(tmp_path):
     recording, _ = on_main()
     unit, turnout = lay_out(tmp_path, replace(recording, started_at=None), "20240102T030405Z")
     row = passage_unit(unit, turnout, tmp_path, context())["passages"][0]
@@ -180,7 +180,7 @@ def test_the_time_may_stand_in_the_name_of_the_file(tmp_path):
 
 
 def test_a_continuous_loggers_file_gives_a_passage_per_train(tmp_path):
-    """Three trains in fifty seconds: each has its own time, speed and id; their quiet times are no passages."""
+    """Three trains in fifty seconds: each has its own time, speed and id; the quiet times are no passages."""
     rng, length = np.random.default_rng(41), int(50.0 * 20000)
     samples = 0.003 * rng.standard_normal((len(PLACES), length))
     speeds, starts = (40.0, 44.4, 36.0), (3.0, 18.0, 33.0)
@@ -201,7 +201,7 @@ def test_a_continuous_loggers_file_gives_a_passage_per_train(tmp_path):
     assert len(with_model(rows)) == 3 and rows["quarantine"] == [] and len(rows["recordings"]) == 1
 
 
-def test_the_id_of_a_passage_follows_from_all_that_it_says(tmp_path):
+def test_the_id_of_a_passage_depends_on_train_data_and_fitted_sections(tmp_path):
     recording, _ = on_main()
     listed = "passed_at_utc,train_type\n2024-05-13T10:00:20Z,{}\n"
     found = {}
@@ -216,8 +216,8 @@ def test_the_id_of_a_passage_follows_from_all_that_it_says(tmp_path):
 
 
 @pytest.mark.parametrize(("noted", "kept"), [(21.5, 21.5), (85.0, None), (999.0, None)])
-def test_a_thermometer_that_is_broken_costs_its_reading_alone(tmp_path, noted, kept):
-    """85 °C is what a sensor says that was switched on and not yet asked to measure."""
+def test_a_reading_of_a_broken_thermometer_is_left_out_alone(tmp_path, noted, kept):
+    """85 °C is the value of a sensor that has not measured since it was switched on."""
     recording, _ = on_main()
     unit, turnout = lay_out(tmp_path, replace(recording, conditions={"rail_temperature": noted}))
     rows = passage_unit(unit, turnout, tmp_path, context())
@@ -226,7 +226,7 @@ def test_a_thermometer_that_is_broken_costs_its_reading_alone(tmp_path, noted, k
 
 
 class Counted:
-    """A model that counts how often one looks at its time."""
+    """A model that counts the accesses to its time."""
 
     looks = 0
 
@@ -239,7 +239,7 @@ class Counted:
         return self.time
 
 
-def test_only_models_that_a_file_may_be_fitted_with_make_it_stale():
+def test_only_models_that_apply_to_a_file_make_its_results_outdated():
     models = tuple(SectionModel(f"m{month}", datetime(2024, month, 1), None) for month in (3, 5, 7))
     at = {"20240513T100000Z.h5": ["m5"], "20240101T000000Z.h5": ["m3"], "20240630T120000Z.h5": ["m5", "m7"]}
     for label, names in at.items():

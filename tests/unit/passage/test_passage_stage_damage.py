@@ -1,4 +1,4 @@
-"""Offsets, coarse converters and remains of records: a passage costs what is damaged in it and nothing else."""
+"""Offsets, coarse converters and incomplete records: a passage loses its damaged parts and nothing else."""
 
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -27,7 +27,7 @@ def in_repository(repository, monkeypatch):
 
 
 def on_main(snr_db=40.0):
-    """An IC3 on the main track as the paper's models answer; the diverging sensors hear nothing."""
+    """Responses of the paper's models to an IC3 on the main track; sensors of the diverging track record nothing."""
     rng = np.random.default_rng(1)
     recording, _ = impact_train(rng, LOCATIONS.values(), list(PLACES.values()), speed=44.4, snr_db=snr_db)
     samples = recording.samples.copy()
@@ -67,7 +67,7 @@ def same(found, expected, but=()):
 
 
 @pytest.mark.parametrize(("late", "used"), [(timedelta(hours=-14), True), (timedelta(days=-365), False)])
-def test_a_file_whose_time_contradicts_its_name_is_dated_by_neither(late, used, tmp_path):
+def test_a_file_whose_time_contradicts_its_name_is_rejected(late, used, tmp_path):
     """Local time in the name is no contradiction; a year is."""
     rows = rows_of(tmp_path, replace(on_main(), started_at=STARTED + late))
     assert [p["passed_at_utc"] - STARTED - late < timedelta(minutes=1) for p in rows["passages"]] == [True] * used
@@ -105,7 +105,7 @@ def coarse(samples, codes, noisy_end=False):
 
 
 @pytest.mark.parametrize("codes", [100, 300, 1000])
-def test_a_converter_that_rounds_the_quiet_to_zero_has_lost_no_sensor(codes, tmp_path):
+def test_a_coarse_converter_does_not_count_as_a_lost_sensor(codes, tmp_path):
     """90 dB between peak and noise: before and after the train every sample is the same code."""
     sound = on_main(snr_db=90.0)
     rows = rows_of(tmp_path, replace(sound, samples=coarse(sound.samples, codes)))
@@ -116,7 +116,7 @@ def test_a_converter_that_rounds_the_quiet_to_zero_has_lost_no_sensor(codes, tmp
 
 
 @pytest.mark.parametrize("noisy_end", [False, True])
-def test_a_channel_without_noise_is_fitted_with_that_of_its_converter(noisy_end, tmp_path):
+def test_a_channel_without_noise_is_fitted_with_the_noise_of_its_converter(noisy_end, tmp_path):
     sound = on_main()
     samples = sound.samples.copy()
     samples[3] = coarse(on_main(90.0).samples[3], 40, noisy_end)
@@ -126,7 +126,7 @@ def test_a_channel_without_noise_is_fitted_with_that_of_its_converter(noisy_end,
 
 
 @pytest.mark.parametrize("n_sample", [2, 100, 400, 800, 1999])
-def test_the_rest_of_a_record_is_said_to_be_too_short_and_costs_no_other_train(n_sample, tmp_path):
+def test_a_too_short_record_is_reported_and_does_not_affect_other_trains(n_sample, tmp_path):
     sound = on_main()
     rest = replace(sound, samples=sound.samples[:, 5:][:, :n_sample], started_at=STARTED + timedelta(seconds=60))
     rows = rows_of(tmp_path, sound, rest)
@@ -136,8 +136,8 @@ def test_the_rest_of_a_record_is_said_to_be_too_short_and_costs_no_other_train(n
     assert row["found"] == f"only {n_sample / 20000:.3f} s were recorded"
 
 
-def test_a_fault_of_the_program_costs_one_record(tmp_path, monkeypatch):
-    """The second of three trains meets one: its row says so, names file and record, and the others stay."""
+def test_a_fault_of_the_program_affects_one_record(tmp_path, monkeypatch):
+    """The second of three trains causes one. Its row states the fault, the file and the record; the others stay."""
     sound = on_main()
     trains = [sound.samples * (1.0 + 1e-6 * k) for k in range(3)]  # no two trains leave the same samples
     later = [replace(sound, samples=x, started_at=STARTED + timedelta(seconds=60.0 * k)) for k, x in enumerate(trains)]

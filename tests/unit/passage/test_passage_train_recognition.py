@@ -1,4 +1,4 @@
-"""Axles, speed, direction, track and type of trains that were put into recordings."""
+"""Axles, speed, direction, track and type of trains in synthetic recordings."""
 
 from dataclasses import replace
 
@@ -24,8 +24,8 @@ def reasons(passage):
 
 @pytest.mark.parametrize("direction, name", [(1, "facing"), (-1, "trailing")])
 @pytest.mark.parametrize("speed, acceleration, told", [(8.0, 0.0, 0.1), (25.0, 0.4, 0.15), (55.0, -0.5, 0.6)])
-def test_rolling_train_on_three_sensors(direction, name, speed, acceleration, told, settings):
-    """Speed within 0.3 % at mid-train, whatever it does meanwhile; every axle; type; direction.
+def test_a_rolling_train_is_recognized_from_three_sensors(direction, name, speed, acceleration, told, settings):
+    """Speed within 0.3 % at mid-train with any acceleration; every axle; type; direction.
 
     At 55 m/s the train is past in a second: its change of speed moves no axle by more than the timing, and the
     prior of a steady speed stands.
@@ -59,21 +59,21 @@ def test_a_train_of_impulses_is_timed_to_microseconds_after_blind_detection(sett
     assert fit.status == "accepted" and not fit.ambiguous.any()
 
 
-def test_locomotive_with_coaches_is_found_by_its_row_of_vehicles(settings):
+def test_a_locomotive_with_coaches_is_recognized_by_its_row_of_vehicles(settings):
     recording = rolling_noise(np.random.default_rng(3), COACHES, 33.0, (0.0, 6.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "intercity"
     assert [v.name for v in passage.type.vehicles] == ["loco", "coach", "coach", "coach"]
 
 
-def test_the_same_train_backwards(settings):
+def test_the_same_train_is_recognized_when_it_runs_backwards(settings):
     backwards = COACHES[-1] - COACHES[::-1]
     recording = rolling_noise(np.random.default_rng(4), backwards, 33.0, (0.0, 6.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert [v.name for v in passage.type.vehicles] == ["coach", "coach", "coach", "loco"]
 
 
-def test_a_train_without_template_is_unknown_and_still_measured(settings):
+def test_a_train_without_a_template_is_unknown_and_its_speed_is_measured(settings):
     recording = rolling_noise(np.random.default_rng(5), ODD, 30.0, (0.0, 7.0, 15.0))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "unknown" and passage.type.probability > 0.95
@@ -82,7 +82,7 @@ def test_a_train_without_template_is_unknown_and_still_measured(settings):
     assert passage.speed.speed == pytest.approx(30.0, abs=4 * passage.speed.se)
 
 
-def test_one_sensor_knows_the_speed_from_the_template_and_no_direction(settings):
+def test_one_sensor_determines_the_speed_by_the_template_and_no_direction(settings):
     recording = rolling_noise(np.random.default_rng(6), IC3, 40.0, (2.0,))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert (passage.type.type, passage.direction, passage.speed.source) == ("IC3", "unknown", "axle spacing")
@@ -91,14 +91,14 @@ def test_one_sensor_knows_the_speed_from_the_template_and_no_direction(settings)
     assert passage.speed.speed == pytest.approx(40.0, abs=3 * passage.speed.se)
 
 
-def test_one_sensor_and_an_unknown_train_say_how_little_is_known(settings):
+def test_the_speed_of_an_unknown_train_at_one_sensor_has_a_large_error(settings):
     recording = rolling_noise(np.random.default_rng(7), ODD, 30.0, (2.0,))
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     assert passage.type.type == "unknown" and passage.speed.source == "bogie"
     assert passage.speed.se > 0.1 * passage.speed.speed
 
 
-def test_the_track_is_that_of_the_sensors_that_hear_it(settings):
+def test_the_track_of_a_train_is_that_of_the_sensors_that_record_it(settings):
     recording = rolling_noise(np.random.default_rng(8), IC3, 40.0, (0.0, 5.0, 9.0, 12.0))
     samples = recording.samples.copy()
     samples[1] = samples[3] = 0.02 * np.random.default_rng(9).standard_normal(samples.shape[1:])
@@ -117,7 +117,7 @@ def test_noise_is_no_train(settings):
     assert (passage.status, passage.reason, passage.n_axle) == ("rejected", "no_train", 0)
 
 
-def test_a_train_cut_off_is_named_at_either_end(settings):
+def test_a_train_cut_off_at_either_end_is_reported(settings):
     recording = rolling_noise(np.random.default_rng(12), IC3, 40.0, (0.0, 4.0))
     for part, words in (
         (slice(int(1.5 * RATE), None), "after the start"),
@@ -130,7 +130,7 @@ def test_a_train_cut_off_is_named_at_either_end(settings):
         assert 3 <= passage.n_axle < 8 and passage.type.type == "unknown"
 
 
-def test_a_second_train_the_other_way_is_found_and_flagged(settings):
+def test_a_second_train_in_the_other_direction_is_detected_and_reported(settings):
     positions = (0.0, 6.0, 11.0, 19.0)
     first = rolling_noise(np.random.default_rng(13), IC3, 40.0, positions)
     other = rolling_noise(np.random.default_rng(14), COACHES, 25.0, positions, direction=-1, lead=1.4)
@@ -142,7 +142,7 @@ def test_a_second_train_the_other_way_is_found_and_flagged(settings):
     assert "two_trains" not in reasons(alone)
 
 
-def test_clipped_dead_and_lost_channels_are_named_and_the_rest_is_used(settings):
+def test_clipped_dead_and_lost_channels_are_reported_and_the_others_are_used(settings):
     recording = rolling_noise(np.random.default_rng(15), IC3, 40.0, (0.0, 3.0, 6.0, 9.0, 12.0))
     samples = recording.samples.copy()
     samples[1] = np.clip(samples[1], -1.0, 1.0)
@@ -157,7 +157,7 @@ def test_clipped_dead_and_lost_channels_are_named_and_the_rest_is_used(settings)
     assert lost.value == pytest.approx(1.9, abs=0.01) and "c3: constant from 1.90 s on" in lost.detail
 
 
-def test_swapped_channels_are_named_and_left_out(settings):
+def test_exchanged_channels_are_reported_and_left_out(settings):
     positions = (0.0, 4.0, 9.0, 15.0, 22.0)
     recording = rolling_noise(np.random.default_rng(16), IC3, 40.0, positions)
     samples = recording.samples.copy()
@@ -169,7 +169,7 @@ def test_swapped_channels_are_named_and_left_out(settings):
     assert not {"c1", "c3"} & set(passage.audible_sensors)
 
 
-def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
+def test_a_clock_with_an_offset_of_a_tenth_of_a_second_is_reported(settings):
     positions = (0.0, 4.0, 9.0, 15.0, 22.0)
     recording = rolling_noise(np.random.default_rng(17), IC3, 40.0, positions)
     samples = recording.samples.copy()
@@ -180,7 +180,7 @@ def test_a_clock_off_by_a_tenth_of_a_second_is_named(settings):
     assert passage.speed.speed == pytest.approx(40.0, rel=3e-3)
 
 
-def test_fewer_than_four_sensors_cannot_say_which_one_is_wrong(settings):
+def test_fewer_than_four_sensors_do_not_identify_the_faulty_one(settings):
     recording = rolling_noise(np.random.default_rng(18), IC3, 40.0, (0.0, 4.0, 9.0))
     findings, keep = inconsistent_positions(recording, Motion(40.0), sensors_for(recording))
     assert findings == [] and keep.all()
@@ -224,10 +224,10 @@ def test_motion_and_its_inverse_agree_with_the_law_of_motion():
     [
         ((0.0, 3.0, 9.5, 12.5), "locomotive"),
         ((0.0, 3.0, 9.5, 12.5, 18.98, 21.98, 28.48, 31.48), "locomotive"),
-        ((0.0, 2.5, 19.0, 21.5), "unknown"),  # a coach by itself
+        ((0.0, 2.5, 19.0, 21.5), "unknown"),  # a single coach
     ],
 )
-def test_a_lone_locomotive_has_its_template_and_a_lone_coach_has_none(axles, type_, settings, repository):
+def test_a_single_locomotive_has_its_template_and_a_single_coach_has_none(axles, type_, settings, repository):
     patterns = known_patterns(str(repository / "config" / "vehicles" / "axle_patterns.yaml"))
     recording = rolling_noise(np.random.default_rng(9), np.array(axles), 25.0, (0.0, 10.0, 30.0, 40.0))
     passage = analyse(recording, sensors_for(recording), patterns, settings)

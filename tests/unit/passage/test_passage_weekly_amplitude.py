@@ -1,4 +1,4 @@
-"""From raw files of several weeks to the weekly amplitude of the charts, through chain, batch, registry and view."""
+"""From raw files of several weeks to the weekly amplitude of the charts: stage, batch, registry and view."""
 
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -25,7 +25,7 @@ TRAINS = (5, 6, 5, 5, 4)  # in each week: four are too few for an amplitude
 
 
 def passing_train(rng, week):
-    """An IC3 at 36 to 40 m/s; two sensors are ``LOUDER`` times as loud from the third week on."""
+    """An IC3 at 36 to 40 m/s; two sensors have ``LOUDER`` times the amplitude from the third week on."""
     recording = rolling_noise(rng, IC3, rng.uniform(36.0, 40.0), list(PLACES.values()), noise=0.01)
     samples = recording.samples.copy()
     for i, name in enumerate(PLACES):
@@ -39,7 +39,7 @@ def passing_train(rng, week):
 
 @pytest.fixture(scope="module")
 def charted(tmp_path_factory, repository):
-    """Weeks of raw files through to a registry; the rows of its weekly charts."""
+    """The rows of the weekly charts of a registry that was computed from raw files of several weeks."""
     root, rng = tmp_path_factory.mktemp("weeks"), np.random.default_rng(61)
     raw, folder = root / "raw", root / "raw" / "tommerup_s1" / "passages"
     folder.mkdir(parents=True)
@@ -72,7 +72,7 @@ def test_there_is_a_value_per_section_and_week_with_five_trains(charted):
     assert [(s, m) for s, m, *_ in charted] == [(f"tommerup_s1/{n}", w) for n in sorted(HEARD) for w in weeks]
 
 
-def test_the_chart_shows_by_how_much_two_sensors_became_louder_and_leaves_the_others_alone(charted):
+def test_charts_show_by_how_much_the_amplitude_of_two_sensors_rose_and_others_stay(charted):
     for name in HEARD:
         truth = LOUDER if name in LOUD else 1.0
         rows = [(np.log(value), se / value) for section, _, value, se in charted if section.endswith(name)]

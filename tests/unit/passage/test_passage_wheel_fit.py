@@ -1,4 +1,4 @@
-"""Joint fit of all wheels, impact times and the test of the jump, against what was put in."""
+"""Joint fit of all wheels, impact times and the test of the jump, against the true values."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_model_of_another_rate_keeps_its_poles():
     assert np.allclose(wheel_basis(model, None, RATE).response(0.0)[: 2 * 200 : 2], half[:200], atol=1e-12)
 
 
-def test_an_unstable_model_is_rejected_in_words():
+def test_an_unstable_model_is_rejected_with_its_eigenvalue():
     with pytest.raises(ValueError, match=r"unstable: \|eigenvalue\| 1\.2"):
         wheel_basis(ModalModel(np.diag([1.2]), np.ones(1), np.ones(1), RATE, ()), None, RATE)
 
@@ -98,8 +98,8 @@ def cramer_rao(passage, basis):
 
 
 @pytest.mark.parametrize("snr_db, limit", [(40.0, 1.5), (26.0, 1.5)])
-def test_impact_times_reach_the_bound_and_say_their_error(snr_db, limit):
-    """40 passages, 320 wheels: rms over the bound is known to 4 %; the reported errors are those seen to 15 %."""
+def test_impact_times_reach_the_bound_and_their_stated_errors_are_right(snr_db, limit):
+    """40 passages, 320 wheels: rms over the bound is known to 4 %; the stated errors are the actual ones to 15 %."""
     rng = np.random.default_rng(6)
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
     off, bound, reported, flagged = [], [], [], []
@@ -116,7 +116,7 @@ def test_impact_times_reach_the_bound_and_say_their_error(snr_db, limit):
     assert np.std(off[~flagged] / reported[~flagged]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_a_wrong_interval_is_never_silent():
+def test_a_wrong_interval_is_flagged():
     """At 6 dB many times land in a wrong interval: of those not flagged at odds of 100, at most 2 % may be wrong."""
     rng = np.random.default_rng(7)
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
@@ -133,7 +133,7 @@ def test_a_wrong_interval_is_never_silent():
     assert silent <= max(0.02 * total, 3)
 
 
-def test_overlapping_wheels_are_taken_off_each_other():
+def test_responses_of_overlapping_wheels_are_separated():
     """A three-axle bogie at 250 km/h: responses of SP (27 ms) overlap; times within 5 us without noise."""
     rng = np.random.default_rng(8)
     passage = impact_record(rng, "SP", [0.0, 1.5, 3.0], 69.4, snr_db=120.0)
@@ -142,7 +142,7 @@ def test_overlapping_wheels_are_taken_off_each_other():
     assert np.abs(found - passage.times).max() < 0.1
 
 
-def test_the_jump_test_keeps_its_level_and_finds_another_direction():
+def test_the_test_of_the_jump_has_its_level_and_detects_another_direction():
     """800 wheels along b at the true times: share below 0.01 within the binomial range; a second jump is found."""
     rng = np.random.default_rng(9)
     basis = wheel_basis(paper_model("CP A7"), None, RATE)
@@ -176,11 +176,11 @@ def test_whitened_noise_is_white_and_the_basis_passes_the_same_filter():
     assert np.allclose(apply_filter(plain, taps), wheel_basis(model, taps, RATE).response(0.4)[: plain.size], atol=1e-9)
 
 
-def test_a_wheel_outside_the_recording_is_named():
+def test_a_wheel_outside_the_recording_is_an_error_that_names_it():
     basis = wheel_basis(paper_model("OT"), None, RATE)
     with pytest.raises(ValueError, match="wheel 1 at sample 5000 lies outside the 4000 samples"):
         joint_fit(np.zeros(4000), [100.0, 5000.0], basis)
 
 
-def test_the_train_of_the_fixtures_is_the_one_of_the_patterns():
+def test_the_train_of_the_fixtures_is_that_of_the_axle_patterns():
     assert IC3[-1] == pytest.approx(53.1)

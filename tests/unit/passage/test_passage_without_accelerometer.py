@@ -1,4 +1,4 @@
-"""Passages of a turnout whose layout names no accelerometer: filed, with a row that says why they hold no train."""
+"""Passages of a turnout without accelerometers have a row that states why they hold no train."""
 
 from datetime import datetime
 
@@ -24,7 +24,7 @@ passages:
 
 
 @pytest.mark.parametrize("seconds", [2, 600])
-def test_a_passage_of_strain_gauges_alone_has_a_row_that_says_so(seconds, tmp_path):
+def test_a_passage_of_strain_gauges_alone_has_a_row_that_states_that(seconds, tmp_path):
     """Long records, which are read in pieces, and short ones."""
     config = tmp_path / "config"
     (config / "layouts").mkdir(parents=True)

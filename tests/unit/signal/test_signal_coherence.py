@@ -17,14 +17,14 @@ def test_distribution_is_the_negative_binomial_mixture_of_betas(n, true, estimat
 
 
 @pytest.mark.parametrize("n", [2, 3, 10, 30, 300])
-def test_of_incoherent_signals_the_distribution_is_a_power(n):
+def test_the_distribution_for_incoherent_signals_is_a_power(n):
     z = np.array([0.001, 0.05, 0.3, 0.9])
     assert coherence.coherence_distribution(z, 0.0, n) == pytest.approx(1.0 - (1.0 - z) ** (n - 1), abs=1e-12)
 
 
 @pytest.mark.parametrize("n", [2, 3, 10, 30, 90, 300])
 @pytest.mark.parametrize("probability", [0.025, 0.05, 0.95, 0.975])
-def test_tabulated_limit_has_the_probability_it_was_asked_for(n, probability):
+def test_a_tabulated_limit_has_the_requested_probability(n, probability):
     estimate = -np.expm1(-np.linspace(1e-3, 12.0, 997))
     true = coherence.true_coherence_with_quantile(estimate, n, probability)
     inside = (true > 0.0) & (true < 1.0)
@@ -58,7 +58,7 @@ def test_the_paper_gate_lets_a_true_coherence_of_0_7_pass_in_a_fifth_of_all_test
     assert passes == pytest.approx([0.22, 0.59, 0.97], abs=0.006)
 
 
-def test_limits_of_one_record_say_nothing_and_of_a_missing_line_are_missing():
+def test_limits_of_one_record_are_0_and_1_and_those_of_a_missing_line_are_missing():
     low, high = coherence.coherence_limits(np.array([1.0, np.nan]), 1)
     assert low[0] == 0.0 and high[0] == 1.0 and np.isnan([low[1], high[1]]).all()
     assert coherence.zero_coherence_level(1) == 1.0

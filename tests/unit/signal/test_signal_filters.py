@@ -10,7 +10,7 @@ from turnout.signal.spectra import correct_poles, exponential_window, force_wind
 RATE = 20_000.0
 
 
-def test_low_pass_falls_as_butterworth_wrote():
+def test_the_low_pass_has_the_response_of_butterworth():
     f = np.array([100.0, 700.0, 900.0, 3000.0])
     _, gain = freqz_sos(butterworth_sections(None, 800.0, RATE, 4), f, fs=RATE)
     warped = np.tan(np.pi * f / RATE) / np.tan(np.pi * 800.0 / RATE)
@@ -31,7 +31,7 @@ def test_impossible_edges_are_rejected(edges):
         butterworth_sections(*edges, RATE)
 
 
-def test_rate_reduction_keeps_what_fits_and_removes_what_would_fold():
+def test_a_reduction_of_the_rate_keeps_the_band_and_removes_aliases():
     t = np.arange(8000) / RATE
     kept, folded = np.sin(2 * np.pi * 200 * t), np.sin(2 * np.pi * 4200 * t)
     y = reduce_rate(kept + folded, 5)
@@ -40,7 +40,7 @@ def test_rate_reduction_keeps_what_fits_and_removes_what_would_fold():
         reduce_rate(kept, 2.5)
 
 
-def test_exponential_window_shifts_a_pole_and_correction_brings_it_back():
+def test_an_exponential_window_shifts_a_pole_and_the_correction_restores_it():
     pole, decay = -30.0 + 2j * np.pi * 150.0, 40.0
     n = np.arange(400)
     y = np.real(np.exp(pole * n / RATE)) * exponential_window(400, 0, decay, RATE)
@@ -52,19 +52,19 @@ def test_exponential_window_shifts_a_pole_and_correction_brings_it_back():
         exponential_window(3, 0, -1.0, RATE)
 
 
-def test_exponential_window_makes_nothing_ahead_of_the_impact_larger():
+def test_an_exponential_window_is_1_ahead_of_the_impact():
     window = exponential_window(2000, 1000, 100.0, RATE)
     assert (window[:1001] == 1.0).all()
     assert window[-1] == pytest.approx(np.exp(-100.0 * 999 / RATE))
 
 
-def test_force_window_leaves_the_contact_alone():
+def test_a_force_window_does_not_change_the_contact():
     window = force_window(50, 20, 8)
     assert (window[:21] == 1.0).all() and (window[28:] == 0.0).all() and (np.diff(window) <= 0.0).all()
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_pulses_have_unit_peak_and_begin_at_nothing(family):
+def test_pulses_have_a_peak_of_1_and_begin_at_0(family):
     t = np.linspace(-1e-3, 3e-3, 40_001)
     x = force_pulse(family, t, 2e-3)
     assert x.max() == pytest.approx(1.0, abs=1e-6) and not x[t <= 0].any()

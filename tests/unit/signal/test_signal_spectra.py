@@ -16,7 +16,7 @@ def test_density_integrates_to_the_mean_square(n_sample):
     assert frequency[-1] <= RATE / 2
 
 
-def test_zeros_appended_leave_the_density_where_it_was():
+def test_appended_zeros_do_not_change_the_density():
     x = np.random.default_rng(2).standard_normal((2, 100))
     _, short, _, _ = cross_spectra(x, x, RATE, 100)
     _, long, _, _ = cross_spectra(x, x, RATE, 300)

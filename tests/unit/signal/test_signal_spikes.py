@@ -56,7 +56,7 @@ def test_the_peak_of_a_channel_does_not_count_its_spikes(train):
 
 
 def test_the_noise_of_a_force_between_impacts_has_no_spikes():
-    """2,000 records of 3,000 samples, with an impact of 1 ms: 99 % of the magnitudes are those of the noise."""
+    """2,000 records of 3,000 samples with an impact of 1 ms: 99 % of the samples are noise."""
     rng, pulse = np.random.default_rng(7), 2000.0 * np.sin(np.pi * np.arange(20) / 20.0)
     for _ in range(2000):
         samples = rng.standard_normal(3000)
@@ -88,7 +88,7 @@ def test_the_shortest_impact_behind_a_recorders_filter_is_no_spike(train, rate_s
     ],
     ids=["noise", "counts", "held samples", "clipped", "constant", "not finite", "short"],
 )
-def test_what_is_no_spike_is_left_alone(samples):
+def test_signals_without_spikes_stay_unchanged(samples):
     assert spikes_in(samples).size == 0
 
 
@@ -96,6 +96,6 @@ def test_a_recording_without_spikes_is_the_same_object(train):
     assert without_spikes(train) == (train, ()) and without_spikes(train)[0] is train
 
 
-def test_channels_that_are_not_named_are_left_alone(train):
+def test_channels_that_are_not_named_stay_unchanged(train):
     recording, _ = with_spikes(train, 3, 5.0)
     assert without_spikes(recording, {"OT", "SP", "CLP"})[1] == ()

@@ -291,7 +291,7 @@ def test_a_section_measured_alone_after_maintenance_is_later_compared_with_the_o
 
 
 def test_one_common_campaign_after_maintenance_does_not_fix_the_level_of_a_section(settings):
-    """Only the first value after maintenance is measured with the others. It is 3 % too high: a twelfth of the level."""
+    """Only the first value after maintenance has siblings. It is 3 % too high: a twelfth of the level."""
     rows, work = measured_alone(61, bad_first=1.03)
     status, charts = status_of(rows, settings, work)
     raised = alarm_rows(charts, settings)
