@@ -1,4 +1,4 @@
-"""How a force fades along the meshed track, against closed forms of infinite ones."""
+"""The decay of a response along the meshed track, against closed forms of infinite ones."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ def fading(x, frequency, bending, mass, k, c):
 
 
 @pytest.mark.parametrize("x", [1.5, 3.0, 4.5, 6.0])
-def test_a_beam_on_a_foundation_fades_with_distance(x):
-    """To 6 m and to a 5000th of the impact's place: within 0.5 % of it, and 1e-5 of the place of the force."""
+def test_the_response_of_a_beam_on_a_foundation_decays_with_distance(x):
+    """To 6 m and to a 5000th of the response at the impact: within 0.5 %, and 1e-5 of the response at the impact."""
     h, rail = 0.15, Rail(6.42e6, 60.21, 2.4e8, beam="euler")
     track = uniform_track(96.0, h, rail, layers=1, pad_stiffness=1e8 * h, pad_damping=3e4 * h, elements_per_bay=1)
     frequency = np.array([35.0, 60.0, 120.0, 205.0, 300.0, 500.0])
@@ -30,8 +30,8 @@ def test_a_beam_on_a_foundation_fades_with_distance(x):
 
 
 @pytest.mark.parametrize("bays", [3, 7, 10])
-def test_a_track_on_sleepers_fades_with_distance(bays):
-    """Floquet's solution, to 6 m: 1 % below 150 Hz, 5 % elsewhere where a 1000th of the force's place arrives."""
+def test_the_response_of_a_track_on_sleepers_decays_with_distance(bays):
+    """Floquet's solution, to 6 m: 1 % below 150 Hz, elsewhere 5 % down to a 1000th of the response at the force."""
     rail = Rail(6.378e6, 60.2, 2.435e8, 0.2384, damping=4000.0)
     track = uniform_track(96.0, rail=rail, pad_damping=2.5e4, elements_per_bay=8)
     frequency = np.array([36.0, 50.0, 80.0, 120.0, 200.0, 300.0, 500.0, 700.0, 900.0])

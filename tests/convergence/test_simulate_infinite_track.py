@@ -54,7 +54,7 @@ def test_the_mesh_error_falls_with_the_square_of_the_element():
 
 
 @pytest.mark.parametrize(("length", "limit"), [(0.3, 2e-3), (0.15, 2e-4)])
-def test_waves_of_a_timoshenko_rail_run_as_the_exact_ones(length, limit):
+def test_free_waves_of_a_timoshenko_rail_have_the_exact_frequencies(length, limit):
     """Frequency of a free wave of given length to 1 kHz against the dispersion relation: fourth order in the element.
 
     EI κGA k⁴ - (EI m + ρI κGA) ω² k² - κGA m ω² + ρI m ω⁴ = 0. Consistent mass alone: 3.6 and 0.87 % at 1 kHz.
@@ -122,7 +122,7 @@ def test_peaks_of_the_two_layer_track():
     assert abs(frequency[high][np.argmax(h[high])] - 486.0) <= 2.0
 
 
-def test_wavenumbers_of_the_periodic_track_below_its_pass_band_only_decay():
+def test_waves_of_the_periodic_track_below_its_pass_band_decay():
     """Below the ballast resonance nothing propagates, above the pad resonance the rail is nearly free."""
     track = uniform_track(6.0, rail=TIMOSHENKO)
     kappa = propagation([50.0, 700.0], track)[:, 0]

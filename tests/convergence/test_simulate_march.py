@@ -1,4 +1,4 @@
-"""The march against frequency domain, dense solution, other schemes, longer tracks and itself in numpy."""
+"""The time integration against frequency domain, dense solution, other schemes, longer tracks and plain numpy."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def pulse(t):
     return np.where((t > 0.0) & (t < 1.2e-3), 1e4 * np.sin(np.pi * t / 1.2e-3) ** 2, 0.0)
 
 
-def test_a_hammer_marched_has_the_receptance_of_the_frequency_domain():
+def test_a_simulated_impact_has_the_receptance_of_the_frequency_domain():
     """Check 15 at dt 5e-5: complex, 0.1 % in 20-500 Hz and 0.3 % in 500-1000 Hz."""
     prepared = prepare(uniform_track(48.0), 5e-5)
     outcome = run(prepared, 0.8, [Probe(24.0), Probe(24.3)], pulses=[(24.0, pulse)])
@@ -41,7 +41,7 @@ def test_a_hammer_marched_has_the_receptance_of_the_frequency_domain():
 
 
 def test_receptance_is_reciprocal():
-    """Betti: what the impact at one place does at another it also does the other way round, marched."""
+    """Betti: the simulated response stays the same if the positions of impact and sensor are exchanged."""
     track = uniform_track(30.0)
     stiff = track.pad_stiffness.copy()
     stiff[20:30] *= 1.7
@@ -52,7 +52,7 @@ def test_receptance_is_reciprocal():
 
 
 @pytest.mark.parametrize(("scheme", "order"), [("midpoint", 2), ("radau", 3), ("gauss", 4)])
-def test_the_schemes_have_their_order(scheme, order):
+def test_the_error_of_the_schemes_falls_with_their_order(scheme, order):
     """Displacement at a fixed time under a smooth pulse, against a step eight times finer."""
     track = uniform_track(12.0, elements_per_bay=2)
 
@@ -145,7 +145,7 @@ def test_gap_ports_solve_the_full_two_stage_system():
 
 
 class Unilateral(PhysicsTerm):
-    """Sleepers 15 to 25 on ballast that only presses, written out: the linear ballast gone, max(0, W + k y), -W."""
+    """Sleepers 15 to 25 on ballast that only presses, written out: no linear ballast, max(0, W + k y), -W."""
 
     kind, places, dead_load = "port", range(15, 26), 1.83e3
 
@@ -170,14 +170,14 @@ def test_sleepers_that_lift_are_those_on_ballast_that_only_presses():
         outcomes.append(run(prepared, 0.03, probes, pulses=[(12.0, lambda t: -8.0 * pulse(t))]))
     written_out, term, linear = (o.signals for o in outcomes)
     scale = np.max(np.abs(written_out), axis=1, keepdims=True)
-    assert written_out[1].min() < -1.83e3 / 90e6  # it did lift off
+    assert written_out[1].min() < -1.83e3 / 90e6  # the sleepers lift off
     assert np.max(np.abs(term - written_out) / scale) < 1e-8
     assert np.max(np.abs(linear - written_out) / scale) > 0.02
 
 
 @pytest.mark.parametrize("scheme", ["radau", "midpoint"])
-def test_plain_numpy_marches_the_same(scheme):
-    """Two wheels on two surfaces, a flat, a kink, sleepers that hang or lift, fading ends: agreement to rounding."""
+def test_plain_numpy_gives_the_same_simulation(scheme):
+    """Two wheels on two surfaces, a flat, a kink, sleepers that hang or lift, absorbing ends: equal to rounding."""
     terms = (HangingSleeper(12, 2e-4), HangingSleeper(13, 1e-4), LiftingSleepers(9, 10, 1.0, 100.0))
     prepared = prepare(uniform_track(15.0, end_length=3.0, end_damping=300.0), 1e-4, scheme, terms)
     surfaces = (
@@ -199,7 +199,7 @@ def test_plain_numpy_marches_the_same(scheme):
     assert one.surface_force[:, 0].max() > 1e3 and one.surface_force[:, 1].max() > 1e3
 
 
-def test_a_longer_track_changes_nothing():
+def test_a_longer_track_gives_the_same_results():
     """Check 13: 96 m against 288 m, force within 1e-5 and acceleration within 1e-4."""
     outcomes = []
     for length in (96.0, 288.0):
@@ -212,8 +212,8 @@ def test_a_longer_track_changes_nothing():
     assert np.linalg.norm(a.signals - b.signals) < 1e-4 * np.linalg.norm(b.signals)
 
 
-def test_wheels_roll_from_their_stand_in_onto_the_track_unnoticed():
-    """A car that enters 96 m of track is recorded like one that is on a track of 288 m all the time: 3e-4."""
+def test_the_start_of_wheels_on_their_stand_in_does_not_affect_the_recording():
+    """A car that enters 96 m of track has the same recording as one that is always on a track of 288 m: 3e-4."""
     surfaces = ((Kink(1.0, 1e-3, 0.5, 0.6),),)
     short = prepare(uniform_track(96.0, start=-48.0, end_length=9.0, end_damping=400.0), 1e-4)
     long = prepare(uniform_track(288.0, start=-144.0), 1e-4)
@@ -238,7 +238,7 @@ def test_energy_never_grows_without_a_load():
 
 
 def test_a_track_in_equilibrium_stays_there():
-    """A train that stands on a smooth track with hanging sleepers stands still: 1e-6 of gravity."""
+    """A train at rest on a smooth track with hanging sleepers stays at rest: 1e-6 of gravity."""
     prepared = prepare(uniform_track(48.0), 1e-4, terms=(HangingSleeper(40, 3e-4),))
     outcome = run(prepared, 0.05, [Probe(24.1)], car(), Drive(35.0, 0.0, entry=0.0))
     assert np.max(np.abs(outcome.signals)) < 1e-5

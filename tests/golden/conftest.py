@@ -1,3 +1,3 @@
-"""Nothing here is a test of pytest: golden.py is run by hand, sitecustomize.py by the processes that it starts."""
+"""This folder has no tests for pytest: users run golden.py, and its processes run sitecustomize.py."""
 
 collect_ignore_glob = ["*.py", "pinned/*"]

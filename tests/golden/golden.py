@@ -29,7 +29,7 @@ except ModuleNotFoundError:  # the code before the command line became a package
     from turnout.cli import main
 sys.exit(main())
 """
-# Bars and lines of progress: which of them come depends on the clock.
+# Bars and lines of progress, which depend on the clock.
 PROGRESS = r"[^\r\n]*(?:\d+%\||, \d+ simulations|groups done, )[^\r\n]*[\r\n]+"
 COMMANDS = (
     "add", "calibrate", "check", "config", "demo", "diagnose", "distinguish", "hammer", "nightly", "passage", "plan",
@@ -42,7 +42,7 @@ ASKED = (HERE / "asked.txt").read_text(encoding="utf-8")
 
 
 class Recording:
-    """Where the results of one run of the program go, and how the program is started."""
+    """Folder of the results of one run of the program, and the way to start the program."""
 
     def __init__(self, out, src, tier):
         self.out, self.src = Path(out).resolve(), Path(src).resolve()
@@ -68,7 +68,7 @@ class Recording:
         return done.returncode, done.stdout, done.stderr
 
     def command(self, words, folder, name):
-        """Keep what ``turnout`` says to ``words``."""
+        """Store the output of ``turnout`` with the arguments ``words``."""
         before = _cpu()
         code, out, err = self.run(["-c", MAIN, *words], folder)
         with open(self.out / "cpu.txt", "a") as file:
@@ -78,7 +78,7 @@ class Recording:
         return out
 
     def keep(self, name, content):
-        """Write a text, without the places of this run, or bytes."""
+        """Write a text without the folders of this run, or bytes."""
         path = self.files / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if isinstance(content, str):
@@ -93,7 +93,7 @@ class Recording:
         path.write_bytes(content)
 
     def keep_files(self, folder, pattern, name):
-        """Keep the files of a folder, pages and texts without places and hashes of content."""
+        """Store the files of a folder; pages and texts without folders and hashes of content."""
         for path in sorted(p for p in folder.glob(pattern) if p.is_file()):
             content = path.read_bytes()
             if path.suffix in (".html", ".csv", ".json", ".svg", ".yaml", ".tsv", ".md"):
@@ -108,7 +108,7 @@ class Recording:
         return Path(shutil.copytree(INPUTS / name, folder))
 
     def workflow(self, folder, name, *more, nightly=False, settings=()):
-        """Run the whole workflow on one core, keep registry, trends, list and pages."""
+        """Run the whole workflow on one core; store registry, trends, worklist and pages."""
         snakefile = self.repository / "Snakefile"
         options = ["--snakefile", snakefile, "--cores", 1, *more, "--config", f"day={DAY}", "shards=1", *settings]
         profile = ["nightly", "--profile", self.repository / "profiles/default", "--"]
@@ -175,7 +175,7 @@ def toy(rec):
 
 
 def helps(rec):
-    """What every command says of itself, and the page of effects."""
+    """The help of every command, and the page of effects."""
     shutil.rmtree(rec.files / "help", ignore_errors=True)
     for words in ("", *COMMANDS):
         rec.command([*words.split(), "--help"], rec.out, f"help/{words.replace(' ', '_') or 'turnout'}.txt")
@@ -203,7 +203,7 @@ def demo(rec):
 
 
 def blind(case):
-    """A case of the kept blind set, diagnosed."""
+    """The diagnosis of a case of the stored blind set."""
 
     def diagnosed(rec):
         folder, name = rec.place(f"blind/{case}"), f"blind/{case}"
@@ -244,7 +244,7 @@ def _cpu():
 
 
 def compare(args):
-    """Say what differs between two recordings, tier by tier; exit code 1 where something does."""
+    """Print the differences between two recordings, tier by tier; the exit code is 1 if there are any."""
     worst = 0
     for tier in ("quick", "full"):
         lists = [Path(side) / f"{tier}.sha256" for side in (args.a, args.b)]
@@ -263,7 +263,7 @@ def compare(args):
 
 
 def _show(a, b, n):
-    """The first lines that differ of two texts."""
+    """Print the first lines in which two texts differ."""
     try:
         texts = [path.read_text().splitlines() for path in (a, b)]
     except UnicodeDecodeError:

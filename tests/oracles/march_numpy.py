@@ -1,4 +1,4 @@
-"""The march once more in plain numpy and LAPACK, written from the equations: the compiled one must agree with it.
+"""The time integration again in plain numpy and LAPACK, written from the equations, to test the compiled one.
 
 Slow (a few milliseconds a step) and without shortcuts: pivoted banded solves instead of LDL^T, whole columns of
 the inverse instead of windows, one dense Newton system instead of clusters.

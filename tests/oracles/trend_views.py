@@ -1,4 +1,4 @@
-"""The views of the registry over frames in memory, for a look without a registry and for tests."""
+"""The views of the registry over frames in memory, for use without a registry and for tests."""
 
 import atexit
 import shutil
@@ -53,8 +53,8 @@ def _empty_database() -> Path:
 def connect_views(frames, newest, rounded=True) -> duckdb.DuckDBPyConnection:
     """DuckDB in memory with the trend's views over ``frames``, a mapping of table to DataFrame.
 
-    Tables that are not given are empty; ``modes`` stands for itself and for ``modes_current``. ``newest`` is the
-    time of the newest measurement, on the day after which all this was put together.
+    Tables that are not given are empty; ``modes`` is also used as ``modes_current``. ``newest`` is the time of the
+    newest measurement; the registry counts as computed on the day after it.
     """
     con = duckdb.connect(":memory:", config=SETTINGS)
     con.execute(f"attach '{_empty_database()}' as made (read_only)")

@@ -1,4 +1,4 @@
-"""What must hold for any decays: scale, order, sampling rate, exactness without noise."""
+"""Properties of the identification for any decays: scale, order, sampling rate, exactness without noise."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ FREQUENCY, DAMPING = st.floats(30.0, 900.0), st.floats(0.005, 0.5)
 
 
 @given(FREQUENCY, DAMPING, st.floats(1e3, 1e5))
-def test_modes_and_poles_are_two_ways_to_say_the_same(frequency, damping, rate):
+def test_modes_and_poles_are_equivalent(frequency, damping, rate):
     found = modal_parameters(discrete_pole(frequency, damping, 2.5 * frequency + rate), 2.5 * frequency + rate)
     assert found == pytest.approx((frequency, damping), rel=1e-9)
 
@@ -25,7 +25,7 @@ def test_one_mode_without_noise_is_realised_exactly(frequency, damping, phase, s
     z = discrete_pole(frequency, damping, 5000.0)
     decay = size * (np.exp(1j * phase) * z ** np.arange(120)).real
     found, zeta = era(decay, 2, rate=5000.0).modes()
-    # The second singular value can be 1e-3 of the first where half a period is all there is.
+    # The second singular value can be 1e-3 of the first if the record is only half a period long.
     assert found == pytest.approx([frequency], rel=1e-6)
     assert zeta == pytest.approx([damping], rel=1e-6, abs=1e-7)
 

@@ -1,4 +1,4 @@
-"""What must not change a chart: units, order, names, a shift of time, a change in temperature alone."""
+"""A chart does not depend on units, order, names, a shift of time, or a change in temperature alone."""
 
 import sys
 from pathlib import Path
@@ -51,9 +51,9 @@ def test_origin_of_temperature_and_time_do_not_matter(shift, weeks):
 
 @settings(max_examples=10, deadline=None)
 @given(st.floats(-0.05, 0.05))
-def test_a_pure_effect_of_temperature_is_taken_out(coefficient):
+def test_a_pure_effect_of_temperature_is_removed(coefficient):
     # f (1 + c (T - 12)): to first order only a larger slope b. Second order is c (T - T0) times what f deviates by
-    # already: 0.05 %/K * 27 K * 6 % = 0.08 %, a seventh of the scatter; left in, 0.05 %/K * 27 K would be 1.35 %.
+    # already: 0.05 %/K * 27 K * 6 % = 0.08 %, a seventh of the scatter; without the correction it is 1.35 %.
     factor = 1 + coefficient / 100 * (ROWS["rail_temperature_c"] - 12.0)
     other = evaluate(ROWS.assign(frequency_hz=ROWS["frequency_hz"] * factor), None, TrendSettings())
     assert np.allclose(other.residual, CHARTS.residual, atol=0.1, equal_nan=True)

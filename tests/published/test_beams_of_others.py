@@ -1,4 +1,4 @@
-"""Beams that others measured: their published modes are found, and stand on a page and in a table."""
+"""Beams that other authors measured: their published modes are found, and a page and a table list them."""
 
 import csv
 import gzip
@@ -29,13 +29,13 @@ def test_all_modes_are_found_and_no_other(beams):
 def test_frequencies_and_damping_are_those_published(beams):
     for beam in beams:
         for published, damping, mode in beam.rows:
-            # the makers print 0.1 Hz and 0.01 % of damping, and fit all responses with one set of poles
+            # the authors print 0.1 Hz and 0.01 % of damping, and fit all responses with one set of poles
             assert mode.frequency.mean == pytest.approx(published, abs=0.05 + 1e-3 * published)
             if damping is not None:
                 assert 100 * mode.damping.mean == pytest.approx(damping, abs=0.005 + 0.05 * damping)
 
 
-def test_page_and_table_say_them(beams, tmp_path):
+def test_page_and_table_list_the_modes(beams, tmp_path):
     page = write_beams(beams, tmp_path)
     text = page.read_text()
     with open(page.with_suffix(".csv"), encoding="utf-8") as file:

@@ -16,7 +16,7 @@ def recordings_of(test):
 
 
 @pytest.mark.parametrize("location", tables.LOCATIONS)
-def test_no_sound_impact_of_any_location_is_rejected(location):
+def test_no_intact_impact_of_any_location_is_rejected(location):
     for snr in (40.0, 20.0):
         test = synthetic.hammer_test(location, 10, seed=3, snr_db=snr, duration=0.195, pre_trigger=5e-3)
         impacts = find_impacts(recordings_of(test), "hammer", "rail")
@@ -35,8 +35,8 @@ def test_decays_at_40_db_pass_the_gate_where_their_modes_lie(location):
 
 
 @pytest.mark.parametrize("location", ["SP", "CLP", "AS main"])
-def test_resonances_that_scatter_by_3_percent_between_impacts_reject_nobody(location):
-    # Trimming the scatter of nature would make every later error bar too small.
+def test_a_scatter_of_resonances_of_3_percent_between_impacts_rejects_no_impact(location):
+    # Without the natural scatter all later standard errors would be too small.
     for seed in range(4):
         test = synthetic.hammer_test(location, 10, seed=seed, spread=0.03, duration=0.195, pre_trigger=5e-3)
         assert [i.accepted for i in find_impacts(recordings_of(test), "hammer", "rail")] == [True] * 10

@@ -1,7 +1,7 @@
 """A recorded oscillator whose missing physics is known: the cubic spring of the Silverbox benchmark.
 
 Wigren and Schoukens 2013, Three free data sets for development and benchmarking in nonlinear system identification.
-The engine has no prior knowledge; its library holds ten laws. Samples 0 to 40000 are the growing arrow, behind them
+The engine has no prior knowledge; its library holds ten effects. Samples 0 to 40000 are the growing arrow, behind them
 ten realisations of a multisine.
 """
 
@@ -21,13 +21,13 @@ def folder(shared_data):
 
 @pytest.fixture(scope="module")
 def results(folder):
-    """The two diagnoses of the page: with all laws, and without the right one."""
+    """The two diagnoses of the page: with all effects, and without the right one."""
     return silverbox.analyse(folder)
 
 
 @pytest.fixture(scope="module")
 def all_laws(results):
-    """(case, diagnosis) with all laws of the library."""
+    """(case, diagnosis) with all effects of the library."""
     return results["without prior knowledge"]
 
 
@@ -37,7 +37,7 @@ def reserved_fits(case, fit):
 
 
 @pytest.mark.slow
-def test_the_cubic_law_is_chosen_and_predicts_what_it_never_saw(all_laws):
+def test_the_cubic_spring_is_named_and_predicts_reserved_recordings(all_laws):
     case, found = all_laws
     assert len(LAWS) >= 8
     assert found.verdict.answer == "named" and found.names == ("cubic_spring",)
@@ -57,20 +57,20 @@ def test_the_linear_base_predicts_as_published(all_laws):
 
 
 @pytest.mark.slow
-def test_without_the_right_law_the_answer_is_unknown_and_the_force_is_shown(results):
+def test_without_the_right_effect_the_answer_is_unknown_and_the_force_is_shown(results):
     case, found = results["law removed"]
     assert silverbox.missing_force(case, found.base).best_covariate == "displacement"
     assert found.verdict.answer == "unknown" and not found.names
     assert found.latent.best_covariate == "displacement"
     centre, force, _ = found.latent.curves["displacement"]
     odd = np.polyfit(centre, force, 3)
-    assert odd[0] > 0.0  # what the base lacks is a spring that hardens
+    assert odd[0] > 0.0  # the force that the base model lacks is that of a hardening spring
     assert found.latent.r2["displacement"] > 10 * max(found.latent.r2["velocity"], found.latent.r2["time"])
 
 
 @pytest.mark.slow
-def test_a_forgotten_offset_of_the_sensor_hides_under_every_law(folder, all_laws):
-    """Finding: a nuisance that is missing from the model comes back as false physics."""
+def test_without_the_offset_of_the_sensor_a_wrong_effect_has_evidence(folder, all_laws):
+    """A missing nuisance parameter of the model appears as a false effect."""
     with_offset, _ = all_laws
     without = OscillatorCase(*silverbox.recordings(folder), silverbox.RATE, **silverbox.PRIORS, offset=0.0)
     blind = diagnose(without)
@@ -83,8 +83,8 @@ def test_a_forgotten_offset_of_the_sensor_hides_under_every_law(folder, all_laws
 
 
 @pytest.mark.slow
-def test_only_another_condition_tells_the_wrong_law(all_laws):
-    """Finding: |y|y looks well at the amplitude it was fitted to and fails beyond it; the cubic law does not."""
+def test_only_another_condition_reveals_the_wrong_effect(all_laws):
+    """|y|y fits well at the amplitude of the fit and fails at larger ones; the cubic spring does not."""
     case, found = all_laws
     scores = {s.family: s for s in found.verdict.scores}
     ratios = {}
@@ -101,6 +101,6 @@ def test_the_page_follows_from_the_recording(results):
     assert text.splitlines()[0] == (DOCS / "silverbox.md").read_text(encoding="utf-8").splitlines()[0]
 
 
-def test_without_a_recording_it_says_so(tmp_path):
+def test_a_missing_recording_is_reported(tmp_path):
     with pytest.raises(SystemExit, match=r"skipped: .* does not exist"):
         folder_of("nonlinear_silverbox", [str(tmp_path / "nowhere")])

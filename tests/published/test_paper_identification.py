@@ -1,4 +1,4 @@
-"""Identification of noise-free decays of the paper's models gives the models back."""
+"""Identification of noise-free decays of the paper's models gives these models."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The paper's tables against each other; its slips are listed, each a strict expected failure."""
+"""The paper's tables against each other; misprints are listed, each as a strict expected failure."""
 
 from itertools import product
 
@@ -111,7 +111,7 @@ def test_uncertainties_of_the_matrix_are_possible(row, request):
     assert min(row.plus_minus) > 0.0
 
 
-def test_every_listed_slip_is_a_row_of_a_table():
+def test_every_listed_misprint_is_a_row_of_a_table():
     listed = (
         misprints.FREQUENCY,
         misprints.DAMPING,

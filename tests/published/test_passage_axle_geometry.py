@@ -1,4 +1,4 @@
-"""Thirty train types of a public collection of axle geometry: each is told from the others, strangers are unknown."""
+"""Thirty train types of a public collection of axle geometry: each is recognized, and other trains are unknown."""
 
 import re
 
@@ -59,7 +59,7 @@ def passing_times(pattern, rng, place_error=0.03):
     return motion.time(offsets(vehicles) + rng.normal(0, place_error, len(offsets(vehicles))))
 
 
-def test_the_collection_holds_thirty_types_with_the_axles_their_names_say(collection):
+def test_the_collection_has_thirty_types_with_the_number_of_axles_in_their_names(collection):
     assert len(collection) == 30
     for pattern in collection:
         said = re.search(r"_(\d+)$", pattern.type)
@@ -71,11 +71,11 @@ def both_ways(patterns):
 
 
 def family(pattern):
-    """Types whose axles stand at the same places to 5 cm cannot be distinguished by them: one name for all."""
+    """Rounded axle positions: types with the same positions to 5 cm cannot be distinguished and count as one."""
     return tuple(np.round(offsets(pattern.fixed_row()[1]) / 0.05).astype(int))
 
 
-def test_each_type_is_named_and_a_type_without_template_is_unknown(collection):
+def test_each_type_is_recognized_and_a_type_without_a_template_is_unknown(collection):
     """30 types x 4 passages, speed unknown. At least 99 % named; without its own template at least 95 % unknown."""
     rng, settings = np.random.default_rng(20), PassageSettings()
     named = unknown = total = 0

@@ -36,19 +36,19 @@ def patterns(repository):
 
 @pytest.mark.parametrize("train, place", CASES)
 def test_type_and_speed_follow_from_the_axle_times(trains, patterns, train, place):
-    """Type without being told; mean speed within 0.7 km/h of theirs, which assumes 2.5 m in every bogie."""
+    """The type is recognized; the mean speed is within 0.7 km/h of the published one, which assumes bogies of 2.5 m."""
     times = np.array(trains[train][place]["tPeaks"])
     found = find_type(times, patterns, PassageSettings())
     assert found.type == trains[train]["Zugstyp"]
     assert found.probability > 0.99
     middle = found.speed + found.acceleration * (times[-1] - times[0]) / 2
     assert 3.6 * middle == pytest.approx(trains[train][place]["vAv"], abs=0.7)
-    # wheels, coupler slack and their timing together: a template that is off by more would be another train
+    # errors of wheels, coupler slack and timing together: with a larger misfit it would be another train
     assert found.residual < 0.05
 
 
 @pytest.mark.parametrize("train, place", [("3", "Q1"), ("13", "Q4"), ("0", "Q1")])
-def test_axles_are_counted_in_a_sound_made_at_these_times(trains, patterns, train, place):
+def test_axles_are_counted_in_noise_bursts_at_the_published_times(trains, patterns, train, place):
     """No raw signals are public: bursts of noise at the measured times stand in for them; one sensor, unknown speed."""
     recording = bursts(trains[train][place], np.random.default_rng(int(train)))
     sensor = [PassageSensor("rail", "S", 0.0)]

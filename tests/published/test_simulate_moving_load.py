@@ -42,7 +42,7 @@ def test_closed_form_of_the_moving_load_gives_the_printed_peaks(share, printed):
 
 
 @pytest.mark.parametrize(("share", "dt", "tolerance"), [(0.05, 1e-4, 1e-4), (0.3, 1e-4, 1e-4), (0.8, 2.5e-5, 1e-3)])
-def test_a_constant_load_moves_with_the_deflection_of_the_closed_form(share, dt, tolerance):
+def test_the_deflection_under_a_moving_constant_load_is_that_of_the_closed_form(share, dt, tolerance):
     """Check 2: relative L2 within 1e-4 up to 0.3 of the critical speed."""
     speed, damping, h, sensor = share * CRITICAL, 2.0 * 0.1 * M * np.sqrt(K / M), 0.15, 60.0
     rail = Rail(EI, M, 2.4e8, beam="euler")
@@ -219,7 +219,7 @@ def test_p2_force_on_the_track_of_gm_tt0088(angle, speed, shortfall):
     assert (1.0 - shortfall) * formula < found < formula
 
 
-def test_p1_force_grows_with_angle_times_speed(reference_track):
+def test_p1_force_is_proportional_to_angle_times_speed(reference_track):
     """Check 8: linear in the product to 5 %, by angle and by speed."""
 
     def p1(angle, speed):
@@ -231,7 +231,7 @@ def test_p1_force_grows_with_angle_times_speed(reference_track):
     assert p1(8e-3, 0.75 * KMH_160) / base == pytest.approx(1.0, rel=0.05)
 
 
-def test_a_hard_kink_lifts_the_wheel_and_the_force_never_pulls(reference_track):
+def test_a_sharp_kink_unloads_the_wheel_and_the_force_is_never_a_pull(reference_track):
     """Check 17: 20 mrad unloads to 0 and F >= 0 always."""
     _, force = dip_force(reference_track, 600.0, 20e-3, KMH_160)
     assert force.min() == 0.0
@@ -241,7 +241,7 @@ def spectral_line(signal, time, frequency):
     return 2.0 * np.abs(np.mean((signal - signal.mean()) * np.exp(-2j * np.pi * frequency * time)))
 
 
-def test_sleepers_pass_at_speed_over_spacing():
+def test_the_force_has_lines_at_speed_over_sleeper_spacing():
     """Check 9: lines at 74, 148, 222, 296 Hz and none between; check 14: 257 N at 296 Hz within 10 %."""
     wheel = lone_wheels(750.0, gravity=0.0, pressing=53.96e3)
     outcome = run(prepare(uniform_track(96.0), 1e-4), 1.35, [], wheel, Drive(18.0, KMH_160, entry=0.0))

@@ -1,4 +1,4 @@
-"""Receptance curves of other people's track models, as they lie beside the checkout."""
+"""Receptance curves of published track models, from the folder of shared data."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_rolland_discrete_supports(shared_data, column, values):
     assert np.max(np.abs(20.0 * np.log10(mobility / table[column][: frequency.size]))) < 0.15
 
 
-def test_nordborg_within_the_reading_of_his_figure(shared_data):
+def test_nordborg_within_the_error_of_reading_his_figure(shared_data):
     """Digitised to about 1 dB, his load moves at 60 m/s: 90 % of the points to 900 Hz within 2 dB."""
     path = shared_data / "reference_track_models" / "nordborg_data.csv"
     text = path.read_text().replace(",", ".").splitlines()

@@ -1,4 +1,4 @@
-"""The Tommerup track lands on the paper's Table 3 when its simulated hammer tests walk the hammer chain."""
+"""Simulated hammer tests on the Tommerup track give the paper's Table 3 in the hammer stage."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.simulate import load_track, simulate_hammer
 
-# Location: ballast f_n ± [Hz], zeta; railpad f_n ±, zeta (None: the paper has no high model there).
+# Location: ballast f_n ± [Hz], zeta; railpad f_n ±, zeta (None: the paper has no railpad mode there).
 TABLE_3 = {
     "OT": ((154.5534, 11.7249, 0.1932), (611.5569, 1.6490, 0.0673)),
     "SP": ((167.1953, 6.9777, 0.0353), (499.1206, 1.0661, 0.0441)),
@@ -33,7 +33,7 @@ def turnout():
 
 
 @pytest.mark.parametrize("location", TABLE_3)
-def test_simulated_hammer_tests_land_on_table_3(turnout, location):
+def test_simulated_hammer_tests_give_the_modes_of_table_3(turnout, location):
     recordings = simulate_hammer(turnout, location, n_impacts=10, duration=0.15, pretrigger=0.005, seed=0)
     impacts = [i for i in find_impacts(recordings, "hammer", "acc_1", ReceptanceSettings()) if i.accepted]
     assert len(impacts) >= 8
@@ -50,8 +50,8 @@ def test_simulated_hammer_tests_land_on_table_3(turnout, location):
         assert close or (location, band) in EXCEPTIONS, (band, mode.damping)
 
 
-def test_the_exceptions_are_exceptions(turnout):
-    """A damping that began to fit would have to leave the list."""
+def test_the_listed_exceptions_do_not_meet_table_3(turnout):
+    """A damping ratio that agrees would have to be removed from the list."""
     recordings = simulate_hammer(turnout, "A7", n_impacts=6, duration=0.15, pretrigger=0.005)
     impacts = [i for i in find_impacts(recordings, "hammer", "acc_1", ReceptanceSettings()) if i.accepted]
     model = identify([i.decay for i in impacts], recordings[0].rate, IdentifySettings())

@@ -18,10 +18,10 @@ EI, M, K = 210e9 * 3.055e-5, 60.21, 1e8
 KMH_160 = 160.0 / 3.6
 
 
-def test_a_wheel_flat_shows_above_300_hz_away_from_everything_else():
+def test_a_wheel_flat_raises_the_level_above_300_hz_and_not_below_40_hz():
     """Check 11, as a signature: 50 mm, R 0.43 m, on 6 µm of roughness: +16 to +20 dB in 300-1000 Hz were found.
 
-    14 dB are asked on the sleepers, where one realisation of the roughness gave 17 to 23; below 40 Hz nothing.
+    14 dB are required on the sleepers, where one realisation of the roughness gave 17 to 23; below 40 Hz no change.
     """
     prepared = prepare(uniform_track(96.0), 1e-4)
     rough = roughness(0.0, 96.0, 3, offset=-11.7)
@@ -43,7 +43,7 @@ def test_a_wheel_flat_shows_above_300_hz_away_from_everything_else():
 def test_the_force_of_a_flat_is_that_of_three_receptances():
     r"""A linear contact on Winkler's beam: F = -P / (1/k_H + H_rail - 1/(m w^2)), 40-1000 Hz, magnitude to 2 %.
 
-    The closed form lets the wheel stand while the flat runs under it: it moves at 5 % of the critical speed.
+    In the closed form the wheel does not move along the rail; here it moves at 5 % of the critical speed.
     """
     h, mass, load, damping, dt = 0.15, 600.0, 60e3, 1e5, 5e-5
     rail = Rail(EI, M, 2.4e8, beam="euler")

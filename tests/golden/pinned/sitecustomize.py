@@ -1,6 +1,6 @@
-"""First on the path of every process of a golden run: fingerprints and the clock of ``turnout`` say always the same.
+"""First on the path of every process of a golden run: fingerprints and the clock of ``turnout`` are constant.
 
-Whoever compiles kernels keeps the real fingerprint: it names the folder of machine code, never a result.
+The compilation of kernels uses the real fingerprint, which names the folder of machine code and never a result.
 """
 
 import datetime
@@ -22,7 +22,7 @@ class _LikeReal(type):
 
 
 class Pinned(REAL, metaclass=_LikeReal):
-    """The class ``datetime`` with a clock that stands still; what it makes are real datetimes."""
+    """The class ``datetime`` with a constant clock; its objects are real datetimes."""
 
     def __new__(cls, *args, **named):
         return REAL(*args, **named)

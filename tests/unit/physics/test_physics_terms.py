@@ -1,4 +1,4 @@
-"""Each listed term shows one number known without us."""
+"""Each listed term reproduces one number that is known independently."""
 
 from types import SimpleNamespace
 
@@ -26,8 +26,8 @@ def test_a_hanging_sleeper_withholds_the_ballast_up_to_its_gap():
         assert term.force(state)[20] == pytest.approx(withheld)
 
 
-def test_a_wheel_stands_the_more_on_the_neighbours_the_wider_the_gap():
-    """Never closed, the gap takes away the whole support: the static solution without that ballast."""
+def test_a_gap_moves_the_load_of_a_wheel_to_the_neighbouring_sleepers():
+    """A gap that does not close removes the whole support: the static solution without that ballast."""
     wheel = lone_wheels(700.0, gravity=0.0, pressing=50e3)
     stiffness = TRACK.ballast_stiffness.copy()
     stiffness[20] = 0.0

@@ -86,7 +86,7 @@ def test_a_zener_pad_on_every_support_is_the_track_with_that_complex_stiffness()
         assert np.isclose(with_term(term)[k], receptance(assemble(same), [f], 12.0, 12.0)[0], atol=0.0, rtol=1e-9)
 
 
-def test_pads_lose_one_per_cent_a_kelvin():
+def test_the_stiffness_of_pads_falls_by_one_percent_per_kelvin():
     term = physics.PadTemperature(0.01).under_conditions({"rail_temperature": 35.0})
     assert np.allclose(
         with_term(term),
@@ -113,8 +113,8 @@ def test_ballast_inertia_is_a_heavier_and_more_damped_sleeper():
 
 
 @pytest.mark.parametrize("layers", [2, 3])
-def test_a_track_that_radiates_less_takes_power_at_every_point(layers):
-    """A passive structure takes power wherever it is shaken: Im H < 0 at every driving point. 8 kN s/m, less 30."""
+def test_a_track_with_less_radiation_absorbs_power_at_every_point(layers):
+    """A passive structure absorbs power at every driving point: Im H < 0 there. 8 kN s/m, less 30."""
     subgrade = {"ballast_mass": 300.0, "subgrade_stiffness": 78e6, "subgrade_damping": 8e3} if layers == 3 else {}
     track = uniform_track(12.0, ballast_damping=8e3, layers=layers, **subgrade)
     matrices = assemble(track, (physics.BallastInertia(50.0, -3e4),))
@@ -138,7 +138,7 @@ def test_a_sleeper_mode_far_above_the_band_is_a_rigid_sleeper():
 
 
 def test_a_sleeper_that_bends_has_the_dynamic_mass_of_its_mode_with_the_seats_held():
-    """m (1 - r + r (1 + 2ijz) / (1 - j² + 2ijz)) at j = f / f0: what is imaginary of it damps as the ballast does."""
+    """m (1 - r + r (1 + 2ijz) / (1 - j² + 2ijz)) at j = f / f0: its imaginary part damps like the ballast."""
     share, own, loss = 0.3, 200.0, 0.03
     term = physics.SleeperMode(share, own, loss)
     for k, f in enumerate(F):
@@ -149,7 +149,7 @@ def test_a_sleeper_that_bends_has_the_dynamic_mass_of_its_mode_with_the_seats_he
         assert np.isclose(with_term(term)[k], receptance(assemble(same), [f], 12.0, 12.0)[0], atol=0.0, rtol=1e-9)
 
 
-def test_shear_turns_an_euler_rail_into_timoshenkos_of_the_same_flexibility():
+def test_shear_changes_an_euler_rail_into_a_timoshenko_rail_of_the_same_flexibility():
     rail = TRACK.rail
     euler = TRACK.with_(rail=type(rail)(rail.bending_stiffness, rail.mass, 1.0, rail.rotary_inertia, 20.0, "euler"))
     term = physics.RailShear(1e9 / rail.shear_stiffness)
@@ -158,8 +158,8 @@ def test_shear_turns_an_euler_rail_into_timoshenkos_of_the_same_flexibility():
 
 
 def test_a_casting_yields_in_shear_in_the_same_proportion_as_the_rail():
-    """A shear coefficient of the steel's section that is a third too high is so of every section: all stiffness in
-    shear is divided by 1.5. Where the file has none a casting of 2.5 times the section has 1 / 2.5 of the rail's."""
+    """A too high shear coefficient is too high in every section: all stiffness in shear is divided by 1.5.
+    Where the file states none, a casting of 2.5 times the section has 1 / 2.5 of the flexibility of the rail."""
     rail = TRACK.rail
     cast = replace(rail, bending_stiffness=1.8 * rail.bending_stiffness, mass=2.5 * rail.mass)
     own = replace(cast, shear_stiffness=2.2 * rail.shear_stiffness)
@@ -202,13 +202,13 @@ def test_a_stretch_with_four_times_the_stiffness_is_a_softer_spring_by_the_winkl
         (physics.LowPass("A", 1 / 500.0), 500.0, -1j / np.sqrt(2.0)),  # 3 dB and 90 degrees behind
     ],
 )
-def test_channels_have_the_transfer_of_the_textbook(term, frequency, expected):
+def test_channels_have_the_transfer_function_of_the_textbook(term, frequency, expected):
     assert np.isclose(term.transfer(np.array([frequency]))[0], expected, atol=0.0, rtol=1e-12)
     t = np.arange(20000) / 20e3
     shown = term.channel(np.sin(2.0 * np.pi * frequency * t), 20e3, A)[6000:14000]
     inside = t[6000:14000]
     wave = abs(expected) * np.sin(2.0 * np.pi * frequency * inside + np.angle(expected))
-    assert np.max(np.abs(shown - wave)) < 0.02 * abs(expected)  # what has not died out of the start
+    assert np.max(np.abs(shown - wave)) < 0.02 * abs(expected)  # the rest of the initial transient
     other = np.ones(10)
     assert term.channel(other, 20e3, Sensor("B", 12.0)) is other
 
@@ -228,17 +228,17 @@ def test_a_fast_clock_shows_a_line_at_a_higher_frequency():
     assert np.argmax(spectrum) * 20e3 / (1 << 20) == pytest.approx(201.0, abs=0.05)
 
 
-def test_hum_has_the_amplitude_it_says():
+def test_hum_has_its_stated_amplitude():
     shown = physics.Hum("A", 3.0, 4.0).channel(np.zeros(20000), 20e3, A)
     assert np.sqrt(2.0 * np.mean(shown**2)) == pytest.approx(5.0, rel=1e-6)
     assert "5 m/s²" in physics.Hum("A", 3.0, 4.0).sentence()
 
 
-def test_a_sensor_elsewhere_sits_elsewhere():
+def test_the_position_of_a_sensor_changes_by_the_stated_shift():
     assert physics.SensorPosition("A", 0.3).sensor(A).place == pytest.approx(12.3)
 
 
-def test_a_hanging_sleeper_is_held_by_nothing_but_pads_within_its_gap():
+def test_only_the_pads_support_a_hanging_sleeper_within_its_gap():
     (port,) = physics.HangingSleeper(20, 1e-3).ports(TRACK)
     for y in (-9e-4, 3e-4, 9e-4):
         assert -90e6 * y - port.law.force(y) == pytest.approx(0.0, abs=1e-3)
@@ -249,12 +249,12 @@ def test_a_sleeper_that_is_partly_seated_keeps_that_share_of_its_ballast_within_
     (port,) = physics.HangingSleeper(20, 1e-3, 0.3).ports(TRACK)
     for y in (-9e-4, 3e-4, 9e-4):
         assert -90e6 * y - port.law.force(y) == pytest.approx(-0.3 * 90e6 * y)
-    beyond = 0.3 * 90e6 * 1.5e-3 + 0.7 * 90e6 * 0.5e-3  # the rest joins where the gap closes
+    beyond = 0.3 * 90e6 * 1.5e-3 + 0.7 * 90e6 * 0.5e-3  # the other share bears after the gap has closed
     assert -90e6 * 1.5e-3 - port.law.force(1.5e-3) == pytest.approx(-beyond)
 
 
-def test_ballast_under_sleepers_that_lift_presses_or_lets_go_in_every_state():
-    """What the sleeper feels is max(0, W + k y + c v) - W: above 0 with its load, however fast it leaves."""
+def test_ballast_under_lifting_sleepers_presses_and_does_not_pull_in_any_state():
+    """The force on the sleeper is max(0, W + k y + c v) - W, at any velocity."""
     position, velocity = np.meshgrid(np.linspace(-3e-4, 3e-4, 41), np.linspace(-0.3, 0.3, 31))
     for term, share in ((physics.LiftingSleepers(0, 40, 1.0, 400.0), 1.0), (physics.LiftingSleepers(0, 40, 0.4), 0.4)):
         for y, v in zip(position, velocity):
@@ -271,7 +271,7 @@ def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():
     assert slope / 90e6 == pytest.approx(3.0, rel=0.03)  # pieces of 50 µm
 
 
-def test_friction_takes_the_energy_of_its_describing_function():
+def test_friction_dissipates_the_energy_of_its_describing_function():
     """A cycle of amplitude V at ω loses 4 F0 V/ω; the equivalent damper loses π c V²/ω."""
     term = physics.DryFriction(20, 1000.0)
     (port,) = term.ports(TRACK)
@@ -303,7 +303,7 @@ def test_three_waves_around_a_wheel_repeat_every_third_of_a_turn():
 
 
 def test_a_dip_that_is_shifted_is_deepest_there():
-    """A positive shift is towards larger x; smooth and kinked part add to the depth at its lowest point only."""
+    """A positive shift is towards larger x; smooth and kinked part sum to the depth at the lowest point only."""
     x = np.linspace(11.0, 13.0, 2001)
     parts = physics.SurfaceDip(12.0, 1e-3, 0.6, sharpness=0.4, shift=0.25).paths(TRACK, None)
     dip = sum(part(x) for part in parts)
@@ -316,14 +316,14 @@ def test_sentences_count_wheels_from_one_and_add_the_amplitudes_of_both_phases()
     assert sentence == "wheel 3 of every train has 5 waves around it with an amplitude of 5.00e-04 m"
 
 
-def test_corrugation_is_asked_for_under_all_sensors_and_beside_them():
+def test_candidates_of_corrugation_extend_beyond_all_sensors():
     hypotheses = list(physics.RailCorrugation.hypotheses(ContactSite((10.0, 12.1, 14.0))))
     assert hypotheses
     for fixed in (h.fixed for h in hypotheses):
         assert fixed["start"] < 10.0 and fixed["end"] > 14.0
 
 
-def test_corrugation_shakes_at_speed_over_wavelength():
+def test_corrugation_excites_at_speed_over_wavelength():
     (path,) = physics.RailCorrugation(0.0, 20.0, 3e-5, 4e-5, 0.25).paths(TRACK, car())
     t = np.arange(4000) / 10e3
     spectrum = np.abs(np.fft.rfft(path(2.0 + 40.0 * t) * np.hanning(4000), 1 << 18))
@@ -335,13 +335,13 @@ def test_roughness_scales_with_its_amplitude():
     assert np.allclose(two, 2.0 * one, atol=0.0) and np.std(one) > 0.0
 
 
-def test_a_heavier_wheelset_presses_harder_by_its_weight():
+def test_a_heavier_wheelset_increases_the_load_by_its_weight():
     heavier = physics.UnsprungMass(1.4).vehicle(car())
     assert heavier.static_loads - car().static_loads == pytest.approx(0.4 * 750.0 * 9.81, rel=1e-6)
 
 
 def test_roughness_on_top_of_a_rough_rail_adds_its_power():
-    """Of the same seed, as both have where nothing is said: 1 times the curve twice over is 3 dB, not 6."""
+    """Both have the same seed by default: the sum of two roughnesses of equal power is 3 dB more, not 6."""
     rail = TurnoutTrack(TRACK, {"main": ((),)}, roughness_level=0.0)
     x = np.arange(0.0, 24.0, 0.005)
     base = rail.roughness_parts(TRACK.start - 5.0, TRACK.end + 5.0, 0)[0](x)

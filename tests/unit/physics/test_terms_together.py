@@ -1,4 +1,4 @@
-"""Two effects on one sleeper: no spring turns negative, no energy comes of them, and each is seen by the other."""
+"""Two effects on one sleeper: no spring becomes negative, they supply no energy, and each includes the other."""
 
 import numpy as np
 import pytest
@@ -70,8 +70,8 @@ def energy(prepared, duration):
         (THREE, (LiftingSleepers(10, 14, 1.0, 400.0), BallastHardening(11, 13, 3.0))),
     ],
 )
-def test_after_an_impact_the_energy_only_falls_until_all_is_at_rest(track, terms):
-    """Springs give back what they take, dampers take: a track at rest before an impact is at rest long after it.
+def test_after_an_impact_the_energy_falls_until_the_track_is_at_rest(track, terms):
+    """Springs conserve energy and dampers dissipate it: long after an impact the track is at rest.
 
     A thousandth at 0.25 s: the slowest mode of these tracks decays with more than 1/e in 40 ms."""
     prepared = prepare(track, 1e-4, terms=terms)
@@ -81,7 +81,7 @@ def test_after_an_impact_the_energy_only_falls_until_all_is_at_rest(track, terms
 
 
 @pytest.mark.parametrize("track", [TWO, THREE], ids=["2 layers", "3 layers"])
-def test_a_closed_gap_bears_by_its_own_ballast_less_the_gap(track):
+def test_a_closed_gap_reacts_by_its_ballast_stiffness_times_the_deflection_less_the_gap(track):
     """Superposition: the reaction k (d - g) of the closed gap is that of the linear track and a force k g held against
     it. Half the ballast there; the wheel of 90 kN closes 0.1 mm."""
     softer = track.ballast_stiffness.copy()
@@ -103,7 +103,7 @@ def test_a_closed_gap_bears_by_its_own_ballast_less_the_gap(track):
 
 @pytest.mark.parametrize("track", [TWO, THREE], ids=["2 layers", "3 layers"])
 def test_within_its_gap_a_sleeper_on_soft_ballast_is_free(track):
-    """What the port withholds is what the track and the other term have there: r k and sqrt(r) c."""
+    """The gap withholds the stiffness and damping that the track has with the other term: r k and sqrt(r) c."""
     for terms in ((HANGS, LocalBallast(J, 0.25)), (LocalBallast(J, 0.25), HANGS)):
         (port,) = ports_of(terms, track)
         link = track.ballast_link(J)
@@ -113,7 +113,7 @@ def test_within_its_gap_a_sleeper_on_soft_ballast_is_free(track):
             assert float(port.law.force(d, rate)) == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_warm_pad_that_is_worn_has_both_shares_in_either_order():
+def test_a_warm_and_worn_pad_has_both_factors_in_either_order():
     """k r (1 - a dT) under support 12; the damper goes with the root of r."""
     warm, worn = PadTemperature(0.02, 30.0), LocalPad(J, 0.25)
     stiffness, damping = 0.7 * TWO.pad_stiffness, TWO.pad_damping.copy()
@@ -125,7 +125,7 @@ def test_a_warm_pad_that_is_worn_has_both_shares_in_either_order():
         assert np.allclose(receptance(assemble(TWO, terms), frequency, 7.2, 7.5), expected, atol=0.0, rtol=1e-9)
 
 
-def test_a_term_alone_adds_what_it_says_of_itself():
+def test_a_single_term_adds_its_own_links_and_ports():
     for term in (LocalBallast(J, 0.3), PadTemperature(0.01)):
         assert links_of((term,), TWO) == list(term.links(TWO))
     assert ports_of((HANGS,), TWO) == list(HANGS.ports(TWO))

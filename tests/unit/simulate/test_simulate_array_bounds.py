@@ -19,7 +19,7 @@ assert np.max(np.abs(train.force)) > 0.0
 """
 
 
-def test_impacts_and_wheels_are_marched_within_their_arrays(repository):
+def test_the_simulation_of_impacts_and_wheels_stays_within_its_arrays(repository):
     """Kernels run as Python code, in which an index beyond an array is an error."""
     environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "", "PYTHONPATH": f"{repository / 'src'}"}
     finished = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True)

@@ -1,4 +1,4 @@
-"""Bad input is rejected with time, place and value; a run never returns NaN."""
+"""Bad input is rejected with time, position and value; a run never returns NaN."""
 
 import numpy as np
 import pytest
@@ -29,29 +29,29 @@ TRACK = uniform_track(24.0)
 SENSOR = [Sensor("A", 12.0)]
 
 
-def test_a_wheel_that_leaves_the_track_is_named_with_time_and_place():
+def test_an_error_states_which_wheel_leaves_the_track_when_and_where():
     drive = Drive(20.0, 40.0, entry=0.0)
     with pytest.raises(SimulationError, match=r"wheel 0 leaves the track at 0\.1000 s: it is at 24\.001 m"):
         run(prepare(TRACK, 1e-4), 0.5, [Probe(12.0)], lone_wheels(700.0), drive)
 
 
-def test_a_wheel_that_starts_off_the_track_is_named_at_time_zero():
+def test_an_error_states_which_wheel_is_off_the_track_at_time_zero():
     with pytest.raises(SimulationError, match=r"wheel 1 leaves the track at 0\.0000 s: it is at -0\.500 m"):
         run(prepare(TRACK, 1e-4), 0.1, [], lone_wheels(700.0, (0.0, 2.5)), Drive(2.0, 10.0, entry=0.0))
 
 
 @pytest.mark.parametrize("speed", [0.0, -3.0, np.nan, np.inf])
-def test_a_speed_that_is_none_is_rejected(speed):
+def test_a_speed_that_is_not_positive_and_finite_is_rejected(speed):
     with pytest.raises(SimulationError, match="speed must be above 0 m/s"):
         simulate_passage(TRACK, car(), speed, SENSOR)
 
 
-def test_a_pattern_of_the_wrong_length_says_both_lengths():
+def test_an_error_about_the_number_of_values_states_both_numbers():
     with pytest.raises(SimulationError, match="pad_stiffness has 12 values for 41 supports"):
         TRACK.with_(pad_stiffness=np.ones(12))
 
 
-def test_negative_stiffness_says_support_place_and_value():
+def test_an_error_about_negative_stiffness_states_support_position_and_value():
     stiffness = TRACK.ballast_stiffness.copy()
     stiffness[7] = -1e6
     with pytest.raises(SimulationError, match=r"ballast_stiffness of support 7 at 4\.200 m is negative: -1e\+06\."):
@@ -63,7 +63,7 @@ def test_a_value_that_is_no_number_is_rejected():
         TRACK.with_(pad_damping=np.nan)
 
 
-def test_a_path_that_jumps_says_where():
+def test_an_error_about_a_step_of_a_path_states_its_position():
     def step(x, wheel=0):
         return np.where(np.asarray(x) > 12.3, 3e-3, 0.0)
 
@@ -74,15 +74,15 @@ def test_a_path_that_jumps_says_where():
     check_path((Sections((3.0, 4.0, 5.0), (0.0, 2e-3, 0.0)),), 0.0, 24.0)
 
 
-def test_a_path_that_is_no_number_says_where():
+def test_an_error_about_a_path_that_is_no_number_states_the_position():
     with pytest.raises(SimulationError, match=r"not a number at 12\.00"):
         simulate_passage(
             TurnoutTrack(TRACK, {"main": ((lambda x, wheel=0: np.where(x > 12.0, np.nan, 0.0),),)}), car(), 30.0, SENSOR
         )
 
 
-def test_newton_that_does_not_converge_says_time_port_and_residual():
-    """A force that steps up by more than the deformation can bear: open, closed, open, ... never either."""
+def test_an_error_about_convergence_states_time_wheel_and_residual():
+    """The force has a step: with the contact open it closes, with the contact closed it opens, and so on."""
     step = TableLaw((-1.0, 2.9e-5, 2.9e-5 + 1e-12, 1.0), (0.0, 0.0, 6e4, 6e4), (0.0, 0.0, 0.0, 0.0))
     wheel = lone_wheels(700.0, contact=step, gravity=0.0)
     drive = Drive(12.0, 0.0, entry=0.0, free_fall=(0.0, 1.0))
@@ -95,7 +95,7 @@ def test_a_track_that_carries_nothing_is_rejected():
         prepare(TRACK.with_(ballast_stiffness=0.0), 1e-4)
 
 
-def test_a_body_on_nothing_is_rejected():
+def test_a_body_without_support_is_rejected():
     floating = Vehicle("v", (Body("box", 1e3, 1e3, 1.0), Body("wheel", 700.0, None, 0.0)), (), (1,))
     with pytest.raises(SimulationError, match="rests on nothing"):
         simulate_passage(TRACK, floating, 30.0, SENSOR)
@@ -127,7 +127,7 @@ def test_a_body_on_nothing_is_rejected():
         (lambda: load_track("nowhere"), "Write one of tommerup"),
     ],
 )
-def test_other_bad_input_says_what_was_found(build, said):
+def test_errors_about_other_bad_input_state_what_is_wrong(build, said):
     with pytest.raises(SimulationError, match=said):
         build()
 
@@ -143,7 +143,7 @@ def test_other_bad_input_says_what_was_found(build, said):
         ("name: [1, 2", "line"),
     ],
 )
-def test_a_parameter_file_is_rejected_with_file_and_place(tmp_path, text, said):
+def test_an_error_of_a_parameter_file_states_the_file_and_the_cause(tmp_path, text, said):
     path = tmp_path / "wrong.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=said) as caught:
@@ -159,13 +159,13 @@ def test_a_sensor_where_wheels_are_not_yet_on_the_track_is_rejected_with_both_li
         simulate_passage(TRACK, car(), 30.0, sensors, direction)
 
 
-def test_it_counts_where_a_sensor_really_sits():
+def test_the_limit_applies_to_the_true_position_of_a_sensor():
     with pytest.raises(SimulationError, match=r"'A' at 8\.900 m"):
         simulate_passage(TRACK, car(), 30.0, [Sensor("A", 9.4)], terms=(SensorPosition("A", -0.5),))
 
 
-def test_a_sensor_at_the_limit_records_what_one_in_the_middle_does():
-    """A uniform track does not know where it is: the highest deflection under a wheel agrees to 1 %, the wheel's own
+def test_a_sensor_at_the_limit_records_the_same_as_one_in_the_middle():
+    """A uniform track is the same everywhere: the highest deflection under a wheel agrees to 1 %, with its own
     stand-in behind the limit; 3 m from the end it is a hundredth."""
     sensors = [Sensor(name, x, quantity="displacement", cutoff=None) for name, x in zip("ABC", (9.0, 18.0, 27.0))]
     wheel = lone_wheels(600.0, (0.0,), pressing=50e3)

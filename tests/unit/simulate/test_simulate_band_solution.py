@@ -45,7 +45,7 @@ def test_the_solution_from_both_ends_is_that_of_the_dense_system(half, n):
 
 
 @pytest.mark.parametrize("half", [4, 6])
-def test_momentum_less_force_is_that_of_dense_matrices(half):
+def test_momentum_less_force_agrees_with_dense_matrices(half):
     n, pad, rng = 37, 9, np.random.default_rng(5)
     mass, stiffness = band(half, n, 6, 2.0), band(half, n, 7, 50.0)
     v, u = rng.normal(size=(2, n))

@@ -1,4 +1,4 @@
-"""A blade beside its stock rail: closed forms of two beams on common bearers, energy, limits, a wheel changing rail."""
+"""A blade beside its stock rail: closed forms of two beams on common bearers, energy, limits, and wheels."""
 
 from itertools import pairwise
 
@@ -34,8 +34,8 @@ def winkler(stiffness, spacing, rail=EULER):
     return 1.0 / (8.0 * rail.bending_stiffness * b**3)
 
 
-def test_two_rails_share_a_load_as_the_symmetric_and_the_antisymmetric_case_say():
-    """Half the load on both rails: each on pad and half the ballast. Half against half: each on its pad alone."""
+def test_two_rails_share_a_load_as_in_the_symmetric_and_antisymmetric_closed_forms():
+    """Symmetric loads: each rail is on its pad and half of the ballast. Antisymmetric loads: on its pad alone."""
     spacing, pad, ballast = 0.1, 5e7, 2e7
     track = uniform_track(40.0, spacing, EULER, pad_stiffness=pad, ballast_stiffness=ballast, elements_per_bay=1)
     switch = track.with_(blade=Blade(2.0, 2.1, 38.0, EULER, pad, 3e4))
@@ -49,7 +49,7 @@ def test_two_rails_share_a_load_as_the_symmetric_and_the_antisymmetric_case_say(
 
 
 @pytest.mark.parametrize(("toe", "heel", "end"), [(9.0, 15.0, 24.0), (21.0, 15.0, 6.0), (9.3, 15.0, 24.2)])
-def test_chairs_are_the_supports_from_toe_to_end_and_slide_before_the_heel(toe, heel, end):
+def test_chairs_are_the_supports_from_toe_to_end_and_slide_chairs_those_before_the_heel(toe, heel, end):
     blade, x = Blade(toe, heel, end, TRACK.rail, 3e8, 3e4), TRACK.support
     last = TRACK.nearest_support(end)
     low, high = min(toe, x[last]) - 1e-6, max(toe, x[last]) + 1e-6
@@ -78,7 +78,7 @@ def test_wheels_change_rails_only_between_a_surface_of_each():
         assert transfer_position(surfaces, BLADE) is None
 
 
-def test_a_blade_of_nothing_leaves_the_plain_track():
+def test_a_blade_of_negligible_section_leaves_the_plain_track():
     ghost = TRACK.with_(blade=Blade(9.0, 24.0, 24.0, Rail(1.0, 1e-6, 1e3, 1e-9), 1e-2, 0.0))
     frequency = np.linspace(20.0, 1000.0, 50)
     plain, changed = (receptance(prepare(t, 1e-4).matrices, frequency, 12.0, 13.5) for t in (TRACK, ghost))
@@ -90,7 +90,7 @@ def test_a_blade_of_nothing_leaves_the_plain_track():
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_the_planed_blade_grows_to_its_section_and_ends_at_the_closure_rail(mirrored):
+def test_a_planed_blade_has_the_mass_of_its_section_and_ends_at_the_closure_rail(mirrored):
     """Mass of the blade as the integral of its section; no term of the sum is that of an average section."""
     rail, length, share = Rail(5e6, 66.0, 2e8, 0.2, 3000.0), 2.5, 0.4
     toe, heel, end = (23.3, 15.7, 6.0) if mirrored else (6.7, 14.3, 24.0)
@@ -110,7 +110,7 @@ def test_the_planed_blade_grows_to_its_section_and_ends_at_the_closure_rail(mirr
     assert ratio[inside] == pytest.approx([r.shear_ratio(h) for r, h in zip(matrices.blade_rails, np.diff(node))])
 
 
-def test_a_cantilever_planed_to_a_point_share_bends_as_its_closed_form_says():
+def test_a_tapered_cantilever_bends_as_its_closed_form():
     r"""The overhanging toe, :math:`w = \frac{F}{EI} \int_0^L \frac{x^2 dx}{q + (1-q)x/L} + F \int \frac{dx}{GA(x)}`."""
     rail, q, length, force, per_bay = Rail(6e6, 60.0, 2.4e8, 0.0), 0.3, 0.6, 1.0, 12
     track = TRACK.with_(blade=Blade(9.05, 20.0, 24.0, rail, 0.0, 0.0, length, q), elements_per_bay=per_bay)
@@ -153,7 +153,7 @@ def test_the_work_of_an_impact_on_the_blade_is_the_energy_of_both_rails():
     assert energy == pytest.approx(work, rel=2e-3)
 
 
-def test_a_wheel_changes_to_the_blade_and_carries_its_load_over():
+def test_a_wheel_moves_its_load_from_the_stock_rail_to_the_blade():
     """At walking pace both rails together carry the wheel; the stock rail before the change, the blade after it."""
     prepared = prepare(TRACK.with_(blade=Blade(9.0, 9.1, 24.0, TRACK.rail, 3e8, 3e4)), 2e-4)
     drive = Drive(9.9, 3.0, surfaces=SURFACES)
@@ -183,7 +183,7 @@ def reach_of_a_loaded_wheel(prepared, x, line):
     return own - other + m.compliance(x) * weight + (weight / lone_wheels(1.0).contact.stiffness) ** (2.0 / 3.0)
 
 
-def test_the_compiled_march_and_plain_numpy_agree_over_the_change():
+def test_the_compiled_simulation_and_plain_numpy_agree_over_the_change():
     """Whole columns of the inverse and one dense Newton system, with slide chairs that open."""
     prepared = prepare(SWITCH, 1e-4, terms=(LocalPad(19, 0.5),))
     drive = Drive(10.6, 30.0, surfaces=SURFACES)
@@ -199,7 +199,7 @@ def test_the_compiled_march_and_plain_numpy_agree_over_the_change():
 
 
 def test_slide_chairs_press_but_do_not_pull():
-    """With the blade's own weight a chair never carries less than nothing; a fastened one does."""
+    """With the blade's own weight the force of a slide chair is never a pull; that of a fastened chair is."""
     prepared = prepare(SWITCH, 2.5e-5)
     j, k = 16, 27
     names = [("blade", j, 0), ("sleeper", j), ("blade", k, 0), ("sleeper", k)]
@@ -210,7 +210,7 @@ def test_slide_chairs_press_but_do_not_pull():
     spring = [BLADE.chair_stiffness * (a - c) + BLADE.chair_damping * (b - d) for a, b, c, d in (s[:4], s[4:])]
     weight = GRAVITY * BLADE.rail.mass * 0.6
     port = outcome.port_force[BLADE.slide_chairs(SWITCH).index(j)]
-    assert spring[0].min() < -2.0 * weight, "the blade lifts off here: the test would prove nothing otherwise"
+    assert spring[0].min() < -2.0 * weight, "the blade lifts off here: otherwise the test would show nothing"
     assert (spring[0] + port).min() > -1.05 * weight
     assert spring[1].min() < -1.05 * weight
 
@@ -223,15 +223,15 @@ def test_slide_chairs_press_but_do_not_pull():
         ({"chair_stiffness": -1.0}, "chair_stiffness must not be negative"),
     ],
 )
-def test_a_blade_that_cannot_be_is_rejected(blade, message):
+def test_an_impossible_blade_is_rejected(blade, message):
     values = {"toe": 9.0, "heel": 15.0, "end": 24.0, "rail": TRACK.rail, "chair_stiffness": 3e8, "chair_damping": 3e4}
     with pytest.raises(SimulationError, match=message):
         TRACK.with_(blade=Blade(**{**values, **blade}))
 
 
 @pytest.mark.parametrize("toe", [9.2, 9.04, 20.8])
-def test_a_blade_is_as_long_on_every_mesh(toe):
-    """Without a node at its toe it would be up to 0.15 m too long or too short, and rest on another chair."""
+def test_a_blade_has_the_same_length_on_every_mesh(toe):
+    """Without a node at its toe it would be up to 0.15 m too long or too short, and be on another chair."""
     heel, end = (15.0, 24.0) if toe < 15.0 else (14.0, 6.0)
     switch, frequency = TRACK.with_(blade=Blade(toe, heel, end, TRACK.rail, 3e8, 3e4)), np.linspace(20.0, 112.0, 20)
     position = toe + 0.1 * np.sign(heel - toe)
@@ -240,7 +240,7 @@ def test_a_blade_is_as_long_on_every_mesh(toe):
     assert max(np.max(np.abs(h / fine - 1.0)) for h in coarse) < 0.005
 
 
-def test_the_wheel_sinks_by_the_power_of_the_way_that_it_has_moved_off():
+def test_a_wheel_on_the_stock_rail_sinks_by_a_power_of_the_distance():
     """Closed form at half the way, in either direction; 2 unless the file gives another."""
     x = np.array([9.0, 10.5, 12.0, 13.5, 20.0])
     for power, half in ((1.8, 0.02 * 0.5**1.8), (2.0, 0.005)):

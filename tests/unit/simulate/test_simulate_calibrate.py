@@ -1,4 +1,4 @@
-"""What a calibration says of its own error: the model's error is one per octave, not one per line."""
+"""The stated errors of a calibration: the error of the model is one per octave, not one per line."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def _track():
 
 
 def _asked(true, frequency, parameters):
-    """Calibration of the plain track by receptances of a true one, heard at the support and in mid-span."""
+    """Calibration of the plain track by receptances of a true one, measured at the support and in mid-span."""
     matrices, track = assemble(true), _track()
     given = [
         MeasuredReceptance(frequency, h, 1e-4 * np.abs(h), PLACE, heard)
@@ -30,8 +30,8 @@ def _asked(true, frequency, parameters):
     return calibrate(TurnoutTrack(track, {"main": ((),)}), "S", given, location=PLACE, parameters=parameters)
 
 
-def test_the_same_curve_in_sixteen_times_the_lines_says_nothing_new():
-    """Lines within an octave share the model's error; 20 %: the curve's ends count a few lines fewer."""
+def test_the_same_curve_on_sixteen_times_the_lines_has_no_smaller_errors():
+    """Lines within an octave share the error of the model. 20 %: the ends of the curve differ by a few lines."""
     parameters = ("pad_stiffness", "ballast_stiffness", "ballast_damping")
     few, many = (_asked(_track(), np.linspace(60.0, 800.0, n), parameters) for n in (100, 1600))
     for name in parameters:
@@ -46,10 +46,10 @@ def test_the_same_curve_in_sixteen_times_the_lines_says_nothing_new():
     ],
     ids=["pads of a width", "rail 5 % softer"],
 )
-def test_what_the_model_lacks_is_within_the_errors_that_are_said(wrong):
+def test_errors_by_an_incomplete_model_are_within_the_stated_errors(wrong):
     """A track that the five parameters cannot describe, 371 lines of two sensors, hardly any noise."""
     found = _asked(_track().with_(**wrong), np.arange(60.0, 801.0, 2.0), tuple(PARAMETERS))
     true = {name: getattr(_track(), name)[0] for name in PARAMETERS}
     for name, value in found.values.items():
         assert abs(np.log(value / true[name])) < 3.0 * found.sd[name], name
-    assert found.sd["pad_stiffness"] < 0.05  # and they say something
+    assert found.sd["pad_stiffness"] < 0.05  # and the errors are not large

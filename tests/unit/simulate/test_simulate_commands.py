@@ -1,4 +1,4 @@
-"""The commands leave raw files that the readers read and the stages use."""
+"""The commands write raw files that the readers read and the stages use."""
 
 import json
 
@@ -13,7 +13,7 @@ from turnout.records import RawChannel, RawDescription
 from turnout.simulate.calibration import Calibration
 
 
-def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, repository, monkeypatch):
+def test_a_simulated_hammer_test_is_read_again_and_has_intact_impacts(tmp_path, repository, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = str(repository / "config")
     command = [
@@ -37,7 +37,7 @@ def test_a_simulated_hammer_test_is_read_back_and_has_sound_impacts(tmp_path, re
     assert sum(i.accepted for i in impacts) >= 2
 
 
-def test_a_simulation_never_takes_the_place_of_a_raw_file_of_a_turnout(tmp_path, repository, monkeypatch, capsys):
+def test_a_simulation_does_not_overwrite_a_raw_file_of_a_turnout(tmp_path, repository, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "raw" / "tommerup_s1" / "hammer" / "2024-05-13" / "A7_1.h5"
     path.parent.mkdir(parents=True)
@@ -48,7 +48,7 @@ def test_a_simulation_never_takes_the_place_of_a_raw_file_of_a_turnout(tmp_path,
     assert "A7_1.h5 is there already and may be a measurement" in capsys.readouterr().err
 
 
-def test_a_simulated_passage_keeps_its_truth_apart(tmp_path, monkeypatch, capsys):
+def test_the_truth_of_a_simulated_passage_is_in_a_separate_file(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "one.npz"
     command = [
@@ -77,7 +77,7 @@ terms:
 """
 
 
-def test_a_simulated_hammer_test_keeps_its_truth_apart(tmp_path, monkeypatch):
+def test_the_truth_of_a_simulated_hammer_test_is_in_a_separate_file(tmp_path, monkeypatch):
     """Impacts scatter by 1 cm and never by more than two of these. The channel's low-pass is the load cell's: a
     pulse of 1.2 ms loses less than 0.3 % of its peak, its noise is 2 N."""
     monkeypatch.chdir(tmp_path)
@@ -120,14 +120,14 @@ HAMMER = ["simulate", "hammer", "--section", "A7"]
         (["calibrate", "--section", "A7", "--modes", "ballast"], "not of the form"),
     ],
 )
-def test_wrong_commands_say_what_is_wrong(tmp_path, monkeypatch, capsys, command, said):
+def test_errors_about_wrong_commands_state_what_is_wrong(tmp_path, monkeypatch, capsys, command, said):
     monkeypatch.chdir(tmp_path)
     assert main(command) == 2
     assert said in capsys.readouterr().err
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_a_place_in_metres_is_none_of_a_turnouts_sections(tmp_path, repository, monkeypatch, capsys):
+def test_a_position_in_metres_is_no_section_of_a_turnout(tmp_path, repository, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     folder = str(repository / "config")
     assert main(["simulate", "hammer", "--section", "3.0", "--turnout", "tommerup_s1", "--config", folder]) == 2
@@ -135,22 +135,22 @@ def test_a_place_in_metres_is_none_of_a_turnouts_sections(tmp_path, repository, 
     assert not (tmp_path / "raw").exists()
 
 
-def test_a_time_in_utc_is_stored_as_it_is_said(tmp_path, monkeypatch):
+def test_a_time_in_utc_is_stored_unchanged(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*HAMMER, "--impacts", "1", "--at", "2024-05-13T09:00:00Z", "--out", "a.h5"]) == 0
     (recording,) = read("a.h5", tmp_path, RawDescription(CHANNELS)).recordings
     assert recording.started_at.isoformat() == "2024-05-13T09:00:00"
 
 
-def test_the_help_tells_the_loads_that_are_simulated(capsys):
+def test_the_help_states_the_range_of_loads(capsys):
     with pytest.raises(SystemExit):
         main(["simulate", "passage", "--help"])
     assert "0 (empty) to 1 (full), overloaded up to 1.5" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(("reduced", "warned"), [(0.2, False), (241.4, True)])
-def test_a_calibration_that_does_not_meet_its_test_says_that_its_intervals_mean_nothing(reduced, warned):
-    """Five parameters are always found, with a narrow ±, be the test of another track altogether."""
+def test_a_calibration_that_misses_its_test_warns_that_its_intervals_are_not_valid(reduced, warned):
+    """A fit always gives five parameters with small errors, even for a test on another track."""
     band = {(40.0, 100.0): 0.6}
     found = Calibration(
         "M1", {"pad_stiffness": 3e8}, {"pad_stiffness": 0.012}, np.eye(1), {"pad_stiffness": True}, (), band, band,
@@ -180,7 +180,7 @@ def calibrated(monkeypatch, capsys, command, reduced=0.9):
 
 
 @pytest.mark.parametrize("own", ["aarup_n4", "tommerup"], ids=["turnout", "layout"])
-def test_a_calibration_takes_the_track_of_the_turnout_and_says_which(tmp_path, repository, monkeypatch, capsys, own):
+def test_a_calibration_uses_the_track_of_the_turnout_and_states_it(tmp_path, repository, monkeypatch, capsys, own):
     (tmp_path / "config/tracks").mkdir(parents=True)
     for name in ("layouts", "turnouts.tsv"):
         (tmp_path / "config" / name).symlink_to(repository / "config" / name)
@@ -196,7 +196,7 @@ def test_a_calibration_takes_the_track_of_the_turnout_and_says_which(tmp_path, r
     assert said.startswith(f"track: {folder}/tommerup.yaml (no turnout and no track was named)\n")
 
 
-def test_a_calibration_without_a_track_file_of_the_turnout_says_so(tmp_path, repository, monkeypatch, capsys):
+def test_a_calibration_states_that_the_turnout_has_no_track_file(tmp_path, repository, monkeypatch, capsys):
     (tmp_path / "config").mkdir()
     for name in ("layouts", "turnouts.tsv"):
         (tmp_path / "config" / name).symlink_to(repository / "config" / name)
@@ -205,7 +205,7 @@ def test_a_calibration_without_a_track_file_of_the_turnout_says_so(tmp_path, rep
     assert "aarup_n4: no file config/tracks/aarup_n4.yaml nor tommerup.yaml" in capsys.readouterr().err
 
 
-def test_what_is_to_be_pasted_is_what_the_tests_told(monkeypatch, capsys):
+def test_the_lines_for_the_track_file_hold_only_values_that_the_tests_determine(monkeypatch, capsys):
     said, _ = calibrated(monkeypatch, capsys, [])
     told, block = said.split("paste")
     assert "hardly determined by these tests: about what the track file says" in told.splitlines()[3]
@@ -213,7 +213,7 @@ def test_what_is_to_be_pasted_is_what_the_tests_told(monkeypatch, capsys):
     assert "ballast_damping" not in block
 
 
-def test_nothing_is_to_be_pasted_of_a_fit_that_does_not_meet_its_test(monkeypatch, capsys):
+def test_a_fit_that_misses_its_test_gives_no_lines_for_the_track_file(monkeypatch, capsys):
     said, _ = calibrated(monkeypatch, capsys, [], reduced=241.4)
     block = said.split("neither values nor ±")[1]
     assert "do not paste" in block and "does not meet these tests (chi-squared per degree of freedom 241" in block

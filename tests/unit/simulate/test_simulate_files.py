@@ -1,4 +1,4 @@
-"""Files of tracks and vehicles: what is misspelt, without its unit or impossible is rejected with file and place."""
+"""Files of tracks and vehicles: misspelt, impossible or unitless entries are rejected with file and line."""
 
 from copy import deepcopy
 
@@ -58,7 +58,7 @@ def rejected(load, path, text, said):
          r"routes\.main\[2\]\.places\[0\]: 1.0 has no unit and source"),
     ],
 )  # fmt: skip
-def test_a_track_file_is_rejected_with_its_place_and_what_to_write(tmp_path, old, new, said):
+def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, new, said):
     assert old in TRACK
     rejected(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
 
@@ -75,7 +75,7 @@ def test_a_track_file_is_rejected_with_its_place_and_what_to_write(tmp_path, old
         ("rests_on: [b1, b2]", "rests_on: 3", r"cars\[0\]\.rests_on: 3 instead of a list"),
     ],
 )
-def test_a_vehicle_file_is_rejected_with_its_place(tmp_path, old, new, said):
+def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, said):
     assert old in VEHICLE
     rejected(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
 
@@ -98,7 +98,7 @@ def test_an_error_of_a_track_file_names_its_line(tmp_path, old, new, line):
     rejected(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
 
 
-def test_an_error_of_what_another_track_says_names_the_line_of_that_file(tmp_path):
+def test_an_error_in_an_extended_track_file_states_the_line_of_that_file(tmp_path):
     (tmp_path / "base.yaml").write_text(TRACK.replace("kind: cosine", "kind: sine"), encoding="utf-8")
     (tmp_path / "own.yaml").write_text("extends: base\n\nname: own\n", encoding="utf-8")
     line = 1 + next(k for k, said in enumerate(TRACK.split("\n")) if "kind: cosine" in said)
@@ -151,7 +151,7 @@ SMALL_VEHICLE = {
 
 
 def spoilt(content):
-    """``content`` with one entry after the other, at every depth, replaced by what does not belong there."""
+    """``content`` with one entry after the other, at every depth, replaced by a wrong value."""
 
     def places(inside, way=()):
         items = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
@@ -172,8 +172,8 @@ def spoilt(content):
 @pytest.mark.parametrize(
     ("load", "content"), [(load_track, SMALL_TRACK), (load_vehicle, SMALL_VEHICLE)], ids=["track", "vehicle"]
 )
-def test_whatever_stands_in_a_file_loads_or_is_rejected_in_words(tmp_path, monkeypatch, load, content):
-    """Never with a traceback: a YAML reader makes numbers, text, lists, mappings and nothing of what people write."""
+def test_any_content_of_a_file_is_loaded_or_rejected_with_a_message(tmp_path, monkeypatch, load, content):
+    """Never with a traceback: YAML files contain numbers, text, lists, mappings and empty values."""
     path, parsed = tmp_path / "file.yaml", [content]
     path.write_text("", encoding="utf-8")
     # the true reader takes twenty times as long
@@ -189,7 +189,7 @@ def test_whatever_stands_in_a_file_loads_or_is_rejected_in_words(tmp_path, monke
             raise AssertionError(f"{'.'.join(map(str, way))} = {wrong!r}") from error
 
 
-def test_a_vehicle_file_that_was_changed_is_read_again(tmp_path):
+def test_a_changed_vehicle_file_is_read_again(tmp_path):
     path = tmp_path / "v.yaml"
     path.write_text(VEHICLE)
     before = load_vehicle(path, 0.0)
@@ -200,8 +200,8 @@ def test_a_vehicle_file_that_was_changed_is_read_again(tmp_path):
     assert load_vehicle(path, 0.0) != before
 
 
-def test_a_file_is_parsed_once_for_each_text_and_every_caller_has_its_own_parameters(tmp_path, monkeypatch):
-    """A tenth of a second for each turnout of a fleet whose turnouts share a track file."""
+def test_a_file_is_parsed_once_per_text_and_each_caller_has_its_own_parameters(tmp_path, monkeypatch):
+    """Parsing took a tenth of a second for each turnout of a fleet with a common track file."""
     parsed = []
     monkeypatch.setattr(parameter_files, "compose", lambda *given: [parsed.append(given), compose(*given)][1])
     path = tmp_path / "t.yaml"

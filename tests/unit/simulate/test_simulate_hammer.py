@@ -1,4 +1,4 @@
-"""An impact: what of the track and of its terms the hammer meets."""
+"""Simulated impacts: the hammer, the terms of the track, and the stretch of track that is simulated."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def impact(**options):
     return simulate_hammer(TRACK, 15.0, HAMMER, **SHORT, **options)[0].samples
 
 
-def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_roll_on():
-    """It bounces off a track at rest with at most the speed it came with; 1 % for the anti-alias filter."""
+def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_with_any_effect_of_wheels():
+    """It rebounds from a track at rest with at most its initial speed; 1 % for the anti-alias filter."""
     paths = tuple(term.example() for term in TERMS if term.effect_type == "path")
     found, bare = impact(terms=(SurfaceDip(15.0, -1e-3, 0.6), *paths)), impact()
     assert len(paths) >= 5
@@ -28,7 +28,7 @@ def test_a_free_mass_gives_the_rail_at_most_twice_its_momentum_whatever_wheels_r
     assert np.array_equal(found, bare)
 
 
-def test_a_given_force_acts_as_it_is_whatever_the_hammer():
+def test_a_given_force_acts_unchanged_with_any_hammer():
     """A half-sine of 4 ms, in channel 0 to 1 %, the ripple of the anti-alias filter, and its response is linear."""
     duration, peak = 4e-3, 8e3
 
@@ -44,7 +44,7 @@ def test_a_given_force_acts_as_it_is_whatever_the_hammer():
     assert np.std(once[1]) > 1.0
 
 
-def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
+def test_the_terms_of_a_prepared_track_also_act_on_its_channels():
     """A gain of 3 is three times the signal, to rounding: these channels have no converter."""
     quiet = [Sensor("A", 15.0), Sensor("B", 15.6)]
     terms = (LocalBallast(25, 0.3), SensorPosition("B", 0.15))
@@ -56,9 +56,9 @@ def test_the_terms_of_a_prepared_track_count_in_its_channels_too():
     assert np.array_equal(impact(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
 
 
-def test_a_term_counts_the_supports_of_the_whole_track_however_much_of_it_is_marched():
-    """Soft ballast 3 m from the impact changes what is heard above it, more than an end of the track 27 m from
-    there."""
+def test_a_term_counts_supports_of_the_whole_track_also_if_a_stretch_is_simulated():
+    """Soft ballast 3 m from the impact changes the response above it, and more than an end of the track 27 m from
+    there does."""
     track, place = uniform_track(120.0), 60.0
     near, far = (LocalBallast(track.nearest_support(x), 0.2) for x in (place + 3.0, 8.0))
     above = [Sensor("A", place + 3.0, cutoff=None)]
@@ -71,7 +71,7 @@ def test_a_term_counts_the_supports_of_the_whole_track_however_much_of_it_is_mar
     assert np.std(short - whole) < 0.1 * np.std(short - bare)
 
 
-def test_of_a_run_of_supports_a_stretch_keeps_what_lies_in_it():
+def test_a_stretch_of_track_keeps_the_parts_of_terms_that_lie_in_it():
     keep = np.zeros(100, dtype=bool)
     keep[40:60] = True
     terms = (LiftingSleepers(30, 45, 1.0), LiftingSleepers(10, 39, 1.0), LocalBallast(59, 0.3),
@@ -89,7 +89,7 @@ def test_a_track_prepared_for_another_step_is_rejected(rate, substeps):
     assert impact(prepared=prepared, rate=rate, substeps=substeps).shape[1] == round(0.05 * rate)
 
 
-def test_the_former_name_of_the_number_of_impacts_still_counts_and_warns():
+def test_the_former_name_of_the_number_of_impacts_still_works_with_a_warning():
     with pytest.warns(DeprecationWarning, match="n_impacts"):
         recordings = simulate_hammer(TRACK, 15.0, HAMMER, n_blows=2, duration=0.05, pretrigger=0.005)
     assert len(recordings) == 2

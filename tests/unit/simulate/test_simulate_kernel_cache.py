@@ -1,4 +1,4 @@
-"""Machine code of the kernels is kept where it can be written, and never older than any of its sources."""
+"""Machine code of the kernels is stored in a writable folder, and never older than any of its sources."""
 
 import ast
 import os
@@ -25,7 +25,7 @@ def name_of(path):
     return ".".join(("turnout", *path.relative_to(PACKAGE).with_suffix("").parts))
 
 
-def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
+def test_the_name_of_the_folder_depends_on_every_kernel_that_another_one_calls():
     with_kernels = {name_of(p): p for p in PACKAGE.rglob("*.py") if "kernel_cache import" in p.read_text()}
     assert len(with_kernels) >= 8
     behind = closure(*kernel_cache.FINGERPRINTED_MODULES)
@@ -35,7 +35,7 @@ def test_every_kernel_that_another_one_calls_is_behind_the_name_of_the_folder():
     assert {"turnout.simulate.force_laws", "turnout.modal.wave_kernels", "turnout.kernel_cache"} <= behind
 
 
-def test_no_kernel_goes_round_the_folder():
+def test_only_the_kernel_cache_imports_numba():
     assert {p.stem for p in PACKAGE.rglob("*.py") if "numba" in imported_by(p)} == {"kernel_cache"}
 
 
@@ -65,15 +65,15 @@ def test_only_kernels_that_create_arrays_count_references():
 
 
 def called_by_python(path):
-    """Names of functions that a file calls by their name, outside of kernels."""
+    """Names of functions that the Python code of a file calls outside of kernels."""
     kernels = {node.name for node, _ in kernels_of(path)}
     for node in ast.parse(path.read_text()).body:
         if getattr(node, "name", "") not in kernels:
             yield from (c.func.id for c in ast.walk(node) if isinstance(c, ast.Call) and isinstance(c.func, ast.Name))
 
 
-def test_inlined_kernels_have_an_entry_for_python_if_it_calls_them_and_only_then():
-    """An entry that takes tens of arrays out of tuples takes longer to compile than the kernel behind it."""
+def test_inlined_kernels_have_an_entry_for_python_only_if_python_calls_them():
+    """An entry that unpacks tens of arrays from tuples takes longer to compile than its kernel."""
     found = [k for p in (PACKAGE / "simulate").rglob("*.py") for k in kernels_of(p)]
     inlined = {node.name for node, decorator in found if decorator in ("inline_kernel", "inner_kernel")}
     with_entry = {node.name for node, decorator in found if decorator == "inline_kernel"}
@@ -96,7 +96,7 @@ def run(environment, code=RUN):
     return done.stdout
 
 
-def test_the_users_own_setting_comes_first_and_is_used_again(tmp_path):
+def test_the_setting_of_the_user_has_priority_and_its_folder_is_used_again(tmp_path):
     first = run({"NUMBA_CACHE_DIR": str(tmp_path)})
     kept = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.nbc")}
     assert len(kept) == 1 and next(p.name for p in tmp_path.iterdir()).startswith("kernels-")
@@ -119,7 +119,7 @@ def test_equal_code_in_another_folder_is_not_compiled_again(tmp_path):
 
 @pytest.fixture
 def nowhere(monkeypatch, tmp_path):
-    """Nothing beside the source and no user's cache can be written: both would lie below a file."""
+    """Neither the folder of the source nor the cache of the user is writable: both would lie below a file."""
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(kernel_cache, "__file__", str(tmp_path / "file" / "kernel_cache.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
@@ -139,13 +139,13 @@ def test_without_any_folder_to_write_kernels_still_compile(nowhere):
     assert twice(21) == 42
 
 
-def test_the_users_cache_serves_an_installation_that_cannot_be_written(nowhere, monkeypatch):
+def test_a_read_only_installation_uses_the_cache_of_the_user(nowhere, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(nowhere / "home"))
     folder = kernel_cache.cache_folder()
     assert folder.parent == nowhere / "home" / "turnout" and folder.is_dir()
 
 
-def test_other_code_has_another_folder_and_the_old_one_goes(nowhere, monkeypatch):
+def test_other_code_has_another_folder_and_the_old_folder_is_deleted(nowhere, monkeypatch):
     package = nowhere / "package"
     (package / "__pycache__" / "kernels-0123456789abcdef").mkdir(parents=True)
     monkeypatch.setattr(kernel_cache, "__file__", str(package / "kernel_cache.py"))

@@ -1,4 +1,4 @@
-"""Our own numerical error, on passages whose error is known because they are made with it."""
+"""Numerical error of the simulation, estimated on passages with a known error."""
 
 from dataclasses import fields
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ def case(**options):
     return PassageCase(TRACK, car(), 30.0, (Sensor("A", 12.0),), options)
 
 
-def test_what_was_prepared_is_prepared_anew_for_each_run_with_its_terms(monkeypatch):
+def test_a_prepared_track_is_prepared_again_for_each_run_with_its_terms(monkeypatch):
     passages = Passages(monkeypatch)
     terms = (LocalBallast(20, 0.3),)
     numerical_error(case(rate=10e3, prepared=prepare_passage(TRACK, terms, 10e3, scheme="midpoint")))
@@ -44,8 +44,8 @@ def test_what_was_prepared_is_prepared_anew_for_each_run_with_its_terms(monkeypa
 
 
 @pytest.mark.parametrize(("scheme", "order"), [("radau", 3), ("midpoint", 2)])
-def test_the_error_is_that_of_the_run_that_was_asked_for(monkeypatch, scheme, order):
-    """Known to be 2 % by the step and 1 % by the mesh; the finer run, over which it is taken, errs by 3 % at most."""
+def test_the_error_is_that_of_the_requested_run(monkeypatch, scheme, order):
+    """The error is 2 % by the step and 1 % by the mesh; the finer run, to which it is relative, errs by up to 3 %."""
     Passages(monkeypatch, mesh=0.16, step=0.02, order=order)
     found = numerical_error(case(scheme=scheme))
     assert found.step == pytest.approx(0.02, rel=0.03)
@@ -68,14 +68,14 @@ def test_terms_stay_where_they_are_on_a_longer_track(term):
     assert placed(longer, shift_supports(example, 10)) == placed(switch, example) != []
 
 
-def test_no_field_that_counts_supports_is_forgotten():
+def test_every_field_that_counts_supports_is_listed():
     """Numbers of supports are integers, as those of wheels, waves and seeds are."""
     whole = {f.name for term in TERMS for f in fields(term) if f.type in (int, "int")}
     assert whole - {"wheel", "order", "seed"} == set(SUPPORT_FIELDS)
 
 
-def test_the_ends_do_not_matter_to_a_term_in_the_middle():
-    """Nothing that leaves for 12 m comes back from absorbing ends; a term that moved by 12 m would change half."""
+def test_the_ends_of_the_track_do_not_affect_a_term_in_the_middle():
+    """Absorbing ends reflect no waves over 12 m; a term that moved by 12 m would change half of the signal."""
     track = uniform_track(36.0, end_length=6.0, end_damping=400.0)
     options = {"lead": 0.1, "tail": 0.05, "rate": 10e3, "terms": (LocalBallast(30, 0.3),)}
     found = end_error(PassageCase(track, car(half_pivot=2.6), 40.0, (Sensor("A", 18.0),), options), 12.0)

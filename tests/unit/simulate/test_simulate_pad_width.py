@@ -1,4 +1,4 @@
-"""A wide pad presses the rail as widely as it is, whatever the mesh."""
+"""The pressure of a wide pad on the rail has the width of the pad on any mesh."""
 
 from dataclasses import replace
 

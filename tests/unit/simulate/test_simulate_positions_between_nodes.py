@@ -1,4 +1,4 @@
-"""Places between nodes: static and dynamic closed forms, whatever the mesh."""
+"""Positions between nodes: static and dynamic closed forms on any mesh."""
 
 from itertools import pairwise
 
@@ -37,7 +37,7 @@ def influence(x, a, beam="timoshenko"):
 @pytest.mark.parametrize("beam", ["timoshenko", "euler"])
 @pytest.mark.parametrize(("x", "a"), PLACES)
 def test_the_static_receptance_is_the_influence_line_of_the_beam(x, a, beam):
-    """To the 1e-5 that the ends give way and rounding leaves."""
+    """To 1e-5, for the compliance of the ends and rounding."""
     matrices = assemble(simple_beam(beam))
     h = receptance(matrices, [0.0], a, x)[0]
     assert h.real == pytest.approx(influence(x, a, beam), rel=1e-5, abs=0.0)
@@ -46,7 +46,7 @@ def test_the_static_receptance_is_the_influence_line_of_the_beam(x, a, beam):
 
 @pytest.mark.parametrize(("x", "a"), PLACES)
 def test_a_standing_load_deflects_a_sensor_by_the_influence_line(x, a):
-    """In equilibrium from the start, and still: 1e-5 as above; 1e-9 of gravity."""
+    """The load is in equilibrium from the start and does not move: 1e-5 as above; 1e-9 of gravity."""
     load = lone_wheels(1.0, contact=LinearLaw(0.0, 0.0, 5e4), gravity=0.0, pressing=5e4)
     probes = [Probe(x, order) for order in (0, 1, 2)]
     outcome = run(prepare(simple_beam(), 1e-4), 1e-3, probes, load, Drive(a, 0.0, entry=0.0), forces=False)
@@ -79,7 +79,7 @@ def test_an_impact_between_nodes_has_the_receptance_of_the_infinite_track(offset
     assert np.max(np.abs(found / floquet_receptance(frequency[band], track, offset) - 1.0)) < 0.01
 
 
-def test_the_decay_rate_does_not_ask_for_the_mesh():
+def test_the_decay_rate_does_not_depend_on_the_mesh():
     """Far below its first mode (89 Hz) a simple beam deflects by its influence line: 1 %, of which the frequency takes
     0.3 %. The grid is laid so close that all of it lies in the accelerometer's element."""
     place, spacing = 0.3, 0.004

@@ -47,7 +47,7 @@ def test_local_compliance_is_that_of_the_clamped_element(beam, places):
 
 
 @pytest.mark.parametrize("beam", ["timoshenko", "euler"])
-def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass(beam):
+def test_rigid_motion_has_no_strain_energy_and_the_whole_mass(beam):
     rail = Rail(**UIC60, beam=beam)
     h = 0.37
     lift, turn = np.array([1.0, 0.0, 1.0, 0.0]), np.array([-h / 2, 1.0, h / 2, 1.0])
@@ -59,7 +59,7 @@ def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass(beam):
     assert turn @ mass @ turn == pytest.approx(rail.mass * h**3 / 12 + rotary, rel=1e-12)
 
 
-def test_shape_functions_meet_the_nodes_and_rotate_with_the_section():
+def test_shape_functions_agree_with_displacement_and_rotation_of_the_nodes():
     rail = Rail(**UIC60)
     h = 0.3
     p = rail.shear_ratio(h)
@@ -69,6 +69,6 @@ def test_shape_functions_meet_the_nodes_and_rotate_with_the_section():
 
 
 @pytest.mark.parametrize("change", [{"bending_stiffness": -1.0}, {"mass": 0.0}, {"damping": -1.0}, {"beam": "wire"}])
-def test_a_rail_that_cannot_be_is_rejected_with_its_value(change):
+def test_an_impossible_rail_is_rejected_with_its_value(change):
     with pytest.raises(SimulationError, match=str(next(iter(change.values()))).replace(".", r"\.")):
         Rail(**(UIC60 | change))

@@ -1,4 +1,4 @@
-"""Simulated recordings: what a measuring system would have left, seeds, routes, own error."""
+"""Simulated recordings: the measuring system, seeds, routes and numerical error."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ from turnout.simulate.sensor import record_signal
 RNG = np.random.default_rng(7)
 
 
-def test_the_chain_of_a_sensor_does_what_each_stage_says():
+def test_each_stage_of_a_sensor_has_its_stated_effect():
     rate, n = 20e3, 8192
     t = np.arange(n) / rate
     tone = lambda f: np.sin(2.0 * np.pi * f * t)  # noqa: E731
@@ -38,7 +38,9 @@ def test_the_chain_of_a_sensor_does_what_each_stage_says():
     assert np.ptp(mounted[4000:6000]) / 2 == pytest.approx(8.0, rel=0.02)
     low = record_signal(Sensor("a", 0.0), tone(500.0) + tone(9.7e3), rate, RNG)
     inner = slice(1000, 7000)
-    assert np.max(np.abs(low[inner] - tone(500.0)[inner])) < 0.02  # passes one, stops the other, no delay
+    assert (
+        np.max(np.abs(low[inner] - tone(500.0)[inner])) < 0.02
+    )  # one tone passes, the other does not, and there is no delay
     clipped = record_signal(Sensor("a", 0.0, gain=2.0, limit=1.5, **bare), tone(100.0), rate, RNG)
     assert clipped.max() == 1.5 and clipped.min() == -1.5
     stepped = record_signal(Sensor("a", 0.0, resolution=0.25, offset=0.1, **bare), tone(100.0), rate, RNG)
@@ -58,7 +60,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
     assert runs[0][1].samples.tobytes() == runs[1][1].samples.tobytes() != runs[2][1].samples.tobytes()
 
 
-def test_force_and_acceleration_of_an_impact_are_those_of_a_measured_one():
+def test_force_and_acceleration_of_an_impact_have_signs_and_duration_of_measured_ones():
     impact = simulate_hammer(uniform_track(36.0), 18.0, Hammer(velocity_spread=0.0), n_impacts=1)[0]
     assert [c.quantity for c in impact.channels] == ["force", "acceleration", "acceleration"]
     force, acceleration = impact.signal("hammer"), impact.signal("acc_1")
@@ -68,7 +70,7 @@ def test_force_and_acceleration_of_an_impact_are_those_of_a_measured_one():
     assert abs(force[: contact[0] - 40].mean()) < 2.0
 
 
-def test_a_recording_of_a_passage_names_train_speed_loads_and_route():
+def test_a_recording_of_a_passage_states_train_speed_loads_and_route():
     turnout = load_track("tommerup")
     sensors = [Sensor("A7", 24.6, "rail web", limit=5e3)]
     vehicle = load_vehicle("ic3", 0.5)
@@ -80,7 +82,7 @@ def test_a_recording_of_a_passage_names_train_speed_loads_and_route():
 
 
 @pytest.mark.parametrize(("direction", "front"), [("facing", 12.0), ("trailing", 20.0)])
-def test_wheels_arrive_when_speed_and_distance_say(direction, front):
+def test_wheels_arrive_at_the_times_of_speed_and_distance(direction, front):
     sensors = [Sensor("A", 12.0), Sensor("B", 20.0)]
     _, truth = simulate_passage(
         uniform_track(36.0), car(half_pivot=3.0), 25.0, sensors, direction, lead=0.4, tail=0.1, truth=True
@@ -90,7 +92,7 @@ def test_wheels_arrive_when_speed_and_distance_say(direction, front):
     assert np.sign(np.diff(truth.wheel_position[0])[0]) == (1.0 if direction == "facing" else -1.0)
 
 
-def test_one_factorisation_serves_trains_and_speeds():
+def test_one_factorisation_is_used_for_all_trains_and_speeds():
     track, sensors = uniform_track(36.0), [Sensor("A", 18.0)]
     prepared = prepare_passage(track)
     for speed in (20.0, 35.0):
@@ -111,7 +113,7 @@ def test_roughness_has_the_level_of_the_limit_curve(wavelength, printed):
     assert 10.0 * np.log10(variance / 1e-12) == pytest.approx(printed + 2.0, abs=0.7)
 
 
-def test_the_limit_curve_is_straight_in_the_logarithm_where_the_standard_draws_lines():
+def test_the_limit_curve_is_straight_over_the_logarithm_as_in_the_standard():
     """20.3 dB a decade from 40 to 400 mm, 6 dB a decade below 31.5 mm; tabulated to 0.1 dB."""
     decade = np.geomspace(0.04, 0.4, 11)
     assert np.max(np.abs(level(decade) - (-3.2 + 20.3 * np.log10(decade / 0.04)))) < 0.11
@@ -136,7 +138,7 @@ def test_the_gradient_of_the_receptance_is_its_difference():
         assert np.allclose(gradient[:, k], (up - down) / (2.0 * step), atol=0.0, rtol=2e-4)
 
 
-def test_calibration_finds_what_the_receptances_were_made_of_within_its_errors():
+def test_a_calibration_estimates_the_true_parameters_within_its_errors():
     """Five parameters, 2 % noise: all within 4 standard errors, and the errors cover in most of ten draws."""
     turnout = load_track("tommerup")
     truth = {"pad_stiffness": 350e6, "pad_damping": 22e3, "ballast_stiffness": 110e6, "ballast_damping": 45e3,
@@ -159,8 +161,8 @@ def test_calibration_finds_what_the_receptances_were_made_of_within_its_errors()
     assert np.mean(np.abs(scores) < 1.96) > 0.8  # 30 scores, nominal 0.95
 
 
-def test_calibration_says_what_the_data_cannot_tell():
-    """Receptances above 400 Hz hardly know the ballast."""
+def test_a_calibration_reports_parameters_that_the_data_do_not_determine():
+    """Receptances above 400 Hz hardly depend on the ballast."""
     turnout = load_track("tommerup")
     made = assemble(turnout.track)
     frequency = np.arange(450.0, 800.0, 10.0)
@@ -172,8 +174,8 @@ def test_calibration_says_what_the_data_cannot_tell():
 
 
 @pytest.mark.parametrize("tone", [600.0, 700.0, 800.0])
-def test_what_lies_above_the_sampled_band_does_not_fold_into_it(tone):
-    """1 kHz with twenty steps per sample: half the rate is 500 Hz, 54 dB is what a Hamming window stops."""
+def test_frequencies_above_the_sampled_band_cause_no_aliases(tone):
+    """1 kHz with twenty steps per sample: half the rate is 500 Hz; a Hamming window attenuates by 54 dB."""
     time = (np.arange(20 * 4096) + 0.5) / 20e3
     heard = [
         record_signal(Sensor("a", 0.0), np.sin(2.0 * np.pi * f * time), 1e3, RNG, substeps=20)[500:-500]
@@ -199,7 +201,7 @@ def test_the_decay_rate_of_a_winkler_beam_is_that_of_its_exponentials():
     assert found == pytest.approx(4.343 / np.sum(energy * width), rel=0.01)
 
 
-def test_own_error_falls_with_the_step_and_is_small_where_it_should_be():
+def test_the_numerical_error_falls_with_the_step_and_is_small_at_the_usual_step():
     case = PassageCase(
         uniform_track(36.0), car(half_pivot=2.6), 40.0, (Sensor("A", 18.2),), {"lead": 0.15, "tail": 0.1}
     )

@@ -27,7 +27,7 @@ FILES = [shipped_path("config/vehicles") / f"{name}.yaml" for name in AXLES]
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 @pytest.mark.parametrize("load", [0.0, 1.0])
-def test_every_vehicle_stands_on_its_wheels_with_its_weight(path, load):
+def test_the_loads_of_the_wheels_sum_to_the_weight_of_the_vehicle(path, load):
     vehicle = load_vehicle(path.stem, load)
     assert len(vehicle.wheels) == AXLES[path.stem]
     assert vehicle.static_loads.sum() == pytest.approx(GRAVITY * sum(b.mass for b in vehicle.bodies), rel=1e-9)
@@ -38,7 +38,7 @@ def test_every_vehicle_stands_on_its_wheels_with_its_weight(path, load):
         assert np.allclose(matrix, matrix.T, atol=0.0) and np.linalg.eigvalsh(matrix).min() > -1e-3 * abs(matrix).max()
     lift = np.zeros(vehicle.n)
     lift[vehicle.row[:-1]] = 1.0
-    assert np.max(np.abs(stiffness @ lift)) < 1e-9 * np.max(stiffness)  # lifting the whole train strains nothing
+    assert np.max(np.abs(stiffness @ lift)) < 1e-9 * np.max(stiffness)  # lifting the whole train causes no strain
 
 
 def test_the_ic3_has_97_tonnes_8_axles_and_two_shared_bogies():
@@ -82,12 +82,12 @@ def lopsided():
 
 
 @pytest.mark.parametrize("vehicle", [load_vehicle("intercity"), lopsided()], ids=["intercity", "lopsided"])
-def test_a_train_that_runs_the_other_way_round_has_its_wheels_loads_and_modes_in_reverse(vehicle):
+def test_a_reversed_train_has_its_wheels_loads_and_modes_in_reverse_order(vehicle):
     turned = vehicle.reverse()
     last = vehicle.wheel_positions[-1]
     assert turned.wheel_positions == pytest.approx(last - vehicle.wheel_positions[::-1])
     assert turned.static_loads == pytest.approx(vehicle.static_loads[::-1])
-    assert turned.static_loads[0] != pytest.approx(vehicle.static_loads[0], rel=1e-3)  # the input breaks symmetry
+    assert turned.static_loads[0] != pytest.approx(vehicle.static_loads[0], rel=1e-3)  # the input has no symmetry
     assert turned.overhang + vehicle.overhang + last == pytest.approx(vehicle.length)
     modes = [np.sort(eigh(v.matrices[2], v.matrices[0], eigvals_only=True)) for v in (vehicle, turned)]
     assert modes[0] == pytest.approx(modes[1], abs=1e-9 * modes[0][-1])
@@ -105,7 +105,7 @@ def test_coupled_cars_keep_their_places_and_blocks():
 
 
 def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
-    """Four wheels of the locomotive, twenty of its coaches; the other way round the coaches come first."""
+    """Four wheels of the locomotive, twenty of its coaches; of the reversed train the coaches come first."""
     train, locomotive, coach = (load_vehicle(name) for name in ("intercity", "locomotive", "coach"))
     assert locomotive.radius != coach.radius and locomotive.contact != coach.contact
     assert train.wheel_values("radius") == (locomotive.radius,) * 4 + (coach.radius,) * 20
@@ -115,7 +115,7 @@ def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
     assert load_vehicle("wagon_four_axles", units=2).radius == load_vehicle("wagon_four_axles").radius
 
 
-def test_what_presses_the_wheels_of_a_vehicle_is_coupled_with_it():
+def test_coupled_vehicles_keep_the_loads_on_their_wheels():
     light, heavy = (lone_wheels(900.0, (0.0, 2.0), pressing=force, length=5.0) for force in (3e4, 7e4))
     pair = couple("pair", [light, heavy])
     assert pair.static_loads == pytest.approx([*light.static_loads, *heavy.static_loads])
