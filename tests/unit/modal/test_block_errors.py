@@ -1,4 +1,4 @@
-"""Errors of the entries of a mode's block are those of blocks whose mode scatters."""
+"""The errors of the entries of a mode's block are the scatter of blocks of random modes."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ def entries(frequency, damping, residue):
     return a, b, c
 
 
-def test_the_errors_are_the_scatter_of_blocks_of_drawn_modes():
+def test_the_stated_errors_are_the_scatter_of_blocks_of_random_modes():
     blocks = [entries(*mode) for mode in MODES]
     a = np.zeros((4, 4))
     a[:2, :2], a[2:, 2:] = blocks[0][0], blocks[1][0]

@@ -1,4 +1,4 @@
-"""No estimate leaves the domain of an underdamped mode, and no failure of the estimator costs a campaign."""
+"""All estimates are in the domain of an underdamped mode, and a failure of the estimator rejects no campaign."""
 
 from datetime import date
 from zlib import crc32
@@ -26,7 +26,7 @@ SETTINGS = IdentifySettings(null_draws=10)
 
 
 def odd_impact(kind, time, frequency):
-    """A record that holds no resonance of the section, of amplitude 1."""
+    """A record of amplitude 1 without a resonance of the section."""
     return {
         "short": np.exp(-4000.0 * time),
         "step": np.ones_like(time) + 0.01 * np.random.default_rng(1).standard_normal(len(time)),
@@ -36,8 +36,8 @@ def odd_impact(kind, time, frequency):
 
 @pytest.mark.parametrize("location", ["OT", "CP A9"])
 @pytest.mark.parametrize("kind", ["short", "step", "growing"])
-def test_one_odd_impact_leaves_every_estimate_in_its_domain(location, kind):
-    """Damping estimates of single impacts were up to 2.98 here, which is the damping of no vibration."""
+def test_with_one_outlying_impact_all_estimates_are_within_their_domain(location, kind):
+    """Damping ratios of single impacts were up to 2.98 here, which no vibration has."""
     test = hammer_test(location, 6, 0)
     decays = np.array(test.decays())
     time = np.arange(decays.shape[1]) / test.rate
@@ -62,7 +62,7 @@ def pink_noise(rng, n):
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_noise_of_one_over_f_gives_modes_in_their_domain(seed):
+def test_modes_in_one_over_f_noise_are_within_their_domain(seed):
     test = hammer_test("CP A7", 10, seed, snr_db=80.0)
     rng = np.random.default_rng(seed)
     decays = [y + 0.05 * np.abs(y).max() * pink_noise(rng, len(y)) for y in test.decays()]
@@ -73,7 +73,7 @@ def test_noise_of_one_over_f_gives_modes_in_their_domain(seed):
     assert all(abs(row["damping"]) <= MAX_DAMPING for row in model.per_impact)
 
 
-def test_an_impact_with_which_the_estimator_fails_is_left_out(monkeypatch):
+def test_an_impact_for_which_the_estimator_fails_is_left_out(monkeypatch):
     test = hammer_test("CP A7", 6, 3)
     decays = test.decays()
 
@@ -128,8 +128,8 @@ def check_receptance(measured, model):
     assert np.all(np.abs(ratio - 1.0) < 0.1)
 
 
-def test_two_poles_in_one_resonance_do_not_stand_for_it():
-    """Poles of 477 and 493 Hz shared the railpad resonance of one campaign: 505 Hz, and a fit of 55 %."""
+def test_two_poles_do_not_replace_one_resonance():
+    """Formerly poles of 477 and 493 Hz described the railpad resonance of one campaign: 505 Hz, and a fit of 55 %."""
     tests = [demonstration_model("A8", (1.0, 1.012), number) for number in (0, 5)]
     first, second = (model for _, model in tests)
     for measured, model in tests:
@@ -161,7 +161,7 @@ def shared_error_mode(band, frequency, shared, damping=0.1, damping_shared=0.0):
 
 
 @pytest.mark.parametrize(("estimates", "is_rejected"), [
-    (shared_error_mode("ballast", 307.0, 0.25, 0.4, 0.34), True),  # accepted before: all of its error is shared
+    (shared_error_mode("ballast", 307.0, 0.25, 0.4, 0.34), True),  # formerly accepted: all of its error is shared
     # intervals of ± 1.96 x 4 %: 288 to 337 Hz, 268 to 314 Hz, 262 to 307 Hz; edges 330 and 273 Hz
     (shared_error_mode("ballast", 312.0, 0.04), True), (shared_error_mode("ballast", 290.0, 0.04), False),
     (shared_error_mode("railpad", 284.0, 0.04), True), (shared_error_mode("railpad", 299.0, 0.003), False),
@@ -171,7 +171,7 @@ def shared_error_mode(band, frequency, shared, damping=0.1, damping_shared=0.0):
     (shared_error_mode("other1", 284.0, 0.04), False),
 ])  # fmt: skip
 def test_an_error_that_all_impacts_share_counts(estimates, is_rejected):
-    """An interval out of the band of a resonance does not tell which one it is, even where all impacts agree."""
+    """An interval beyond the band of a resonance does not identify it, even if all impacts agree."""
     accepted, failed = accepted_modes([estimates], SETTINGS)
     assert len(accepted) == (not is_rejected)
     reasons = [(band, rejection.reason) for band, rejection in failed]

@@ -29,7 +29,7 @@ def receptance(model, passed, residue=None, decay=0.0):
     return Receptance(FREQUENCY, h, h, h, level, level, level, level, passed, 10, 1500.0, decay=decay)
 
 
-def test_a_gate_that_stops_the_railpad_band_leaves_a_second_order_model():
+def test_a_gate_that_rejects_the_railpad_band_leaves_a_second_order_model():
     test = hammer_test("CP A7", 10, 1)
     model = identify(test.decays(), test.rate, SETTINGS, receptance(published_model("CP A7"), FREQUENCY < 300.0))
     assert model.status == "second_order_only"
@@ -38,12 +38,12 @@ def test_a_gate_that_stops_the_railpad_band_leaves_a_second_order_model():
     assert (rejection.reason, rejection.value) == ("low_coherence", 0.0)
     assert rejection.detail == "railpad mode: share of its half-power band that passes the gate; lowest level 0.30"
     assert [m["reason"] for m in model.rejected_modes if m["value"] == 0.0] == ["fails the coherence gate"]
-    # The railpad mode stays in the fit, so the ballast mode is not biased by leaving it out.
+    # The railpad mode stays in the fit, so that the ballast mode has no bias.
     assert len(model.diagnostics["modes_in_fit"]) == 2
     assert abs(model.modes[0].frequency - test.frequency[0, 0]) < 6.0 * model.modes[0].frequency_se
 
 
-def test_a_gate_that_stops_everything_gives_no_model():
+def test_a_gate_that_rejects_all_lines_gives_no_model():
     test = hammer_test("CP A7", 10, 2)
     gated = receptance(published_model("CP A7"), np.zeros(len(FREQUENCY), dtype=bool))
     model = identify(test.decays(), test.rate, SETTINGS, gated)
@@ -96,7 +96,7 @@ def test_too_few_lines_give_no_residues():
     assert fit_receptance(receptance(model, FREQUENCY < 50.0), model.frequency, model.damping) is None
 
 
-def test_with_a_receptance_the_model_answers_a_unit_impulse():
+def test_with_a_receptance_the_model_gives_the_response_to_a_unit_impulse():
     """y at sample k is the impulse response at time k/rate, of the modes as identified."""
     test = hammer_test("SP", 10, 3)
     truth = published_model("SP")
@@ -110,5 +110,5 @@ def test_with_a_receptance_the_model_answers_a_unit_impulse():
     for _ in k:
         out.append(model.c @ x)
         x = model.a @ x
-    # The railpad frequency is good to 2e-5 and turns 7.5 times in 300 samples: 1e-3 of phase; damping likewise.
+    # The railpad frequency is known to 2e-5 and has 7.5 periods in 300 samples: 1e-3 of phase; damping likewise.
     np.testing.assert_allclose(out, expected.sum(axis=0), atol=5e-3 * np.abs(expected).max())

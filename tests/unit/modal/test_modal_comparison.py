@@ -1,4 +1,4 @@
-"""Two tests are compared by their impacts; a shift is found, or the shift that could have been is printed."""
+"""Two tests are compared by their impacts; a shift is found, or the detectable shift is stated."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_a_detectable_shift_is_detected_at_its_power():
     assert np.mean(found) == pytest.approx(0.8, abs=0.06)
 
 
-def test_a_moved_ballast_mode_is_found_and_the_railpad_mode_is_not():
+def test_a_shifted_ballast_mode_is_found_and_the_constant_railpad_mode_is_not():
     first, second = model_of(1, spread=0.01), model_of(2, spread=0.01, shift=(0.95, 1.0))
     ballast, railpad = (compare_tests(first, second, band) for band in ("ballast", "railpad"))
     assert ballast.detected
@@ -52,7 +52,7 @@ def test_a_moved_ballast_mode_is_found_and_the_railpad_mode_is_not():
 
 
 def test_a_five_per_cent_shift_hardly_changes_the_fit():
-    """Detection by fit fails: the held-out fit tells how alike the impacts are, not where the pole is."""
+    """A fit does not detect a shift: the held-out fit depends on the scatter of impacts, not on the pole."""
     first, second = model_of(3), model_of(4, shift=(0.95, 1.0))
     assert compare_tests(first, second, "ballast").probability < 1e-6
     assert abs(first.fit - second.fit) < 2.0

@@ -1,4 +1,4 @@
-"""The fast Hankel products and realisations agree with the plain ones, in a fraction of the memory."""
+"""Fast Hankel products and realisations agree with the direct ones, with less memory."""
 
 import tracemalloc
 
@@ -12,7 +12,7 @@ from turnout.modal.era import gram_matrices, hankel_operator, hankel_rows
 
 
 def full_svd_era(y, order, rows):
-    """Realisation as in the textbook, with every matrix formed."""
+    """Realisation as in textbooks, with explicit matrices."""
     columns = len(y) - rows
     h0 = hankel(y[:rows], y[rows - 1 : -1])
     h1 = hankel(y[1 : rows + 1], y[rows:])
@@ -27,7 +27,7 @@ def noisy_decay(n=600):
 
 
 @pytest.mark.parametrize(("rows", "shift"), [(7, 0), (7, 1), (20, 0), (20, 1), (33, 1)])
-def test_the_hankel_product_is_that_of_the_formed_matrix(rows, shift):
+def test_the_hankel_product_is_that_of_the_explicit_matrix(rows, shift):
     rng = np.random.default_rng(1)
     y = rng.standard_normal(40)
     operator = hankel_operator(y, rows, shift)
@@ -57,11 +57,11 @@ def test_lanczos_gives_the_digits_of_a_full_svd(rows, order):
     ours = era(y, order, rows)
     np.testing.assert_allclose(ours.singular_values, s, rtol=1e-10)
     expected, found = np.sort_complex(np.linalg.eigvals(a)), np.sort_complex(ours.poles)
-    # At order 7 two singular values of noise are 2 % apart: eigenvectors lose two digits, poles with them.
+    # At order 7 two singular values of noise are 2 % apart: eigenvectors and poles lose two digits.
     np.testing.assert_allclose(found, expected, atol=1e-8)
 
 
-def test_the_realisation_reproduces_the_decay_it_came_from():
+def test_the_realisation_reproduces_its_decay():
     y = 2.0 * 0.9 ** np.arange(60.0) * np.cos(0.7 * np.arange(60.0) + 0.4)
     model = era(y, 2, 20)
     x, out = model.b, []
@@ -93,7 +93,7 @@ def test_memory_is_not_quadratic_in_the_size_of_the_hankel_matrix():
     assert peaks[1] < 1200 * 1200
 
 
-def test_a_record_shorter_than_a_decay_time_asks_for_a_square_matrix():
+def test_a_record_shorter_than_a_decay_time_needs_a_square_matrix():
     assert hankel_rows(600) == 200
     assert hankel_rows(600, decay_time=199.0) == 200
     assert hankel_rows(600, decay_time=201.0) == 300
@@ -107,6 +107,6 @@ def test_a_record_shorter_than_a_decay_time_asks_for_a_square_matrix():
         (np.ones((2, 9)), 5, "order 5"),
     ],
 )
-def test_what_cannot_be_realised_says_why(decay, order, words):
+def test_an_error_states_why_a_decay_cannot_be_realised(decay, order, words):
     with pytest.raises(ValueError, match=words):
         era(decay, order)

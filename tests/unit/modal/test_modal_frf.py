@@ -23,12 +23,12 @@ def test_modes_over_a_decade_are_found_with_their_damping():
     f = np.arange(1.0, 2001.0)
     true = [(112.0, 0.004, 1.0), (306.9, 0.002, -0.8), (596.4, 0.0015, 1.2), (974.1, 0.001, -0.5)]
     found = modes_of_frf(f, response(f, true)).modes
-    # The local polynomial replaces modes far off the band; what it misses is 1e-4 of a half-width.
+    # The local polynomial replaces modes far from the band, with an error of 1e-4 of a half-width.
     assert [m.frequency.mean for m in found] == pytest.approx([t[0] for t in true], rel=1e-5)
     assert [m.damping.mean for m in found] == pytest.approx([t[1] for t in true], rel=1e-2)
 
 
-def test_two_close_modes_are_told_apart():
+def test_two_close_modes_are_distinguished():
     f = np.arange(1.0, 1001.0) * 0.25
     both = [response(f, [(100.0, 0.01, 1.0), (103.0, 0.01, w)]) for w in (0.8, -0.5, 0.3)]
     found = modes_of_frf(f, np.array(both)).modes
@@ -51,7 +51,7 @@ def damped_modes(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_receptance_mobility_and_accelerance_give_the_same_modes(seed):
-    """The local polynomial misses part of the slope of the neighbours within a half-width: a share like the damping.
+    """The local polynomial lacks a part of the slope of the neighbours within a half-width, about the damping ratio.
 
     The bias is a share of the half-width, zeta, times a factor below 0.02 in frequency, 4 in damping and 6 in residue.
     """
@@ -70,7 +70,7 @@ def test_receptance_mobility_and_accelerance_give_the_same_modes(seed):
         assert residue == pytest.approx(expected, rel=6.0 * zeta.max())
 
 
-def test_a_response_that_is_zero_at_zero_hertz_has_its_modes():
+def test_the_modes_of_a_response_that_is_zero_at_zero_hertz_are_found():
     f = np.arange(0.0, 1000.0)
     found = modes_of_frf(f, response(f, [(200.0, 0.01, 1.0)])).modes
     assert [m.frequency.mean for m in found] == pytest.approx([200.0], rel=1e-5)
@@ -100,7 +100,7 @@ def test_errors_come_from_the_spread_between_responses():
         (np.arange(100.0), np.full(100, np.nan), "not finite"),
     ],
 )
-def test_what_cannot_be_used_says_why(frequency, frf, words):
+def test_an_error_states_why_a_response_cannot_be_used(frequency, frf, words):
     with pytest.raises(ValueError, match=words):
         modes_of_frf(frequency, frf)
 

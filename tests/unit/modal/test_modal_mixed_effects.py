@@ -86,7 +86,7 @@ def test_the_spread_between_impacts_is_recovered_and_does_not_become_damping():
     fit = fit_mixed(theta_of(model.frequency, model.damping), decays, test.rate, NO_DRIFT)
     spread = np.sqrt(fit.spread).reshape(2, 2)
     assert spread[1, 0] == pytest.approx(0.02, rel=0.4)
-    # One pole for all impacts would read 3 % more damping in the railpad mode; the mean of 30 is good to 0.4 %.
+    # One pole for all impacts would give 3 % more damping in the railpad mode; the mean of 30 is known to 0.4 %.
     assert fit.mean[1, 1] == pytest.approx(test.damping[:, 1].mean(), rel=0.01)
     np.testing.assert_allclose(fit.theta[:, 1, 0], np.log(test.frequency[:, 1]), atol=2e-3)
 
@@ -112,11 +112,11 @@ def test_equal_errors_give_the_t_interval():
     assert (s.mean, s.n) == (5.0, 4)
 
 
-def test_a_weak_impact_weighs_less_in_the_mean():
+def test_a_weak_impact_has_a_lower_weight_in_the_mean():
     assert summarise([0.0, 0.1, 9.0], [0.1, 0.1, 90.0]).mean < 0.06
 
 
-def test_the_error_of_a_choice_widens_the_interval_and_leaves_the_mean():
+def test_the_error_of_the_model_choice_widens_the_interval_and_does_not_change_the_mean():
     plain, chosen = (summarise([3.0, 5.0, 4.0, 8.0], [0.3] * 4, shared_se=c) for c in (0.0, 2.0))
     assert (chosen.mean, chosen.spread) == (plain.mean, plain.spread)
     assert chosen.se == pytest.approx(np.hypot(plain.se, 2.0))
@@ -124,7 +124,7 @@ def test_the_error_of_a_choice_widens_the_interval_and_leaves_the_mean():
     assert chosen.high - chosen.mean == pytest.approx(np.hypot(plain.high - plain.mean, 2.0 * norm.ppf(0.975)))
 
 
-def test_the_fit_with_shared_poles_sees_all_decays_through_their_principal_ones():
+def test_the_fit_with_shared_poles_to_principal_decays_is_the_optimum_for_all_decays():
     """At its optimum the score of all 30 decays vanishes against their own information."""
     _, decays = decays_of(n=30, seed=6)
     model = published_model("CP A7")
@@ -133,7 +133,7 @@ def test_the_fit_with_shared_poles_sees_all_decays_through_their_principal_ones(
     at = linearise(theta[None], decays, 20e3, NO_DRIFT)
     information, score = at.information.sum(axis=0), at.score.sum(axis=0)
     step = np.linalg.solve(information, score)
-    # In standard errors; noise that the 22 others hold is all that is left.
+    # In standard errors; only the noise of the 22 other decays remains.
     sigma2 = at.rss.sum() / decays.size
     assert settled
     assert np.sqrt(step @ information @ step / sigma2) < 0.3
@@ -147,7 +147,7 @@ def test_a_single_impact_keeps_its_own_error():
         summarise([], [])
 
 
-def test_the_noise_filter_finds_the_autoregression_that_made_the_noise():
+def test_the_noise_filter_estimates_the_true_autoregression():
     rng = np.random.default_rng(3)
     noise = np.zeros((10, 700))
     for k in range(1, 700):
@@ -157,7 +157,7 @@ def test_the_noise_filter_finds_the_autoregression_that_made_the_noise():
     assert found == pytest.approx([1.0, -0.8], abs=0.03)
 
 
-def test_whitening_keeps_the_poles():
+def test_whitening_does_not_change_the_poles():
     k = np.arange(50)
     z = 0.9 * np.exp(0.6j)
     white = whiten((z**k).real[None], np.array([1.0, -0.5, 0.2]))[0]
@@ -166,7 +166,7 @@ def test_whitening_keeps_the_poles():
 
 
 def test_the_held_out_fit_of_an_impact_does_not_use_its_own_modes():
-    """Three impacts of one mode and a fourth of another: by the others' modes the fourth is not described at all."""
+    """Three impacts of one mode and a fourth of another: the modes of the others do not describe the fourth at all."""
     k = np.arange(300)
     poles = [discrete_pole(f, 0.05, 20e3) for f in (200.0, 200.0, 200.0, 600.0)]
     decays = np.array([(z**k).real for z in poles])
@@ -177,7 +177,7 @@ def test_the_held_out_fit_of_an_impact_does_not_use_its_own_modes():
     np.testing.assert_allclose(exact, 100.0, atol=1e-4)
 
 
-def test_random_modes_explain_pure_noise_only_by_their_number():
+def test_random_modes_explain_noise_only_by_the_number_of_their_amplitudes():
     """One mode has two free amplitudes: of 600 samples of noise it explains 2/600, a fit of 0.17 %."""
     noise = np.random.default_rng(4).standard_normal((20, 600))
     null = random_mode_fits(noise, 20e3, [(50.0, 300.0)], 40)

@@ -1,4 +1,4 @@
-"""The paper's procedure is there, biased as it is, and every result says by how much."""
+"""The paper's procedure with its bias, which every result states."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def paper(location, settings=SETTINGS, with_leads=True, **conditions):
 
 
 @pytest.mark.parametrize("location", LOCATIONS)
-def test_the_printed_bias_is_the_bias(location):
-    """The bias varies with contact time and start sample, which the simulation draws and the test fixes: to 2.5 %."""
+def test_the_stated_bias_is_the_actual_bias(location):
+    """The bias depends on contact time and start sample: random in the simulation, fixed in the test. To 2.5 %."""
     test, model = paper(location)
     assert "ballast" in [m.band for m in model.modes]
     for mode in model.modes:
@@ -33,7 +33,7 @@ def test_the_printed_bias_is_the_bias(location):
     )
 
 
-def test_the_ballast_mode_is_biased_where_the_joint_method_is_not():
+def test_the_ballast_mode_has_a_bias_that_the_joint_method_does_not_have():
     test, model = paper("OT")
     joint = identify(test.decays(), test.rate, SETTINGS, method="joint")
     truth = test.frequency[0, 0]
@@ -41,7 +41,7 @@ def test_the_ballast_mode_is_biased_where_the_joint_method_is_not():
     assert abs(joint.mode("ballast").frequency / truth - 1.0) < 0.01
 
 
-def test_two_bands_make_two_pairs():
+def test_two_bands_give_two_pairs():
     _, model = paper("CP A7")
     assert (model.method, model.order, model.status) == ("paper", 4, "accepted")
     assert np.all(model.a[:2, 2:] == 0.0)
@@ -56,14 +56,14 @@ def test_a_location_with_one_band_gives_a_second_order_model():
 
 
 def test_a_causal_filter_shifts_the_ballast_mode_of_a7_downwards():
-    """The causal filter's own poles find no room in two states: tens of per cent."""
+    """Two states cannot contain the poles of the causal filter: the shift is tens of percent."""
     settings = IdentifySettings(null_draws=10, paper_bias_tests=4, paper_zero_phase=False)
     test, model = paper("CP A7", settings)
     mode = model.mode("ballast")
     assert mode is None or mode.frequency < 0.85 * test.frequency[0, 0]
 
 
-def test_without_the_samples_before_the_decay_it_says_so():
+def test_without_samples_before_the_decay_the_diagnostics_state_that():
     _, model = paper("CP A7", with_leads=False)
     assert model.diagnostics["filters_start_at"] == "decay"
 
@@ -84,7 +84,7 @@ def test_at_a_low_rate_the_upper_band_ends_below_half_of_it(rate, bands):
     found = band_modes([np.r_[lead, records]], [len(lead)], len(k), rate, SETTINGS)[:, 0]
     assert found[:bands, 0] == pytest.approx([f for f, _ in wanted], rel=0.05)
     assert np.isnan(found[bands:]).all()
-    # 0.45 of the rate is left to the upper band, and nothing above the split where that is no more
+    # the upper band ends at 0.45 of the rate, and there is no upper band if that is below the split
     assert len(split_bands([records], rate, SETTINGS)) == bands
 
 
@@ -98,8 +98,8 @@ def test_one_impact_has_no_standard_error():
     assert all(row["frequency_se"] is None and row["damping_se"] is None for row in model.per_impact)
 
 
-def test_the_spread_of_impacts_is_theirs_and_no_impact_has_an_error_of_its_own():
-    """The procedure states no error: what impacts differ by is all spread, never none."""
+def test_the_spread_of_impacts_is_stated_without_errors_of_single_impacts():
+    """The procedure states no error of an impact: all differences between impacts are spread."""
     _, model = paper("CP A7", spread=0.02)
     for mode in model.modes:
         own = [row for row in model.per_impact if row["band"] == mode.band]

@@ -1,4 +1,4 @@
-"""Which modes are reported: all that are there, none that are not, not told how many or where."""
+"""Reported modes: all true modes and no others, without knowledge of their number and frequencies."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def identified(location, seed=0, n=10, settings=SETTINGS, **conditions):
 
 
 @pytest.mark.parametrize("location", LOCATIONS)
-def test_every_location_gives_its_modes_and_no_other(location):
+def test_at_every_location_the_true_modes_and_no_others_are_reported(location):
     test, model = identified(location)
     assert tuple(m.band for m in model.modes) == test.bands
     assert len(model.diagnostics["modes_in_fit"]) == len(test.bands)
@@ -33,7 +33,7 @@ def test_every_location_gives_its_modes_and_no_other(location):
 
 @pytest.mark.parametrize("location", ["OT", "CP A7", "AS diverging"])
 @pytest.mark.parametrize("snr", [40.0, 26.0])
-def test_unmodelled_modes_and_drift_do_not_disturb(location, snr):
+def test_unmodelled_modes_and_drift_do_not_affect_the_modes(location, snr):
     """Limits of the rms over many tests, here for single tests at three times their value."""
     test, model = identified(location, 4, snr_db=snr, nuisance=UNMODELLED, drift=0.05)
     ballast, railpad = model.mode("ballast"), model.mode("railpad")
@@ -48,7 +48,7 @@ def test_unmodelled_modes_and_drift_do_not_disturb(location, snr):
 
 
 @pytest.mark.parametrize("location", ["CP A9", "AS main"])
-def test_a_mode_that_moves_between_impacts_is_not_taken_for_two(location):
+def test_a_mode_that_scatters_between_impacts_is_not_reported_as_two(location):
     _, model = identified(location, 1, spread=0.03)
     assert len(model.diagnostics["modes_in_fit"]) == 2
     # Ten impacts of 3 %: the spread is known to 1/sqrt(18) = 24 %.
@@ -67,7 +67,7 @@ def test_white_noise_and_random_walks_have_no_modes():
 
 
 @pytest.mark.parametrize("hum", [50.0, 150.0, 16.7])
-def test_hum_is_modelled_and_named(hum):
+def test_hum_is_modelled_and_reported(hum):
     rng = np.random.default_rng(6)
     test = hammer_test("CP A7", 10, 6)
     size = 0.05 * max(np.abs(y).max() for y in test.decays())
@@ -97,7 +97,7 @@ def test_coloured_noise_is_modelled():
 
 
 @pytest.mark.parametrize("damage", ["noise", "second impact"])
-def test_an_odd_impact_is_left_out_and_reported(damage):
+def test_an_outlying_impact_is_left_out_and_reported(damage):
     test = hammer_test("SP", 10, 8)
     decays = test.decays()
     size = np.abs(decays[3]).max()
@@ -122,7 +122,7 @@ def test_a_third_resonance_is_kept_when_its_band_is_configured():
     assert model.mode("other1").frequency == pytest.approx(1050.0, abs=6.0 * model.mode("other1").frequency_se)
 
 
-def test_the_answer_does_not_depend_on_the_order_of_the_impacts_and_is_repeatable():
+def test_the_result_does_not_depend_on_the_order_of_impacts_and_is_repeatable():
     test = hammer_test("CLP", 6, 10)
     decays = test.decays()
     first, again = identify(decays, test.rate, SETTINGS), identify(decays, test.rate, SETTINGS)
@@ -142,7 +142,7 @@ def test_one_impact_gives_modes_with_the_error_of_its_noise():
     assert model.fit is None
 
 
-def test_the_held_out_fit_beats_its_null_and_nears_its_limit():
+def test_the_held_out_fit_exceeds_its_null_and_reaches_its_limit():
     test, model = identified("CP A7", 12, settings=replace(SETTINGS, null_draws=100))
     decays = np.array(test.decays())
     noise_share = test.noise[:, None] * np.sqrt(600) / np.linalg.norm(decays - decays.mean(1, keepdims=True), axis=1)
@@ -185,7 +185,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_unusable_decays_give_a_rejected_model_that_says_why(case):
+def test_unusable_decays_give_a_rejected_model_with_a_reason(case):
     decays, words = BAD[case]
     model = identify(decays, 20e3, SETTINGS)
     assert model.status == "rejected"
@@ -193,7 +193,7 @@ def test_unusable_decays_give_a_rejected_model_that_says_why(case):
     assert len(model.diagnostics["rejected_impacts"]) == len(decays)
 
 
-def test_one_bad_decay_costs_only_itself():
+def test_one_bad_decay_is_left_out_alone():
     test = hammer_test("CP A7", 5, 14)
     decays = test.decays()
     decays[1] = decays[1][:150]

@@ -1,4 +1,4 @@
-"""Decays of similar poles are combined without a loss that matters to the choice of modes."""
+"""Decays with similar poles are combined with a loss that does not affect the choice of modes."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def fit_of(spread, noise, seed, n=30):
     return decays, fit_mixed(THETA, decays, RATE, NONE)
 
 
-def test_what_a_mean_of_scattered_waves_lacks_is_the_energy_of_its_second_derivative():
+def test_the_mean_of_scattered_waves_lacks_the_energy_of_its_second_derivative():
     """Closed form for ln f: a quarter of the squared variance times 3 / zeta^2 times that of the first derivative."""
     mode, step = THETA[1:], 1e-3
     shifted = np.stack([mode, mode])
@@ -46,7 +46,7 @@ def test_impacts_with_equal_poles_need_the_fewest_groups():
 
 
 @pytest.mark.parametrize(("spread", "noise"), [(0.006, 0.002), (0.02, 0.05)])
-def test_combined_decays_are_explained_by_the_modes_of_their_groups(spread, noise):
+def test_the_modes_of_the_groups_explain_the_combined_decays(spread, noise):
     decays, fit = fit_of(spread, noise, 2)
     group = group_similar(fit)
     combined = combine(decays, group)
@@ -55,22 +55,22 @@ def test_combined_decays_are_explained_by_the_modes_of_their_groups(spread, nois
     excess = refit.rss / noise**2 - combined.size
     # chance alone: three standard deviations of chi-squared; beyond it each group may add its limit in both parameters
     assert excess < 3.0 * np.sqrt(2.0 * combined.size) + 4 * MAX_SMEAR * len(combined)
-    # All but the noise of the other combinations of each group: (30 - groups) N samples, and what is left of scatter.
+    # All but the noise of the other combinations of each group, (30 - groups) N samples, and the remaining scatter.
     lost = np.sum(decays**2) - np.sum(combined**2) - (30 - len(combined)) * N * noise**2
     assert lost < 0.01 * np.sum(decays**2)
 
 
-def test_impacts_that_differ_too_much_stay_alone():
+def test_impacts_that_differ_too_much_are_not_combined():
     _, fit = fit_of(0.03, 2e-4, 3)
     assert list(group_similar(fit)) == list(range(30))
 
 
-def test_a_few_impacts_stay_alone():
+def test_a_few_impacts_are_not_combined():
     _, fit = fit_of(0.0, 0.01, 4, n=10)
     assert list(group_similar(fit)) == list(range(10))
 
 
-def test_a_combination_has_the_noise_of_one_decay_whatever_the_signs():
+def test_a_combination_has_the_noise_of_one_decay_for_any_signs():
     rng = np.random.default_rng(5)
     sign = np.where(np.arange(12) % 3, 1.0, -1.0)
     wave = sign[:, None] * decays_of(np.repeat(THETA[None], 12, axis=0))

@@ -1,4 +1,4 @@
-"""Decays of a simulated track: a rail on many supports, with waves beside the two resonances that are looked for."""
+"""Decays of a simulated track: a rail on many supports, with waves besides the two resonances."""
 
 from datetime import date
 
@@ -44,20 +44,20 @@ def highest_peak(section, low, high):
 
 
 class _Still:
-    """A generator that draws no spread."""
+    """A random generator that always returns 0."""
 
     def standard_normal(self):
         return 0.0
 
 
 @pytest.mark.parametrize("section", ["CLP", "A7", "A9"])
-def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
+def test_repeated_tests_find_the_same_modes_or_are_rejected(section):
     """Neither drift nor weak modes take the place of the ballast mode in one test and not in the next."""
     models = [identify(test_of_ten_impacts(section, [3, k]), RATE, SETTINGS) for k in range(3)]
     for band in ("ballast", "railpad"):
         found = [m.mode(band) for m in models if m.mode(band) is not None]
         frequency = np.array([mode.frequency for mode in found])
-        # Another mode would be off by 30 % or more; ten impacts know the ballast mode to some 2 %.
+        # Another mode would differ by 30 % or more; ten impacts determine the ballast mode to about 2 %.
         assert np.ptp(frequency) < 0.06 * frequency.mean()
         assert len(found) >= 2
         for model in models:
@@ -65,8 +65,8 @@ def test_repeated_tests_find_the_same_modes_or_say_that_they_cannot(section):
             assert model.mode(band) is not None or doubts
 
 
-def test_an_interval_holds_the_choice_among_explanations():
-    """More than one was made, and the interval is wider than the scatter of the impacts alone asks for."""
+def test_an_interval_includes_the_choice_among_models():
+    """There are several models, and the interval is wider than by the scatter of the impacts alone."""
     model = identify(test_of_ten_impacts("A9", 5), RATE, SETTINGS)
     mode = model.mode("ballast")
     impacts = np.array([row["frequency"] for row in model.per_impact if row["band"] == "ballast"])
@@ -76,13 +76,13 @@ def test_an_interval_holds_the_choice_among_explanations():
 
 @pytest.mark.parametrize("section", ["A9"])
 def test_the_railpad_mode_is_the_highest_peak_of_its_band(section):
-    """Damping of 5 % moves a peak off its resonance by less than 1 %, the flank of a neighbour by about as much."""
+    """Damping of 5 % shifts a peak from its resonance by less than 1 %, and a neighbouring mode by about as much."""
     mode = identify(test_of_ten_impacts(section, 5), RATE, SETTINGS).mode("railpad")
     assert mode.frequency == pytest.approx(highest_peak(section, 300.0, 800.0), rel=0.02)
 
 
-def test_a_stiffer_ballast_moves_the_ballast_mode_and_not_the_railpad_mode():
-    """A factor of 1.3 on one of two springs in parallel with the rail: at most the root of it, and not nothing."""
+def test_stiffer_ballast_shifts_the_ballast_mode_and_not_the_railpad_mode():
+    """A factor of 1.3 on one of two springs in parallel with the rail: the frequency rises by its root at most."""
     before = identify(test_of_ten_impacts("A8", 7), RATE, SETTINGS)
     after = identify(test_of_ten_impacts("A8", 8, ballast=1.3), RATE, SETTINGS)
     ratio = after.mode("ballast").frequency / before.mode("ballast").frequency
@@ -91,8 +91,8 @@ def test_a_stiffer_ballast_moves_the_ballast_mode_and_not_the_railpad_mode():
 
 
 @pytest.mark.parametrize("seed", [1583613803, 723061654])
-def test_a_resonance_that_an_explanation_splits_does_not_lose_its_name(seed):
-    """A pole too many shares the railpad resonance of A8; the name went to 605 and 499 Hz with 7 to 8 Hz of error."""
+def test_a_resonance_with_two_poles_in_one_model_is_still_reported(seed):
+    """A second pole is at the railpad resonance of A8. Formerly 605 and 499 Hz were reported, ± 7 to 8 Hz."""
     response = simulated_response("A8", 0.97, 1.0)
     recordings, _ = hammer_test(response, 10.0, date(2024, 1, 1), 1, np.random.default_rng(seed))
     settings = ReceptanceSettings()

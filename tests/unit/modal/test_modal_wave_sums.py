@@ -6,7 +6,7 @@ import pytest
 from turnout.modal.least_squares import drift_columns, group_decays, linearise, power_sums, powers
 from turnout.modal.wave_kernels import WIDTH, fill_powers, geometric_sums, sum_blocks
 
-# A prime: no pair of tables fits it without a rest.
+# A prime number: no pair of tables has exactly this length.
 N = 599
 
 
@@ -34,7 +34,7 @@ def test_short_tables_give_the_powers_and_their_products_with_a_record(n_block):
 
 
 def test_sums_of_products_of_two_waves_are_right_for_every_damping():
-    """Also where z z* is so near to 1 that the closed form has lost all its digits."""
+    """Also if z z* is so near to 1 that the closed form has no correct digit."""
     z, wave = waves_of_tests()
     for i, j in np.ndindex(3, 3):
         for other, other_wave in ((z[:, j], wave[:, j]), (z[:, j].conj(), wave[:, j].conj())):
@@ -45,7 +45,7 @@ def test_sums_of_products_of_two_waves_are_right_for_every_damping():
                 assert np.all(np.abs(result - terms.sum(axis=1)) < 1e-11 * np.abs(terms).sum(axis=1))
 
 
-def test_both_ways_to_sum_a_series_agree_where_they_meet():
+def test_both_methods_to_sum_a_series_agree_at_their_limit():
     for distance in (0.49, 0.51):
         for q in np.exp(np.array([-1.0 + 1.0j, 1j, -1.0]) * distance / N):
             direct = [np.sum(np.arange(N) ** p * q ** np.arange(N)) for p in range(3)]
@@ -54,7 +54,7 @@ def test_both_ways_to_sum_a_series_agree_where_they_meet():
 
 @pytest.mark.parametrize("degree", [-1, 2])
 @pytest.mark.parametrize("shared", [True, False])
-def test_a_linearisation_is_that_of_the_matrices_it_does_not_form(degree, shared):
+def test_a_linearisation_is_that_of_explicit_matrices(degree, shared):
     rng = np.random.default_rng(2)
     theta = np.array([[[np.log(110.0), 0.3], [np.log(610.0), 0.05], [np.log(1300.0), 1e-4]]])
     theta = theta if shared else theta + 0.01 * rng.standard_normal((4, 3, 2)) ** 2
@@ -84,7 +84,7 @@ def test_a_wave_that_does_not_oscillate_is_rejected(damping):
         linearise(theta, np.ones((2, N)), 20e3, drift_columns(N, -1))
 
 
-def test_read_only_decays_are_summed_by_the_same_machine_code():
+def test_read_only_decays_use_the_same_machine_code():
     """numba compiles for read-only arrays separately, some 10 s for all sums."""
     decays = np.random.default_rng(2).standard_normal((2, N))
     decays.flags.writeable = False

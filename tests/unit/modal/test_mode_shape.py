@@ -22,7 +22,7 @@ def responses(rng, noise):
     return [list(size * c + noise * rng.standard_normal((N_IMPACT, N))) for c in clean]
 
 
-def test_the_ratio_is_that_of_the_amplitudes_for_any_size_of_the_impacts():
+def test_the_ratio_is_that_of_the_amplitudes_for_impacts_of_any_size():
     first, second = responses(np.random.default_rng(1), 1e-6)
     shapes = two_point_shapes(identify(first, RATE, SETTINGS), first, second)
     np.testing.assert_allclose([s.ratio for s in shapes], SECOND / FIRST, rtol=1e-4)

@@ -1,4 +1,4 @@
-"""Both responses of a test together determine its modes as well as the Cramér-Rao bound of both allows."""
+"""Both responses of a test together determine its modes with the Cramér-Rao bound of both."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def error(model):
     return np.array([[np.log(m.frequency), m.damping] for m in model.modes]) - TRUTH
 
 
-def test_two_responses_reach_the_bound_of_both_and_gain_what_it_says():
+def test_two_responses_reach_their_common_bound():
     """50 tests: an rms is known to 10 %, the ratio of two of the same tests too."""
     single, joint = [], []
     for k in range(50):
@@ -59,7 +59,7 @@ def test_the_stated_bound_is_that_of_both_responses():
     assert twice.modes[0].frequency_crb == pytest.approx(alone.modes[0].frequency_crb / np.sqrt(2.0), rel=0.3)
 
 
-def test_an_impact_without_a_second_decay_leaves_the_identification_to_the_first_response():
+def test_without_a_second_decay_of_an_impact_only_the_first_response_is_used():
     first, second = responses(np.random.default_rng(2))
     alone = identify(list(first), RATE, SETTINGS)
     short = [*second[:-1], second[-1][:50]]

@@ -1,4 +1,4 @@
-"""What the modes leave of all impacts alike moves them by as much as the stated systematic error."""
+"""A residual common to all impacts shifts the modes by about the stated systematic error."""
 
 import numpy as np
 import pytest
@@ -38,8 +38,8 @@ def noise_error(fit):
     return np.sqrt(fit.sigma2 * np.diag(np.linalg.inv(information))).reshape(2, 2)
 
 
-def test_a_mode_that_is_left_out_shows_in_the_common_error_of_its_neighbour():
-    """The fit absorbs a part of it: the error that is made is up to five times the stated one, not fifty."""
+def test_an_omitted_mode_raises_the_common_error_of_its_neighbour():
+    """The fit absorbs a part of it: the actual error is up to five times the stated one, not fifty times."""
     errors, stated, noise = [], [], []
     for seed in range(30):
         fit = fitted(np.random.default_rng(seed), (0.1, 700.0, 0.05))
@@ -52,7 +52,7 @@ def test_a_mode_that_is_left_out_shows_in_the_common_error_of_its_neighbour():
 
 
 def test_noise_of_single_impacts_has_no_common_error():
-    """A fit of the right modes: what is common by chance stays below the error of the noise itself."""
+    """A fit of the right modes: the common part by chance is below the error of the noise."""
     common, bound = [], []
     for seed in range(30):
         fit = fitted(np.random.default_rng(100 + seed), (0.0, 700.0, 0.15))
@@ -61,7 +61,7 @@ def test_noise_of_single_impacts_has_no_common_error():
     assert np.all(np.median(common, axis=0) < np.mean(bound, axis=0))
 
 
-def test_what_is_left_far_from_a_mode_does_not_count_for_it():
+def test_a_residual_far_from_a_mode_does_not_count_for_it():
     fit = fitted(np.random.default_rng(3), (0.3, 1500.0, 0.02))
     assert np.all(common_error(fit, RATE) < 2.0 * noise_error(fit))
 
@@ -80,7 +80,7 @@ def choice_error(ln_f, zeta, variance):
     return systematic_error(OWN, [OwnEstimates(np.array([[ln_f, zeta]]), np.zeros((1, 2)), np.full((1, 2), variance))])
 
 
-def test_an_explanation_that_leaves_much_says_little_about_the_choice():
+def test_a_model_with_large_errors_has_little_weight_in_the_error_of_the_choice():
     """The same distance from a rival that is ten times as uncertain adds a hundredth of the weight."""
     np.testing.assert_allclose(choice_error(4.65, 0.2, 1e-4)[0], [np.sqrt(0.5 * 0.05**2 / 2), 0.0])
     np.testing.assert_allclose(choice_error(4.65, 0.2, 1e-2)[0], [np.sqrt(0.5 * 0.05**2 / 101), 0.0])
@@ -92,13 +92,13 @@ def test_a_broad_rival_with_the_same_error_in_half_widths_has_the_same_weight():
     np.testing.assert_allclose(choice_error(4.65, 0.4, 4e-4)[0], np.sqrt(0.25) * np.array([0.05, 0.2]))
 
 
-def test_a_rival_counts_as_far_as_its_half_power_band_overlaps():
+def test_the_weight_of_a_rival_is_the_overlap_of_its_half_power_band():
     assert choice_error(4.6 + 0.29, 0.1, 1e-4)[0, 0] > 0.05
     assert choice_error(4.6 + 0.31, 0.1, 1e-4)[0, 0] == 0.0
 
 
 @pytest.mark.parametrize(("seed", "number"), [(7138, 69), (7138, 380), (8238, 100), (8238, 292)])
-def test_a_narrow_pole_that_stands_for_a_broad_resonance_has_the_interval_of_its_rivals(seed, number, monkeypatch):
+def test_a_narrow_pole_at_a_broad_resonance_has_the_interval_of_its_rivals(seed, number, monkeypatch):
     """Ballast resonances of damping 0.2 to 0.3 under 1/f noise at 20 dB, found with 0.04 to 0.13.
 
     With weights by the error in ln f and zeta the narrow pole outweighed its broad rivals, or these did not count.
@@ -110,7 +110,7 @@ def test_a_narrow_pole_that_stands_for_a_broad_resonance_has_the_interval_of_its
     assert not bench_modes.is_mistaken(model.mode("ballast"), [m[:2] for m in modes])
 
 
-def test_beside_a_complete_explanation_an_incomplete_one_is_no_rival():
+def test_an_incomplete_model_is_no_rival_of_a_complete_one():
     def explanation(leaves_common):
         fit = fitted(np.random.default_rng(5), (0.0, 700.0, 0.15))
         return Explanation(fit, [], Background(), leaves_common=leaves_common)

@@ -36,7 +36,7 @@ def test_kappa_and_the_pole_of_the_fit_are_those_of_the_closed_form(distance, ra
     assert abs(shift) ** 2 == pytest.approx(2.0 * abs(ratio) * abs(expected), rel=0.15)
 
 
-def test_of_noise_alone_kappa_has_the_stated_variance_and_a_clear_record_leaves_no_error():
+def test_kappa_of_noise_has_the_stated_variance_and_a_clear_record_has_no_error():
     rng = np.random.default_rng(2)
     fits = [fit_of_two(0.0, 0.0, 0.01, rng) for _ in range(60)]
     kappa, variance = np.array([second_order_term(f, NO_DRIFT, RATE) for f in fits])[..., 0].T
@@ -46,8 +46,8 @@ def test_of_noise_alone_kappa_has_the_stated_variance_and_a_clear_record_leaves_
     assert np.median(error) < 0.02 * ZETA
 
 
-def test_the_interval_holds_the_stronger_mode_where_the_noise_hides_the_second_pole():
-    """Eighty such modes; two standard errors of the noise alone hold three in five."""
+def test_the_interval_contains_the_stronger_mode_if_noise_hides_the_second_pole():
+    """Eighty such modes; two standard errors of the noise alone contain three in five."""
     rng = np.random.default_rng(3)
     inside = []
     for _ in range(80):
@@ -63,7 +63,7 @@ def test_the_interval_holds_the_stronger_mode_where_the_noise_hides_the_second_p
     assert np.all(share[2:] > 0.8), share
 
 
-def test_decays_without_information_leave_the_probability_as_it_was():
+def test_decays_without_information_do_not_change_the_probability():
     probability, open_variance = second_pole_posterior(np.array([3.0]), np.array([1e8]))
     assert probability[0] == pytest.approx(0.5, abs=1e-3)
     assert open_variance[0] == pytest.approx(0.3**2, rel=1e-3)
