@@ -1,4 +1,4 @@
-"""Simulated campaigns on a track that is as its file states, each computed once for all tests that read it."""
+"""Simulated campaigns on intact track, each computed once for all tests that use it."""
 
 from functools import cache
 

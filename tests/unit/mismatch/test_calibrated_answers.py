@@ -1,4 +1,4 @@
-"""What the calibrated model answers after each visit, on seeded linear histories with a known change."""
+"""Answers of the calibrated model after each visit, on seeded linear histories with a known change."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -61,7 +61,7 @@ def last_answers(visits):
     return {a.question: a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0, len(visits))}
 
 
-def test_a_step_is_named_from_its_first_visit_on_with_its_onset_and_not_before():
+def test_a_step_is_named_with_its_onset_from_its_first_visit_on_and_not_before():
     visits = histories(np.random.default_rng(1), 5, step("ballast@1.20", 0.8, 3))
     answers = [a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0) if a.question == "change"]
     assert [a.verdict for a in answers] == ["none", "none", "none", "named", "named"]
@@ -71,15 +71,15 @@ def test_a_step_is_named_from_its_first_visit_on_with_its_onset_and_not_before()
     assert last.size == pytest.approx(0.8, abs=4.0 * last.sd)
 
 
-def test_the_evidence_of_a_name_does_not_depend_on_how_finely_its_candidates_are_spaced():
-    """Each candidate counts a third where there are three of each, and the three together as the one did."""
+def test_the_evidence_of_a_name_does_not_depend_on_the_spacing_of_its_candidates():
+    """With three copies of each candidate each counts a third, and the three together count as one."""
     visits = histories(np.random.default_rng(1), 5, step("ballast@1.20", 0.8, 3))
     once, thrice = (change_answer(PARAMETERS, visits, [], n * CANDIDATES, 12.0, 6.0) for n in (1, 3))
     assert once.names == thrice.names == ("local_ballast",)
     assert thrice.gain == pytest.approx(once.gain, abs=1e-9)
 
 
-def test_what_grows_is_a_change_whose_onset_lies_in_the_interval():
+def test_a_growing_effect_is_a_change_with_its_onset_in_the_interval():
     visits = histories(np.random.default_rng(2), 6, lambda v: 0.3 * max(v - 1, 0) * np.eye(len(PARAMETERS))[2])
     answer = last_answers(visits)["change"]
     assert answer.verdict == "named" and answer.parameter == "ballast@1.20" and answer.grows
@@ -87,7 +87,7 @@ def test_what_grows_is_a_change_whose_onset_lies_in_the_interval():
     assert answer.onset[0] <= STEP <= answer.onset[1]
 
 
-def test_softer_ballast_that_trains_feel_less_is_a_hanging_sleeper():
+def test_softer_ballast_with_less_effect_on_trains_is_a_hanging_sleeper():
     visits = histories(np.random.default_rng(3), 4, step("ballast@1.20", -1.0, 2), trains_feel=0.3)
     assert last_answers(visits)["change"].names == ("hanging_sleeper",)
     only_trains = [
@@ -111,8 +111,8 @@ def test_impacts_alone_or_trains_alone_do_not_distinguish_a_gap_from_soft_ballas
 @pytest.mark.parametrize(
     ("trains_feel", "names"), [(1.0, ("local_ballast", "hanging_sleeper")), (0.0, ("hanging_sleeper",))]
 )
-def test_trains_distinguish_only_a_gap_that_they_close_from_soft_ballast(trains_feel, names):
-    """Beside a gap that no train closes, the rest of the bed is soft under impacts and trains alike."""
+def test_trains_distinguish_a_gap_from_soft_ballast_only_if_they_close_it(trains_feel, names):
+    """At a gap that no train closes the ballast is soft under impacts and under trains."""
     answers = [
         last_answers(histories(np.random.default_rng(s), 4, step("ballast@1.20", -1.6, 2), trains_feel))["change"]
         for s in range(10)
@@ -120,7 +120,7 @@ def test_trains_distinguish_only_a_gap_that_they_close_from_soft_ballast(trains_
     assert [a.names for a in answers] == [names] * 10
 
 
-def test_trains_of_some_visits_identify_a_gap_and_leave_the_evidence_of_the_impacts():
+def test_trains_of_some_visits_identify_a_gap_and_do_not_change_the_evidence_of_impacts():
     visits = histories(np.random.default_rng(7), 6, step("ballast@1.20", -1.6, 3), trains_feel=0.0)
     impacts = [replace(v, groups=v.groups[:1]) for v in visits]
     ends = [v if k in (0, 5) else i for k, (v, i) in enumerate(zip(visits, impacts))]
@@ -130,7 +130,7 @@ def test_trains_of_some_visits_identify_a_gap_and_leave_the_evidence_of_the_impa
     assert with_trains.gain == alone.gain and (with_trains.size, with_trains.onset) == (alone.size, alone.onset)
 
 
-def test_a_change_is_as_probable_where_the_file_is_unsure():
+def test_a_change_has_the_same_prior_where_the_file_is_uncertain():
     """The evidence of a step has the same prior at a boundary of two sections; that of a sensor is its own."""
     unsure = [replace(p, sd=1.3) if p.name == "ballast@1.20" else p for p in PARAMETERS]
     by_name = {c.name: c.sd for c in change_candidates(unsure)}
@@ -148,7 +148,7 @@ def test_trains_with_little_information_on_the_support_do_not_decide():
 
 
 def test_a_rival_just_below_the_threshold_counts(monkeypatch):
-    """Evidence of 12.3 and 11.9 nats beyond the price of the candidates: the threshold is for the best alone."""
+    """Evidence of 12.3 and 11.9 nats less the penalty of the choice: only the best one must reach the threshold."""
     price = float(np.log(len(CANDIDATES)))
     by_name = {c.name: c for c in CANDIDATES if not c.grows}
 
@@ -177,22 +177,22 @@ def test_a_sensor_whose_gain_changed_is_named_with_its_channel_position():
     assert answer.names == ("sensor_gain",) and answer.position == pytest.approx(1.8)
 
 
-def test_an_effect_of_the_first_day_differs_from_the_file_and_is_no_change():
+def test_an_effect_of_the_first_day_is_a_difference_from_the_file_and_no_change():
     answers = last_answers(histories(np.random.default_rng(6), 5, step("ballast@1.20", 0.8, 0)))
     assert answers["change"].verdict == "none"
     assert answers["file"].names == ("local_ballast",) and answers["file"].position == pytest.approx(1.2)
 
 
-def test_intact_histories_are_called_intact():
+def test_intact_histories_have_no_finding():
     """60 histories: by Markov's inequality a name has a probability below exp(-12) in each."""
     rng = np.random.default_rng(7)
     verdicts = [last_answers(histories(rng, 5, step("ballast@1.20", 0.0, 0)))["change"].verdict for _ in range(60)]
     assert verdicts.count("none") >= 59 and "named" not in verdicts
 
 
-def test_a_change_below_the_least_size_has_no_name():
+def test_a_change_below_the_smallest_size_has_no_name():
     answer = last_answers(histories(np.random.default_rng(8), 6, step("gain_A1", 0.07, 3)))["change"]
-    assert answer.verdict in ("none", "unknown")  # 0.08 is the least change of a gain that anybody acts on
+    assert answer.verdict in ("none", "unknown")  # 0.08 is the smallest change of a gain that matters
 
 
 WAVES = Waves((2.0, 9.0), 0.0)
@@ -202,22 +202,22 @@ SURFACE = [
 ]
 
 
-def test_directions_of_dips_have_their_shape_without_large_amplitudes_that_cancel():
+def test_dips_are_sums_of_waves_without_large_amplitudes_that_cancel():
     directions = dip_directions(SURFACE)
     direction = directions["dip of 0.8 m@5.00"]
     x = np.linspace(4.0, 6.0, 201)
     amplitudes = np.array([direction[p.name] for p in SURFACE])
     shape = amplitudes @ WAVES.shapes(x)
     dip = 0.5 + 0.5 * np.cos(2.0 * np.pi * np.clip((x - 5.0) / 0.8, -0.5, 0.5))
-    assert np.corrcoef(shape, dip)[0, 1] > 0.85  # waves longer than the sensors' stretch are missing
+    assert np.corrcoef(shape, dip)[0, 1] > 0.85  # waves longer than the stretch of the sensors are missing
     assert np.argmax(shape) == pytest.approx(100, abs=5) and 0.6 < np.ptp(shape) < 1.3
     assert np.max(np.abs(amplitudes)) < 0.3  # of a dip of 1
     assert dip_directions([replace(p, group="pad") for p in SURFACE]) == {}
 
 
 @pytest.mark.parametrize(("depth", "verdict"), [(6e-4, "named"), (0.0, "none")])
-def test_a_dip_of_the_first_day_differs_from_the_file(depth, verdict):
-    """Trains measure the waves with half of their prior sd; the dip of 0.7 m is no candidate's length."""
+def test_a_dip_of_the_first_day_is_a_difference_from_the_file(depth, verdict):
+    """Trains measure the waves with half of their prior sd; no candidate has the length of this dip, 0.7 m."""
     rng, names, sd = np.random.default_rng(9), tuple(p.name for p in SURFACE), WAVES.sd
     x = np.arange(WAVES.start, WAVES.end, 0.02)
     dip = depth * (0.5 + 0.5 * np.cos(2.0 * np.pi * np.clip((x - 5.03) / 0.7, -0.5, 0.5)))
@@ -250,7 +250,7 @@ def visits_with_a_dip(position, first, n_visit=4):
 
 
 @pytest.mark.parametrize("position", [1.4, 5.5, 9.6])
-def test_a_dip_is_sought_as_far_beyond_the_sensors_as_effects_of_supports(position):
+def test_dips_are_tested_as_far_beyond_the_sensors_as_effects_of_supports(position):
     """The sensors stand at 2.0 to 9.0 m, and a wheel beyond them still excites them."""
     candidates = change_candidates(SURFACE, dip_directions(SURFACE))
     answer = change_answer(SURFACE, list(visits_with_a_dip(position, 2)), [], candidates, 12.0, 6.0)
@@ -261,7 +261,7 @@ def test_a_dip_is_sought_as_far_beyond_the_sensors_as_effects_of_supports(positi
 @pytest.mark.parametrize("is_in_library", [False, True])
 @pytest.mark.parametrize("position", [4.4, 5.5])
 def test_a_change_of_the_surface_without_a_name_has_a_position(monkeypatch, position, is_in_library):
-    """It was at a wave, which has none: where dips are not in the library, or where a dip explains too little."""
+    """Formerly the location was a wave, without a position: dips were not in the library, or explained too little."""
     shapes, visits = dip_directions(SURFACE), list(visits_with_a_dip(position, 2))
     monkeypatch.setattr(answers_of_change, "is_explained", lambda *jumps: False)
     candidates = change_candidates(SURFACE, shapes, () if is_in_library else ("surface_dip",))
@@ -274,7 +274,7 @@ def test_a_change_of_the_surface_without_a_name_has_a_position(monkeypatch, posi
 
 
 @pytest.mark.parametrize("position", [4.4, 5.5])
-def test_a_surface_unlike_its_file_has_a_position_without_a_name(position):
+def test_a_surface_that_differs_from_its_file_has_a_position_also_without_a_name(position):
     """A dip of the first day, and no dips in the library."""
     parameters, visits = (*SURFACE, GAINS[0]), list(visits_with_a_dip(position, 0, 3))
     candidates = change_candidates(parameters, {}, ("surface_dip",))
@@ -286,7 +286,7 @@ def test_a_surface_unlike_its_file_has_a_position_without_a_name(position):
 
 
 @pytest.mark.parametrize(("section", "opened"), [("", {"ballast@0.00", "ballast_stiffness"}), ("A", {"ballast@0.00"})])
-def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, section, opened):
+def test_maintenance_of_the_whole_turnout_makes_common_parameters_uncertain(tmp_path, section, opened):
     rows = f"turnout,section,date,kind,resets,note\nt1,{section},2026-01-10,tamping,,\n"
     (tmp_path / "events.csv").write_text(rows)
     sections = [SimpleNamespace(label="A", position=0.6)]
@@ -297,7 +297,7 @@ def test_work_on_the_whole_turnout_opens_what_all_supports_share(tmp_path, secti
 
 
 def test_a_change_that_no_name_explains_is_unknown():
-    """A damper of one support changes; there is no name for it, and what has names is no substitute."""
+    """A damper of one support changes. It has no name, and no effect with a name is accepted instead."""
     damper = StateParameter("ballast_damper@1.20", 0.0, 0.15, 0.05, "ballast_damper", 2, 1.2)
     parameters, names = [*PARAMETERS, damper], (*NAMES, damper.name)
     visits = []
@@ -313,7 +313,7 @@ def test_a_change_that_no_name_explains_is_unknown():
 
 
 def test_a_change_beside_recorded_tamping_is_a_change():
-    """Tamping makes the ballast uncertain between the visits; the first visit still says that it was intact."""
+    """Tamping makes the ballast uncertain between the visits; the first visit still shows that it was intact."""
     tamping = Event(1.2 * STEP, {p.name: p.sd for p in SUPPORTS})
     visits = histories(np.random.default_rng(13), 4, step("ballast@1.20", 1.6, 2))
     answer = change_answer(PARAMETERS, visits, [tamping], CANDIDATES, 12.0, 6.0)
@@ -321,8 +321,8 @@ def test_a_change_beside_recorded_tamping_is_a_change():
 
 
 @pytest.mark.parametrize(("true", "verdict"), [(1.54, "named"), (1.05, "none"), (0.55, "none")])
-def test_a_nose_certainly_twice_as_deep_as_in_the_file_is_a_finding_with_its_position(true, verdict):
-    """The file has 0.43 mm with a tolerance of 40 %. 1.05 mm may be less than twice as much: fits err by 10 % more."""
+def test_a_nose_that_is_clearly_twice_as_deep_as_in_the_file_is_a_finding_with_its_position(true, verdict):
+    """The file has 0.43 mm with a tolerance of 40 %. 1.05 mm may be less than twice as deep, with 10 % for fits."""
     nose = StateParameter("ln depth of the kink at 5.50 m", 0.0, 0.4, 0.0, "depth")
     size, sd = np.log(true / 0.43), 0.12
     group = GroupInformation("A: locomotive", 1, (nose.name,), np.array([[sd**-2]]), np.array([size / sd**2]))
@@ -334,8 +334,8 @@ def test_a_nose_certainly_twice_as_deep_as_in_the_file_is_a_finding_with_its_pos
         assert answer["file"].size == pytest.approx(size, abs=2.0 * answer["file"].sd)
 
 
-def test_a_spring_that_changes_with_its_damper_is_named_and_outer_supports_have_no_finding():
-    """Data see the sum of spring and damper best: without the pair, the damper is the better explanation."""
+def test_a_spring_with_its_damper_is_named_and_outer_supports_have_no_finding():
+    """Data determine the sum of spring and damper best: without the pair the damper explains them better."""
     pad = StateParameter("pad@1.20", 0.0, 0.1, 0.02, "pad", 2, 1.2)
     damper = StateParameter("pad_damper@1.20", 0.0, 0.15, 0.04, "pad_damper", 2, 1.2)
     names = (pad.name, damper.name)
@@ -354,8 +354,8 @@ def test_a_spring_that_changes_with_its_damper_is_named_and_outer_supports_have_
             assert answer.size == pytest.approx(1.8, abs=0.1)
 
 
-def test_another_train_is_no_change():
-    """At each visit another locomotive comes: its unsprung mass is no value of the turnout."""
+def test_another_locomotive_is_no_change():
+    """Each visit has another locomotive: its unsprung mass is no value of the turnout."""
     mass = StateParameter("wheels_locomotive", 0.0, 0.06, 0.006, "wheels", visit_sd=0.06)
     visits = []
     for v, deviation in enumerate((-0.05, -0.05, -0.05, 0.12)):
@@ -365,8 +365,8 @@ def test_another_train_is_no_change():
     assert change_answer([replace(mass, visit_sd=0.0)], visits, [], CANDIDATES[:0], 12.0, 6.0).verdict == "unknown"
 
 
-def test_the_surface_at_a_nose_is_that_of_the_nose_and_no_dip_of_the_rail():
-    """The file has an estimate of the nose; what its shape leaves is no finding against the file."""
+def test_the_surface_at_a_nose_belongs_to_the_nose_and_is_no_dip():
+    """The file has an estimate of the nose; the error of its shape is no difference from the file."""
     rng, names, sd = np.random.default_rng(9), tuple(p.name for p in SURFACE), WAVES.sd
     nose = StateParameter("ln depth of the kink at 5.30 m", 0.0, 0.4, 0.0, "depth")
     direction = dip_directions(SURFACE)["dip of 0.6 m@5.00"]
@@ -389,8 +389,8 @@ def test_the_surface_at_a_nose_is_that_of_the_nose_and_no_dip_of_the_rail():
     ("size", "expected"),
     [(-0.3, ("a_or_b", ("local_ballast", "hanging_sleeper"))), (0.3, ("named", ("local_ballast",)))],
 )
-def test_a_stretch_softer_than_in_the_file_may_as_well_have_gaps(size, expected):
-    """None of three supports has the evidence of a name; together they differ from the file."""
+def test_a_stretch_softer_than_in_the_file_may_have_soft_ballast_or_gaps(size, expected):
+    """None of three supports has enough evidence for a name; together they differ from the file."""
     change = sum(step(f"ballast@{x:.2f}", size, 0)(0) for x in (0.6, 1.2, 1.8))
     answer = last_answers(histories(np.random.default_rng(23), 4, lambda v: change))["file"]
     assert (answer.verdict, answer.names) == expected and answer.gain is None
@@ -415,7 +415,7 @@ def test_a_nose_that_wears_unevenly_is_named_at_the_nose():
     assert answer.onset == (STEP, 2 * STEP)
 
 
-def test_a_visit_is_no_unknown_change_if_earlier_ones_were_as_far_from_what_was_expected():
+def test_a_visit_with_the_usual_deviation_from_its_prediction_is_no_unknown_change():
     innovation = Innovation(400.0, 190, 1e-16, "wave", 5.0, 190)
     assert not innovation.is_expected and innovation.is_expected_at(2.1)
     assert not replace(innovation, deviates=9.0).is_expected_at(2.1)
@@ -424,18 +424,18 @@ def test_a_visit_is_no_unknown_change_if_earlier_ones_were_as_far_from_what_was_
 @pytest.mark.parametrize(
     ("size", "names"), [(-3.2, ("hanging_sleeper",)), (-1.6, ("local_ballast", "hanging_sleeper"))]
 )
-def test_a_support_that_carries_nothing_under_impacts_and_trains_hangs(size, names):
-    """A gap that no train closes: nothing differs between impacts and trains."""
+def test_a_support_without_ballast_reaction_under_impacts_and_trains_hangs(size, names):
+    """A gap that no train closes: impacts and trains agree."""
     visits = histories(np.random.default_rng(15), 4, step("ballast@1.20", size, 2))
     assert last_answers(visits)["change"].names == names
     start = histories(np.random.default_rng(16), 4, step("ballast@1.20", size, 0))
     assert last_answers(start)["file"].names == names
-    near = histories(np.random.default_rng(15), 4, step("ballast@1.20", np.log(0.1), 2))  # a tenth: neither is sure
+    near = histories(np.random.default_rng(15), 4, step("ballast@1.20", np.log(0.1), 2))  # a tenth: neither is certain
     assert last_answers(near)["change"].names == ("local_ballast", "hanging_sleeper")
 
 
-def test_an_effect_that_explains_little_of_a_jump_is_no_name():
-    """Half of the excess over the 100 directions of a visit, which leave 100 where nothing happened."""
+def test_an_effect_that_explains_little_of_a_change_has_no_name():
+    """Half of the excess over the 100 directions of a visit; without a change they leave 100."""
     jump = Innovation(1100.0, 100, 0.0, "seat_A3", 50.0, 190)
     assert is_explained(jump, replace(jump, statistic=600.0))
     assert not is_explained(jump, replace(jump, statistic=601.0))
@@ -444,8 +444,8 @@ def test_an_effect_that_explains_little_of_a_jump_is_no_name():
 
 
 @pytest.mark.parametrize("first", [0, 2])
-def test_a_substitute_that_explains_little_of_what_happened_is_no_name(first):
-    """A sensor moves, and its gain has the evidence of a name: part of the motion looks like gain, most does not."""
+def test_another_effect_that_explains_little_of_a_change_has_no_name(first):
+    """A sensor is moved, and its gain has the evidence of a name, although it explains only a part of the change."""
     seat = StateParameter("seat_A3", 0.0, 0.02, 0.002, "seat", None, 1.8)
     parameters, names = [*PARAMETERS, seat], (*NAMES, seat.name)
     visits = []
@@ -463,13 +463,13 @@ def test_a_substitute_that_explains_little_of_what_happened_is_no_name(first):
         assert (answer.verdict, answer.names) == expected and answer.position == 1.8
         history = estimate_history(parameters, visits, repeats_between_visits=False, accepted=None)
         gains = [max(e.gain, e.from_first) for e in compare_onsets(history, candidates) if e.effect.name == "gain_A3"]
-        assert max(gains) > 12.0 + np.log(len(candidates))  # what it is about
+        assert max(gains) > 12.0 + np.log(len(candidates))  # the precondition of this test
 
 
 @pytest.mark.parametrize("question", ["change", "file"])
 @pytest.mark.parametrize(("name", "parameter"), [("local_ballast", "ballast@1.20"), ("sensor_gain", "gain_A3")])
 def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, name, parameter):
-    """Open world, n = 5 each: the answer is "unknown" where the effect is."""
+    """The true effect is not in the library, n = 5 each: the answer is "unknown" at its position."""
     candidates = change_candidates(PARAMETERS, without=(name,))
     position = next(p.position for p in PARAMETERS if p.name == parameter)
     for seed in range(5):
@@ -482,7 +482,7 @@ def test_without_its_effect_in_the_library_a_site_has_no_other_name(question, na
         assert abs(next(a.position for a in stated if a.question == question) - position) <= 0.6
 
 
-def test_a_wave_has_a_stretch_and_no_position():
+def test_a_wave_has_no_position_and_a_dip_has_one():
     assert position_of(SURFACE[0].name, SURFACE[0]) is None
     assert position_of("dip of 0.8 m@5.00", None) == 5.0
 
@@ -507,8 +507,8 @@ def test_stretches_are_adjacent_supports_of_one_group_with_their_dampers():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_small_change_of_a_stretch_is_named_where_an_alarm_asks(seed):
-    """0.15 at three supports, less than anybody would act on at one."""
+def test_a_small_change_of_a_stretch_is_named_after_an_alarm(seed):
+    """0.15 at three supports, which would be too small at a single one."""
     affected = ("ballast@0.60", "ballast@1.20", "ballast@1.80")
     change = sum(step(name, 1.0, 0)(0) for name in affected)
     visits = histories(np.random.default_rng(seed), 12, lambda v: -0.15 * (v >= 6) * change)
@@ -519,7 +519,7 @@ def test_a_small_change_of_a_stretch_is_named_where_an_alarm_asks(seed):
     assert answer.onset[0] <= 6 * STEP and answer.onset[1] >= 6 * STEP
 
 
-def test_an_alarm_on_an_intact_history_gets_no_name():
+def test_an_alarm_on_an_intact_history_has_no_name():
     """The mean of the likelihood ratios of all candidates exceeds e^6 in at most e^-6 = 0.25 % of intact histories."""
     named = 0
     for seed in range(200):
@@ -550,7 +550,7 @@ def test_trains_distinguish_a_gap_of_several_sleepers_from_soft_ballast():
         ("none", (), ("local_pad",), ("none", ())),
     ],
 )
-def test_an_effect_that_is_left_out_is_no_name(verdict, names, without, expected):
-    """Also not as another form of an effect in the library: a gap as soft ballast that no train closes."""
+def test_an_effect_that_is_left_out_of_the_library_is_not_named(verdict, names, without, expected):
+    """Nor is it named as a form of another effect: a gap that no train closes as soft ballast."""
     answer = within_library(ModelAnswer("2024-02-01", "change", verdict, names), without)
     assert (answer.verdict, answer.names) == expected

@@ -1,4 +1,4 @@
-"""The recursive estimate of the calibrated model: exact on linear examples, without trace of withdrawn visits."""
+"""The recursive estimate of the calibrated model: exact on linear examples and independent of withdrawn visits."""
 
 from dataclasses import replace
 
@@ -93,7 +93,7 @@ def same_bits(a, b):
     return a.mean.tobytes() == b.mean.tobytes() and a.covariance.tobytes() == b.covariance.tobytes()
 
 
-def test_a_withdrawn_visit_leaves_no_trace():
+def test_a_withdrawn_visit_has_no_effect_on_the_estimate():
     visits, _ = chain_visits(np.random.default_rng(2), 8, np.array([p.mean for p in CHAIN]))
     with_faulty_month = estimate_history(CHAIN, visits, accepted=None).belief
     withdrawn = estimate_history(CHAIN, [v for v in visits if v.visit != "visit 3"], accepted=None).belief
@@ -102,7 +102,7 @@ def test_a_withdrawn_visit_leaves_no_trace():
     assert not same_bits(withdrawn, with_faulty_month)
 
 
-def test_a_gap_of_two_years_adds_the_random_walk_of_two_years_and_loses_nothing():
+def test_a_gap_of_two_years_adds_only_the_random_walk_of_two_years():
     visits, _ = chain_visits(np.random.default_rng(4), 8, np.array([p.mean for p in CHAIN]))
     late = [replace(v, time=v.time + (2.0 if k >= 4 else 0.0)) for k, v in enumerate(visits)]
     before, after = estimate_history(CHAIN, late, accepted=None).steps[3:5]
@@ -112,7 +112,7 @@ def test_a_gap_of_two_years_adds_the_random_walk_of_two_years_and_loses_nothing(
     assert np.all(after.belief.sd < [p.sd for p in CHAIN])
 
 
-def test_the_order_of_arrival_does_not_change_a_bit():
+def test_the_order_of_arrival_does_not_change_the_estimate():
     rng = np.random.default_rng(3)
     visits, _ = chain_visits(rng, 6, np.array([p.mean for p in CHAIN]), n_recording=5)
     shared = [VisitInformation(v.visit, v.time, tuple(
@@ -127,7 +127,7 @@ def test_the_order_of_arrival_does_not_change_a_bit():
         assert same_bits(estimate_history(CHAIN, shuffled).belief, expected)
 
 
-def test_without_change_errors_fall_with_the_root_of_the_number_of_visits():
+def test_errors_without_a_change_fall_with_the_root_of_the_number_of_visits():
     parameters = (StateParameter("a", 0.0, 1e3), StateParameter("b", 0.0, 1e3))
     rows = np.array([[1.0, 0.5], [0.2, 1.0]])
     one = np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
@@ -193,7 +193,7 @@ def test_intervals_cover_with_few_and_many_passages_of_the_same_error(n_passage)
             inside[with_repeats] += int(np.sum(np.abs(belief.mean - truth) < 1.96 * belief.sd))
     n = 4 * n_draw
     assert abs(inside[True] / n - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / n)
-    if n_passage == 500:  # the same recordings as independent evidence: wrong values become certain
+    if n_passage == 500:  # with independent errors of these recordings wrong values would become certain
         assert inside[False] / n < 0.4
 
 
@@ -246,8 +246,8 @@ def test_the_wrong_layout_is_rejected_by_its_first_visit():
     assert not step.is_used and step.innovation.chance < 1e-10
 
 
-def test_a_slipped_sensor_teaches_nothing_of_itself_and_little_beside_it():
-    """The gain of this visit is unknown: what remains is the information of ratios between sensors."""
+def test_a_sensor_of_unknown_gain_gives_information_only_by_ratios_to_other_sensors():
+    """The gain of this visit is unknown: the remaining information is that of ratios between sensors."""
     parameters = (StateParameter("gain", 0.0, 0.02), StateParameter("stiffness", 0.0, 0.2))
     rows = np.array([[1.0, 1.0], [0.0, 1.0]])  # the second channel has no gain
     group = information_of(parameters, rows, np.array([-0.5, 0.1]), np.array([[0.01], [0.01]]))
@@ -258,7 +258,7 @@ def test_a_slipped_sensor_teaches_nothing_of_itself_and_little_beside_it():
     assert estimate_history(parameters, [visit], accepted=None).belief.value("stiffness") < 0.03  # 0.1
 
 
-def test_wrong_input_is_named():
+def test_errors_about_wrong_input_state_the_cause():
     visits, _ = chain_visits(np.random.default_rng(9), 2, np.zeros(8))
     with pytest.raises(ValueError, match="visit 1 is given twice"):
         estimate_history(CHAIN, [*visits, visits[1]])

@@ -1,4 +1,4 @@
-"""Errors of the model: what repeats at each visit cancels in a change, and widens the comparison with the file."""
+"""Errors of the model that repeat at each visit: they cancel in a change and widen the comparison with the file."""
 
 from types import SimpleNamespace
 
@@ -45,11 +45,11 @@ def test_the_level_is_the_share_of_the_variance_that_does_not_repeat(repeated):
     if repeated:
         assert np.mean(found) == pytest.approx((1.0 + 4 * (1.0 - repeated)) / 5, abs=0.02)
     else:
-        assert 0.9 < np.mean(found) <= np.max(found) == 1.0  # never more certain than stated, nor less
+        assert 0.9 < np.mean(found) <= np.max(found) == 1.0  # never above 1, and close to it
 
 
-def test_the_level_is_the_same_where_a_visit_knows_less_than_the_file():
-    """Of each direction a visit knows 1 to 5 % of what the file does: 1 where the first visit tells no constant error.
+def test_the_level_is_the_same_if_a_visit_has_less_information_than_the_file():
+    """A visit has 1 to 5 % of the information of the file: a level of 1 if the first visit shows no constant error.
 
     Of n visits with the stated errors, the constant one has the variance 1 before. The mean of k visits leaves
     1 / (k + 1) of it, so that the next innovation has the variance 0.8 / (k + 1)^2 + 0.2 (1 + k / (k + 1)^2) of the
@@ -62,8 +62,8 @@ def test_the_level_is_the_same_where_a_visit_knows_less_than_the_file():
     assert np.mean(found) == pytest.approx((1.0 + innovations.sum()) / 5, abs=0.02)
 
 
-def test_the_constant_error_is_that_of_a_state_that_has_it_beside_the_values():
-    """Values x and error b of one state, of which each visit shows x + b: the same belief in the sum, to 1e-9."""
+def test_the_constant_error_is_that_of_a_joint_state_with_the_values():
+    """Values x and error b of one state, of which each visit measures x + b: the same estimate of the sum, to 1e-9."""
     rng = np.random.default_rng(16)
     visits = visits_with(rng, 0.8, 3, sd=0.3)
     levels = {"A: impacts at 1.20 m": 0.2}
@@ -85,8 +85,8 @@ def test_the_constant_error_is_that_of_a_state_that_has_it_beside_the_values():
 
 
 @pytest.mark.parametrize("repeated", [0.0, 0.5, 0.9])
-def test_no_intact_turnout_of_which_visits_know_little_has_a_changed_support(repeated):
-    """The best candidate of n = 100 intact turnouts has less than 6 nats; a name needs 12 beside its price."""
+def test_intact_turnouts_with_little_information_of_visits_have_no_changed_support(repeated):
+    """The best candidate of n = 100 intact turnouts has less than 6 nats; a name needs 12 and a penalty."""
     rng = np.random.default_rng(17)
     answers = [
         change_answer(SUPPORTS, visits_with(rng, repeated, sd=0.5), [], change_candidates(SUPPORTS), 3.0, 6.0)
@@ -95,7 +95,7 @@ def test_no_intact_turnout_of_which_visits_know_little_has_a_changed_support(rep
     assert not any(a.names for a in answers)
 
 
-def test_what_first_comes_later_has_all_of_its_error():
+def test_a_group_that_first_appears_at_a_later_visit_has_its_full_error():
     rng = np.random.default_rng(6)
     visits = visits_with(rng, 0.8)
     other = visits_with(rng, 0.8, 3, group="A: impacts at 3.00 m")
@@ -108,7 +108,7 @@ def test_what_first_comes_later_has_all_of_its_error():
     }  # fmt: skip
 
 
-def test_a_change_too_small_for_stated_errors_is_named_by_the_scatter_of_the_turnout_itself():
+def test_a_change_below_the_stated_errors_is_named_by_the_scatter_of_the_turnout():
     """The named share of n = 40 rises; of 100 intact turnouts none has a name."""
     candidates = change_candidates(SUPPORTS)
 
@@ -126,14 +126,14 @@ def test_a_change_too_small_for_stated_errors_is_named_by_the_scatter_of_the_tur
     assert named(0.0, 8, 100, 0.9) == 0
 
 
-def test_a_change_does_not_hide_itself_in_the_level():
+def test_a_change_does_not_raise_the_level_once_it_is_modelled():
     visits = visits_with(np.random.default_rng(9), 0.9, change=-1.2)
     raised = own_levels(SUPPORTS, visits)["A: impacts at 1.20 m"]
     explained = own_levels(SUPPORTS, visits, [Event(1.0, {NAMES[4]: 1.0})])["A: impacts at 1.20 m"]
     assert explained < 0.5 < raised
 
 
-def test_an_error_of_the_model_is_no_deviation_from_the_file():
+def test_an_error_of_the_model_is_no_difference_from_the_file():
     """Precise data of values with an error of 0.04 each: n = 300 tracks have the expected rate of deviations."""
     rng, error = np.random.default_rng(10), model_error(SUPPORTS)
     assert model_error_sds(SUPPORTS) == pytest.approx(0.04)
@@ -143,13 +143,13 @@ def test_an_error_of_the_model_is_no_deviation_from_the_file():
         group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, np.eye(9) / 0.01**2, y / 0.01**2)
         history = estimate_history(SUPPORTS, [VisitInformation("v0", 0.0, (group,))], [error], accepted=None)
         counts[True] += bool(deviations_from_file(history, SUPPORTS, {"ballast": 0.2}))
-        # as if the file's scatter were all there is
+        # with the scatter of the file alone
         small = abs(history.belief.mean) > 3.0 * history.belief.sd
         counts[False] += bool(np.any(small & (abs(history.belief.mean) > 0.2)))
     assert counts[True] <= 3 < 100 < counts[False]
 
 
-def test_a_deviation_beyond_scatter_and_error_of_the_model_is_stated_with_both():
+def test_a_difference_beyond_scatter_and_error_of_the_model_is_stated_with_both():
     y = np.zeros(9)
     y[4] = -0.9
     group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, np.eye(9) / 0.01**2, y / 0.01**2)
@@ -177,7 +177,7 @@ class Valleys:
         return fit
 
 
-def test_a_fit_that_leaves_more_than_its_errors_is_begun_from_other_positions_of_the_nose():
+def test_a_fit_with_a_large_residual_is_repeated_from_other_positions_of_the_nose():
     search, at = Valleys(), {"surface_0_place": 0.0, "surface_0_depth": -0.9, "ballast": 0.3}
     stuck = search.fit((), np.zeros(0), at)
     assert stuck.evidence == -400.0
@@ -188,8 +188,8 @@ def test_a_fit_that_leaves_more_than_its_errors_is_begun_from_other_positions_of
     assert fit_from_nose_positions(search, good, ["surface_0_place"]) is good
 
 
-def test_intervals_of_values_of_the_track_hold_them():
-    """Without recordings those of the file; n = 2700 values of 300 tracks: 95 % of the intervals hold the value."""
+def test_intervals_of_values_of_the_track_contain_the_true_values():
+    """Without recordings those of the file; n = 2700 values of 300 tracks: 95 % of the intervals contain the value."""
     rng, error = np.random.default_rng(11), model_error(SUPPORTS)
     nothing = estimate_history(SUPPORTS, [], [error])
     assert track_sds(nothing.belief, SUPPORTS) == pytest.approx(0.1)

@@ -1,4 +1,4 @@
-"""Parameters of the calibrated model: what visits add of their own, and random walks, where the file is unsure."""
+"""Parameters of the calibrated model: deviations of a visit and random walks where the file is uncertain."""
 
 from types import SimpleNamespace
 
@@ -9,14 +9,14 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.calibration import calibrated_parameters
 
 SUPPORTS = 0.6 * np.arange(6)
-EFFECTS_AT = range(2, 6)  # the two supports before them absorb what lies farther out
+EFFECTS_AT = range(2, 6)  # the two supports before them absorb effects farther out
 SENSORS = tuple(SimpleNamespace(name=name, place=place) for name, place in (("A1", 1.1), ("A2", 2.2)))
 SDS = {"pad": 0.1, "ballast": 0.1, "sleeper": 0.03}
 UNSURE = 3.0  # times the standard deviation of other supports, at the first support of a section
 
 
 def parameters(unsure_at):
-    """Parameters of six supports of which the file is unsure at one, by name."""
+    """Parameters by name of six supports, one of which is uncertain in the file."""
     nuisances = [
         Nuisance(f"{group}_{j}", "-", 0.0, sd * (UNSURE if j == unsure_at else 1.0), group=group, index=j)
         for group, sd in SDS.items()
@@ -33,7 +33,7 @@ def parameters(unsure_at):
 
 
 @pytest.mark.parametrize("group", SDS)
-def test_what_outer_supports_absorb_at_a_visit_is_the_same_where_the_file_is_unsure(group):
+def test_the_deviation_of_outer_supports_at_a_visit_does_not_depend_on_the_file(group):
     found = parameters(unsure_at=1)
     assert found[f"{group}@0.60"].sd == pytest.approx(UNSURE * SDS[group])
     own = [found[f"{group}@{x:.2f}"].visit_sd for x in SUPPORTS]
@@ -41,7 +41,7 @@ def test_what_outer_supports_absorb_at_a_visit_is_the_same_where_the_file_is_uns
 
 
 @pytest.mark.parametrize("group", SDS)
-def test_values_of_which_the_file_is_unsure_walk_no_faster(group):
+def test_values_that_are_uncertain_in_the_file_have_the_same_random_walk(group):
     found = parameters(unsure_at=3)
     walks = {found[f"{group}@{x:.2f}"].walk_sd for x in SUPPORTS}
     assert len(walks) == 1 and 0.0 < walks.pop() <= 0.03

@@ -1,4 +1,4 @@
-"""What differs from the file, and what has changed since when: against closed forms and on seeded linear histories."""
+"""Differences from the file, and changes with their onset: against closed forms and on seeded linear histories."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_the_evidence_of_an_onset_is_the_ratio_of_the_probabilities_of_all_data(
     effects = [EFFECTS[2], ChangeEffect("grows", {NAMES[2]: -1.0, NAMES[3]: -0.5}, 0.4, grows=True)]
     history = change_history(visits)
     evidence = {e.effect.name: e for e in compare_onsets(history, effects)}
-    from_first, *_ = evidence_from_first(history, effects)  # with the random walk: it is no constant in the data
+    from_first, *_ = evidence_from_first(history, effects)  # with the random walk, which is not constant in the data
     design = np.kron(np.eye(6), ROWS)
     null = design @ joint_covariance(6) @ design.T + SD**2 * np.eye(len(design))
     y = np.concatenate(data)
@@ -114,7 +114,7 @@ def test_onsets_are_inside_their_intervals_and_the_support_is_right():
         mean, sd = best.size
         size_inside += abs(mean - 0.4) < 2.0 * sd
     assert right >= 118  # 98 %
-    assert inside >= 108  # 90 %: the bar of a shown onset
+    assert inside >= 108  # 90 %: the bar of a stated onset
     assert size_inside >= 106
 
 
@@ -127,7 +127,7 @@ def test_without_change_no_effect_has_evidence():
 
 
 def test_slow_growth_that_the_random_walk_follows_is_detected_by_the_drift():
-    """Growth of 0.16 a year: the belief expects each visit, and the drift of three years is beyond 3 sd."""
+    """Growth of 0.16 a year: each visit agrees with its prediction, and the drift of three years is beyond 3 sd."""
     rng = np.random.default_rng(5)
     detected, unexpected, sizes = 0, 0, []
     for _ in range(40):
@@ -139,7 +139,7 @@ def test_slow_growth_that_the_random_walk_follows_is_detected_by_the_drift():
         sizes.append(growth.size[0])
         detected += drift[2] < -3.0 * np.sqrt(covariance[2, 2])
     assert detected >= 38 and unexpected <= 2  # of 520 visits
-    assert np.mean(sizes) == pytest.approx(0.16, abs=0.02)  # the drift lags behind, the effect that grows does not
+    assert np.mean(sizes) == pytest.approx(0.16, abs=0.02)  # the drift lags behind, the growing effect does not
 
 
 def test_a_drift_without_growth_is_that_of_the_random_walk():
@@ -186,7 +186,7 @@ def intact(rng):
     return np.array([rng.normal(p.mean, p.sd) for p in TRACK])
 
 
-def test_five_soft_sleepers_are_one_finding_though_none_of_them_is_beyond_three_deviations():
+def test_five_soft_sleepers_are_one_finding_although_none_is_beyond_three_deviations():
     rng = np.random.default_rng(8)
     x = np.zeros(len(TRACK))
     x[-1] = TRACK[-1].mean
@@ -208,7 +208,7 @@ def test_a_worn_nose_is_a_finding():
     assert nose.size == pytest.approx(1.11e-3, abs=0.2e-3) and nose.deviates > 5.0 and nose.unit == "m"
 
 
-def test_intact_tracks_seldom_deviate_from_their_file():
+def test_intact_tracks_rarely_differ_from_their_file():
     """400 tracks with the scatter of the file; three groups at the chance of three deviations each: 0.8 %."""
     rng = np.random.default_rng(10)
     alarms = sum(bool(deviations_from_file(history_of(intact(rng), rng), TRACK, LEAST)) for _ in range(400))
@@ -216,7 +216,7 @@ def test_intact_tracks_seldom_deviate_from_their_file():
 
 
 @pytest.mark.parametrize("is_recorded", [True, False])
-def test_what_recorded_tamping_moves_is_no_deviation_from_the_file(is_recorded):
+def test_a_change_by_recorded_tamping_is_no_difference_from_the_file(is_recorded):
     """200 sites of five supports, each moved by twice the scatter of the file; without the record many deviate."""
     rng, alarms = np.random.default_rng(12), 0
     event = Event(0.5 * STEP, {p.name: 2.0 * p.sd for p in SUPPORTS})
@@ -234,9 +234,9 @@ def test_what_recorded_tamping_moves_is_no_deviation_from_the_file(is_recorded):
 
 
 @pytest.mark.parametrize("is_known", [True, False])
-def test_pads_beyond_the_sensors_may_absorb_what_lies_farther_out(is_known):
-    """300 sites of four pads whose fitted values have errors of 0.1 beside their scatter of 0.1; many differ if the
-    error is not known. A pad that is there with a third of its stiffness differs in both cases."""
+def test_absorbed_errors_of_pads_beyond_the_sensors_are_no_difference_from_the_file(is_known):
+    """300 sites of four pads whose fitted values have errors of 0.1 and a scatter of 0.1; many differ if the error
+    is not known. A pad with a third of its stiffness differs in both cases."""
     pads = [
         StateParameter(f"pad@{k}", 0.0, 0.1, 0.0, "pad", k, 0.6 * k, is_beyond_sensors=is_known) for k in (0, 1, 18, 19)
     ]
@@ -255,7 +255,7 @@ def test_pads_beyond_the_sensors_may_absorb_what_lies_farther_out(is_known):
     assert soft.names == ("pad@1",)
 
 
-def test_what_is_not_known_or_too_small_is_no_finding():
+def test_an_uncertain_or_too_small_difference_is_no_finding():
     x = np.array([p.mean for p in TRACK])
     x[5] = -0.6
     assert not deviations_from_file(history_of(x, np.random.default_rng(1), sd=3.0), TRACK, LEAST)

@@ -1,4 +1,4 @@
-"""Stiffness that trains feel and impacts do not, on seeded linear histories with a known change."""
+"""Stiffness that differs under trains alone, on seeded linear histories with a known change."""
 
 from dataclasses import replace
 
@@ -39,7 +39,7 @@ def unit(*names):
 
 
 def history(rng, felt_by_trains, felt_by_impacts=0.0, first=2, n_visit=5, gained=0.0):
-    """Visits with one group of impacts and one of trains, of which each feels its own change from visit ``first``."""
+    """Visits with one group of impacts and one of trains; each group has its own change from visit ``first`` on."""
     x = rng.normal(0.0, [p.sd for p in PARAMETERS])
     visits = []
     for v in range(n_visit):
@@ -74,7 +74,7 @@ def test_trains_inform_on_the_sum_of_value_and_offset_and_impacts_on_the_value()
     np.testing.assert_allclose(trains.matrix @ sums, trains.vector, rtol=1e-6, atol=1e-6)
 
 
-def test_an_offset_is_no_larger_where_the_file_is_unsure_of_the_value():
+def test_an_offset_is_no_larger_where_the_value_is_uncertain_in_the_file():
     unsure = [replace(p, sd=0.35) if p.name == "pad@1.20" else p for p in PARAMETERS]
     offsets = {p.name: p.sd for p in with_offsets(unsure, [])[0][len(PARAMETERS) :]}
     assert {offsets[f"pad@{0.6 * k:.2f}" + END] for k in range(N)} == {0.1}
@@ -88,7 +88,7 @@ def test_an_offset_is_no_larger_where_the_file_is_unsure_of_the_value():
         (("ballast_stiffness",), "ballast_hardening", "ballast_stiffness under load"),
     ],
 )
-def test_what_trains_alone_feel_is_named_with_its_size_and_onset(names, effect, parameter):
+def test_a_change_under_trains_alone_is_named_with_its_size_and_onset(names, effect, parameter):
     answer = answers(history(np.random.default_rng(2), 0.6 * unit(*names)))["change"]
     assert (answer.verdict, answer.names, answer.parameter) == ("named", (effect,), parameter)
     assert answer.size == pytest.approx(0.6, abs=0.1)
@@ -102,20 +102,20 @@ def test_the_first_visit_has_no_finding():
     assert answer["change"].verdict == "none" and answer["file"].names != ("pad_preload",)
 
 
-def test_what_impacts_feel_as_well_is_no_effect_under_load():
+def test_a_change_under_impacts_as_well_is_no_effect_under_load():
     change = 0.6 * unit("pad@1.20")
     answer = answers(history(np.random.default_rng(4), change, change))["change"]
     assert (answer.names, answer.parameter) == (("local_pad",), "pad@1.20")
 
 
 def test_without_these_candidates_the_change_has_no_right_name():
-    """What the offsets are for: a pad that only trains feel is nothing, or something else, without them."""
+    """Purpose of the offsets: without them a pad that changes under trains has no name or a wrong one."""
     ordinary = change_candidates(PARAMETERS)
     answer = answers(history(np.random.default_rng(5), 0.6 * unit("pad@1.20")), ordinary)["change"]
     assert answer.names != ("local_pad",)
 
 
-def test_intact_histories_have_no_evidence_of_it():
+def test_intact_histories_have_no_evidence_of_a_change_under_load():
     """n = 100 histories of 5 visits: none above 6 nats (expected by Markov's inequality: below 0.25 each)."""
     rng = np.random.default_rng(6)
     candidates = candidates_under_load(PARAMETERS)
@@ -127,7 +127,7 @@ def test_intact_histories_have_no_evidence_of_it():
 
 
 def test_a_gain_that_no_effect_of_the_library_explains_is_no_pad_under_load():
-    """Trains show it as a pad as well, impacts do not: the best effect leaves a change of impacts, so it is unknown."""
+    """A pad explains it in trains and not in impacts. The best effect leaves the change of impacts: unknown."""
     visits = history(np.random.default_rng(7), 0.0, gained=unit("gain_A1"))
     alike = [replace(v, groups=(v.groups[0], as_pad(v.groups[1], "gain_A1", "pad@0.60"))) for v in visits]
     answer = answers(alike, candidates_under_load(PARAMETERS))["change"]
@@ -141,6 +141,6 @@ def as_pad(group, gain, pad):
     return replace(group, matrix=terms.T @ group.matrix @ terms, vector=terms.T @ group.vector)
 
 
-def test_left_out_of_the_library_it_is_no_candidate():
+def test_an_effect_under_load_that_is_left_out_of_the_library_is_no_candidate():
     names = {e.group for e in candidates_under_load(PARAMETERS, without=("pad_preload", "local_pad"))}
     assert names == {"hardening"}

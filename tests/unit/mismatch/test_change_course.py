@@ -50,8 +50,8 @@ def test_intervals_contain_the_onset(grows):
 
 
 @pytest.mark.parametrize("start", [0.55, 0.65])
-def test_growth_that_begins_just_before_a_visit_is_not_dated_after_it(start):
-    """That visit shows next to nothing of it. A change of the later visits alone would be dated between these."""
+def test_the_onset_of_growth_just_before_a_visit_is_not_after_that_visit(start):
+    """That visit shows hardly any of it. A change of the later visits alone would have its onset between them."""
     for seed in range(20):
         low, high = courses_of(
             history(np.random.default_rng(seed), growth(start, 1.5), sd=0.02), EFFECT
@@ -60,8 +60,8 @@ def test_growth_that_begins_just_before_a_visit_is_not_dated_after_it(start):
 
 
 @pytest.mark.parametrize("size", [0.5, 5.0])
-def test_what_only_the_last_visit_shows_is_a_step_whatever_its_size(size):
-    """Growth from the visit before is the same. The prior of a step is that of the change, not of a rate."""
+def test_a_change_of_the_last_visit_alone_is_a_step_of_any_size(size):
+    """Growth from the previous visit on is equivalent. The prior of a step is that of the change, not of a rate."""
     effects = [ChangeEffect("f", EFFECT.direction, EFFECT.sd, grows) for grows in (False, True)]
     shown = history(np.random.default_rng(1), lambda time: -size * (time > 1.9))
     first, second = compare_onsets(shown, effects)
@@ -84,7 +84,7 @@ FORMS = ("step", "growth up to the last visit", "growth that has ended")
 
 
 def drawn_change(rng, form):
-    """A change of this form as often as its prior has it, as a function of time."""
+    """A change of this form, drawn from its prior, as a function of time."""
     size, n = rng.normal(0.0, EFFECT.sd), len(TIMES) - 1
     first = rng.integers(n)  # visit before its begin
     begin, end = first + rng.uniform(), rng.uniform(first, n)
@@ -98,7 +98,7 @@ def drawn_change(rng, form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_intervals_contain_the_size_at_the_last_visit(form):
-    """1000 of each form, drawn from its prior, of which 95 % is promised. Of growth a step gives the mean of all visits
+    """1000 of each form, drawn from its prior; 95 % is promised. For growth a step gives the mean of all visits
     with the effect instead: its interval contains the size less often."""
     rng, inside, of_step = np.random.default_rng(43), 0, 0
     for _ in range(1000):
@@ -128,8 +128,8 @@ def test_the_size_at_the_last_visit_is_that_of_exact_data():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_an_answer_states_what_growth_has_reached_with_the_error_of_the_model(seed):
-    """Of growth that has ended: all of it, though half of the visits with it show less. The error of the model that is
-    constant changes with the value: at least a tenth of the change is uncertain, however exact the recordings are."""
+    """Growth that has ended: the whole size, although half of the visits with it show less. The constant error of
+    the model changes with the value: at least a tenth of the change is uncertain even with exact recordings."""
     times = tuple(0.5 * v for v in range(8))
     reached = dict(zip(times, (0.0, 0.0, 0.0, -0.2, -0.4, -0.6, -0.8, -0.8)))
     rng, visits = np.random.default_rng(seed), []

@@ -1,4 +1,4 @@
-"""The example systems of other fields: a mount under a known force, and a pendulum that is left to decay."""
+"""The example systems of other fields: a mount under a known force, and a pendulum in free decay."""
 
 import re
 import runpy
@@ -46,7 +46,7 @@ def test_an_effect_that_is_not_in_the_library_gets_no_other_name():
     assert found.verdict.answer == "unknown"
 
 
-def test_decays_down_to_the_noise_of_the_sensor_need_its_size(capsys):
+def test_decays_down_to_the_noise_of_the_sensor_need_the_size_of_the_noise(capsys):
     """The tolerance is a share of the rms of a record, which falls below the noise where the body has come to rest."""
     records = made_records("dry_friction", 0.01, (1.0, 0.5, 0.1, 0.7), force_sd=0.0, noise=0.0)
     rng = np.random.default_rng(5)
@@ -72,7 +72,7 @@ def test_a_free_decay_is_that_of_the_closed_form():
     assert set(LAWS) >= {"quadratic_drag", "dry_friction"}
 
 
-def test_both_programs_print_what_their_page_shows(repository, capsys):
+def test_both_programs_print_the_output_on_their_page(repository, capsys):
     """docs/own_simulator.md"""
     page = (repository / "docs" / "own_simulator.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```console\n\$ python (\S+(?: \S+)?)\n(.*?)^```", page, re.M | re.S)

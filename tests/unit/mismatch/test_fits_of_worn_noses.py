@@ -1,4 +1,4 @@
-"""Trains at a worn nose: what all recordings say must not depend on the few that were fitted first."""
+"""Trains at a worn nose: the estimate from all recordings must not depend on the few that were fitted first."""
 
 from types import SimpleNamespace
 
@@ -18,14 +18,14 @@ from turnout.stages import stored_visits
 
 SDS = {"place": 0.05, "depth": 0.4, "length": 0.2, "share": 0.2, "power": 0.25}  # as the file of a nose states them
 ERROR = 1e-4  # of a sample [m]
-LONG = np.linspace(-0.5, 0.5, 51)  # where the long train feels the surface [m]
-SHORT = (np.linspace(-0.12, 0.0, 6), np.linspace(-0.05, 0.2, 6))  # where the short one does, at two visits
+LONG = np.linspace(-0.5, 0.5, 51)  # where the surface acts on the long train [m]
+SHORT = (np.linspace(-0.12, 0.0, 6), np.linspace(-0.05, 0.2, 6))  # where it acts on the short one, at two visits
 AS_FILED = Kink(0.0, 0.5e-3, 0.7)
 WEAR = Kink(-0.04, 1.5e-3, 0.6, 0.26)
 
 
 class Nose(Case):
-    """Two trains at a nose: the short one is fitted, the long one is not, and feels what the short one does not."""
+    """Two trains at a nose: only the short one is fitted; the long one meets parts that the short one does not meet."""
 
     nuisances = tuple(Nuisance(name, "-", 0.0, sd) for name, sd in SDS.items())
     aligned_passages = {"long": None}
@@ -67,8 +67,8 @@ def cost(case, x):
     return squares + NormalPrior.of_file(case).cost(np.asarray(x))
 
 
-def test_a_surface_of_design_and_wear_has_the_same_numbers_whichever_train_was_fitted_first():
-    """The same surface at two visits without noise, whose short trains feel other parts of it."""
+def test_the_estimate_of_a_surface_does_not_depend_on_the_train_that_was_fitted_first():
+    """The same surface at two visits without noise, whose short trains meet different parts of it."""
     by_linear, by_all = [], []
     for visit in (0, 1):
         case, linear, again = fits_of(Nose(visit, WEAR))
@@ -80,7 +80,7 @@ def test_a_surface_of_design_and_wear_has_the_same_numbers_whichever_train_was_f
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_fit_continued_with_all_recordings_is_their_maximum(seed):
-    """Against a general optimizer that begins there: six steps gain nine tenths of what is to be gained, mostly all."""
+    """Against a general optimizer from the same start: six steps gain nine tenths of the possible gain at least."""
     case, linear, again = fits_of(Nose(1, WEAR, ERROR, seed))
     reached, before = (cost(case, [f.values[n] for n in SDS]) for f in (again, linear))
     options = {"xatol": 1e-6, "maxiter": 5000, "maxfev": 5000}
@@ -91,23 +91,23 @@ def test_the_fit_continued_with_all_recordings_is_their_maximum(seed):
     assert reached - best.fun < 0.1 * (before - best.fun)
 
 
-def test_a_value_far_beyond_its_prior_keeps_its_wide_one():
-    """A depth of six standard deviations that a wide prior has found: the prior of the file draws it back."""
+def test_a_value_far_beyond_its_prior_keeps_its_wide_prior():
+    """A depth of six standard deviations by a wide prior: with the prior of the file it would be smaller."""
     surface = Kink(0.0, AS_FILED.depth * np.exp(2.4) - AS_FILED.depth, 0.7)
     case, linear, narrow = fits_of(Nose(0, surface))
     wide = fit_again(case, linear, {"depth"})
     assert abs(wide.values["depth"] - 2.4) < abs(narrow.values["depth"] - 2.4)
 
 
-def test_passages_that_are_not_asked_for_stay_reserved():
+def test_passages_that_are_not_requested_stay_reserved():
     case = Nose(0, WEAR)
     same, _ = with_reserved_passages(case, fit_jointly(case), ())
     extended, _ = with_reserved_passages(case, fit_jointly(case), ("long",))
     assert [len(c.observations) for c in (same, extended)] == [1, 2] and extended.reserved == ()
 
 
-def test_a_visit_continues_its_fit_with_wide_priors_for_what_is_large(monkeypatch):
-    """A spring at four standard deviations, and its damper; the fit stays where nothing can be simulated there."""
+def test_a_visit_continues_its_fit_with_wide_priors_for_large_values(monkeypatch):
+    """A spring at four standard deviations, and its damper; the fit stays if the simulation fails there."""
     pad, damper, ballast = (Nuisance(n, "-", 0.0, 0.1) for n in ("pad_3", "pad_damper_3", "ballast_3"))
     case = SimpleNamespace(nuisances=(pad, damper, ballast))
     fit = SimpleNamespace(values={"pad_3": 0.4, "pad_damper_3": 0.2, "ballast_3": 0.2})

@@ -1,4 +1,4 @@
-"""Effects that are in no library: a name beside which a free law still explains held-out data is withdrawn."""
+"""Effects that are in no library: a name is withdrawn if a free force law explains held-out data beside it."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def verdicts(made, tolerance=0.02):
 
 
 @pytest.mark.parametrize(("seed", "tolerance"), [(3, 0.02), (1, 0.05)])
-def test_microslip_that_no_lumped_effect_describes_has_no_name(seed, tolerance):
+def test_microslip_which_no_lumped_effect_describes_has_no_name(seed, tolerance):
     (verdict, *_) = verdicts(records(seed, microslip), tolerance)
     assert verdict.answer == "unknown" and "free_law_predicts_better" in verdict.trail
 

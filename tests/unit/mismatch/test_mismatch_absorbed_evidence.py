@@ -1,4 +1,4 @@
-"""What a nuisance has taken in: against a normal problem solved by hand."""
+"""Evidence for effects that a nuisance parameter has absorbed, against a linear problem in closed form."""
 
 import numpy as np
 from scipy import stats
@@ -14,7 +14,7 @@ from turnout.physics.term import Parameter
 TAU, NOISE, WIDE = 0.1, 0.06, 0.7
 
 
-def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
+def test_a_wider_prior_gains_the_ratio_of_two_marginal_densities():
     y = -0.69
     s = (TAU**-2 + NOISE**-2) ** -0.5
     gain, size = gain_with_wide_prior(y * s**2 / NOISE**2, s, TAU, WIDE)
@@ -24,7 +24,7 @@ def test_opening_a_prior_gains_the_ratio_of_two_marginal_densities():
 
 
 class Springs(Case):
-    """Two springs in series of which both logarithms are hidden; the second is soft."""
+    """Two springs in series with unknown logarithms; the second is soft."""
 
     is_large = True
 
@@ -46,7 +46,7 @@ class Springs(Case):
         return [np.full(o.data.size, said[o.name]) for o in observations]
 
 
-def test_the_spring_that_took_an_effect_in_gives_it_back_at_its_size():
+def test_a_spring_that_absorbed_an_effect_is_a_candidate_with_the_size_of_the_effect():
     case = Springs()
     entries = masked_candidates(case, fit_jointly(case, iterations=12))
     gain, candidate, start, values = max(entries, key=lambda e: e[0])

@@ -1,4 +1,4 @@
-"""A common wrong scale of all channels: a unit or a sensitivity, but never a track, a train or a sensor."""
+"""A common wrong scale of all channels: a unit or a sensitivity, and no effect of track, train or one sensor."""
 
 from dataclasses import replace
 
@@ -56,7 +56,7 @@ def test_a_common_factor_is_that_of_two_units_or_itself(recordings, ratio, divis
         [Comparison(("A1",), ("A1",), np.full((1, 1, 1), 0.9), np.array([0.1]))] * 4,  # one channel: its gain
     ],
 )
-def test_what_only_some_share_is_no_scale(comparisons):
+def test_a_factor_of_some_recordings_or_channels_is_no_common_scale(comparisons):
     assert not wrong_scale("passages", comparisons)
 
 

@@ -94,7 +94,7 @@ def test_an_effect_with_a_length_is_no_neighbour_of_one_without():
     assert at_best_position(Search(case), base, leader).candidate.where == {"place": 3.6}
 
 
-def test_a_leader_takes_the_next_length_as_it_takes_the_next_position(monkeypatch):
+def test_a_leader_also_moves_to_the_next_length(monkeypatch):
     """Bumps of three lengths at each position; the true one is at 4.2 m, the longest."""
     case = Dented(4.2)
     lengths = {1: 0.3, 3: 0.6, 5: WIDTH}

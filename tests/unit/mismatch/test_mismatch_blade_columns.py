@@ -1,4 +1,4 @@
-"""Gaps of slide chairs and a loose heel in hammer tests: columns in closed form, so that a search tries every chair."""
+"""Gaps of slide chairs and a loose heel in hammer tests: closed-form columns allow a search over all chairs."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A casting in the rail may be other than the file has it, piece by piece: which pieces, and what they change."""
+"""A casting may differ from the file piece by piece: the pieces, and their effect on the rail."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def test_pieces_cover_the_casting_and_half_a_bay_beyond_its_ends(zone):
     assert [p.rail.mass / TRACK.rail.mass for p in pieces] == pytest.approx([1.0, *[2.2] * 5, 1.0])
 
 
-def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_sure(zone):
+def test_each_piece_has_its_own_bending_stiffness_and_mass_and_ends_are_less_certain(zone):
     spreads, known = rail_sds(zone), {n.name: n.sd for n in track_nuisances(zone, ())}
     assert list(spreads)[:2] == [name for name, _ in RAIL_SDS] and len(spreads) == 2 + 2 * 7
     assert {name: known[name] for name in spreads} == spreads
@@ -50,8 +50,8 @@ def test_the_meaning_of_a_piece_states_its_position(zone):
 
 
 def test_a_piece_changes_its_own_rail_and_no_other(zone):
-    """Half as heavy again and a fifth stiffer in the fourth piece, all rails a tenth stiffer: there, beside it, on the
-    other route, and nothing of what lies far away but what all rails share."""
+    """The fourth piece has 1.5 times the mass and 1.2 times the stiffness, all rails 1.1 times the stiffness.
+    Compared there, beside it, on the other route, and far away, where only the common factor acts."""
     values = dict.fromkeys(rail_sds(zone), 0.0)
     values |= {"cast_mass_3": np.log(1.5), "cast_bending_3": np.log(1.2), "rail_bending": np.log(1.1)}
     changed = with_rail(zone, values).turnout
@@ -92,6 +92,6 @@ def test_castings_are_those_of_the_track_on_which_impacts_are_modelled():
     assert not zone_of(replace(turnout, track=cast, tracks={"diverging": cast, "main": TRACK}), [21.0, 27.3]).castings
 
 
-def test_plain_track_has_nothing_more():
+def test_plain_track_has_no_castings():
     plain = zone_of(PLAN.turnout, [21.0, 27.3])
     assert plain.castings == () and rail_sds(plain) == dict(RAIL_SDS)

@@ -28,7 +28,7 @@ def values_of(case):
 
 
 def test_the_column_of_a_chair_is_the_difference_quotient_by_that_chair_alone(case):
-    """A term changes one chair: by a share in stiffness and half of it in damping."""
+    """A term changes the stiffness of one chair by a share, and its damping by half of that share."""
     predictor, values = case.predictor, values_of(case)
     track = predictor.track()
     chairs = list(track.blade.chairs(track))
@@ -72,7 +72,7 @@ def test_the_variance_of_an_observation_is_that_of_drawn_chairs(case):
         assert np.sum(modes**2, axis=1) == pytest.approx(np.mean(sample**2, axis=0), rel=0.15, abs=1e-9)
 
 
-def test_observations_of_a_switch_have_them_and_those_of_plain_track_have_not(case):
+def test_observations_of_a_switch_have_errors_of_chairs_and_those_of_plain_track_do_not(case):
     pairs = list(case.frf_pairs.values())
     errors = chair_errors(case.predictor, values_of(case), pairs)
     for o, pair in zip(case.observations, pairs):

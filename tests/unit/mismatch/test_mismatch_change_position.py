@@ -1,4 +1,4 @@
-"""What trains measure of the tops of a switch, and which numbers of a running surface are stated at all."""
+"""The numbers of the tops of a switch that trains measure, and the numbers of a running surface that are stated."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,18 +29,18 @@ WAVES = Waves([s.place for s in PLAN.sensors], 0.0)
 
 
 def fit_of(surface, depth, error):
-    """A fit with a depth of the blade and its standard error, and nothing else."""
+    """A fit that holds only a depth of the blade and its standard error."""
     values = dict.fromkeys(surface.names, 0.0) | {"surface_0_depth": depth}
     covariance = np.diag([error**2 if name == "surface_0_depth" else 0.0 for name in surface.names])
     return SimpleNamespace(values=values, covariance=covariance, jacobian=[])
 
 
 def level(depth):
-    """Where a line that falls 5 mm a metre from 21 m meets one that rises from ``depth`` [mm] at 20 m to 0 at 24 m."""
+    """Crossing of a line that falls by 5 mm per metre from 21 m on and one from ``depth`` [mm] at 20 m to 0 at 24 m."""
     return (depth * 24.0 / 4.0 + 5.0 * 21.0) / (5.0 + depth / 4.0)
 
 
-def test_of_tops_the_position_of_the_change_is_stated_with_its_own_error():
+def test_for_tops_the_position_of_the_change_is_stated_with_its_error():
     """A depth at the toe, 2.5 m from where wheels touch the blade, is extrapolated: 1.6 times it, 4 prior sd."""
     surface = RunningSurface(FILED, WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
@@ -54,7 +54,7 @@ def test_of_tops_the_position_of_the_change_is_stated_with_its_own_error():
     assert text.endswith("the track file has 22.5 m.")
 
 
-def test_a_change_where_the_file_has_it_is_not_worth_a_sentence_and_an_unsure_one_is_not_stated():
+def test_a_change_as_in_the_file_has_no_sentence_and_an_uncertain_one_is_not_stated():
     surface = RunningSurface(FILED, WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
     (stated,) = surface.estimate(case, fit_of(surface, 0.05, 0.02))
@@ -62,7 +62,7 @@ def test_a_change_where_the_file_has_it_is_not_worth_a_sentence_and_an_unsure_on
     assert not list(surface.estimate(case, fit_of(surface, 0.05, 0.2)))
 
 
-def test_numbers_of_a_nose_stay_those_of_the_nose():
+def test_for_a_nose_its_own_numbers_are_stated():
     nose = Kink(25.2, 0.8e-3, 1.0, 0.55)
     surface = RunningSurface(
         replace(PLAN.turnout, routes={"main": ((nose,),)}, spreads={nose: {"depth": 0.5}}), WAVES, ("main",)
@@ -74,8 +74,8 @@ def test_numbers_of_a_nose_stay_those_of_the_nose():
 @pytest.mark.parametrize(
     ("level", "loud", "is_stated"), [(0.6, 1.0, True), (0.9, 1.0, False), (0.6, 1.6, False), (None, 1.0, True)]
 )
-def test_a_fit_that_does_not_explain_the_passages_measures_no_number(level, loud, is_stated):
-    """Above the control level, in all or in one channel (1.6² of 2.0), what is missing has moved the numbers."""
+def test_a_fit_that_does_not_explain_the_passages_states_no_number(level, loud, is_stated):
+    """With an excess in all channels or in one (1.6² of 2.0) the missing effect has changed the numbers."""
     observation = Observation(
         "p", "c", np.zeros(20), np.ones(20), 1.0, "passage", {}, np.repeat([0, 1], 10),
         {"sensor": np.array(["A1", "A2"])},

@@ -58,8 +58,8 @@ def test_a_channel_that_agrees_with_no_sensor_is_not_used_and_one_of_wrong_polar
     assert not channel_faults("passages", [inverted] * 4)
 
 
-def test_recordings_that_agree_with_nothing_say_nothing_of_a_channel():
-    """A train of another kind than noted: no channel agrees, and none of them is at fault."""
+def test_recordings_that_agree_with_no_sensor_show_no_fault_of_a_channel():
+    """The train has another type than noted: no channel agrees, and no channel has a fault."""
     assert not channel_faults("passages", [comparison((None,) * 4)] * 4)
     assert not channel_faults("passages", [comparison((None, None, "A3", "A4"))] * 4)
     mixed = [comparison((None,) * 4), *[comparison(("A1", "A2", None, "A4"))] * 2]
@@ -77,18 +77,18 @@ def faults_of(campaign):
 
 
 def relabelled(recording, names):
-    """The recording with the rows of the channels ``names`` in each other's place."""
+    """The recording with exchanged rows of the channels ``names``."""
     rows = [recording.index(n) for n in names]
     samples = recording.samples.copy()
     samples[rows] = samples[rows[::-1]]
     return replace(recording, samples=samples)
 
 
-def test_recordings_as_the_layout_states_have_no_fault(campaign):
+def test_recordings_that_agree_with_the_layout_have_no_fault(campaign):
     assert faults_of(campaign)[1] == {}
 
 
-def test_exchanged_cables_give_the_observations_of_right_ones(campaign):
+def test_exchanged_cables_give_the_same_observations_as_correct_ones(campaign):
     first, second = (s.name for s in campaign.sensors[1:3])
     tests = [
         replace(t, recordings=tuple(relabelled(r, (first, second)) for r in t.recordings)) for t in campaign.hammer
@@ -130,7 +130,7 @@ def test_a_channel_of_noise_in_passages_is_left_out_there_and_used_in_hammer_tes
     assert any(pair.channel == name for pair in data.frf_pairs.values())
 
 
-def test_misnamed_files_of_impacts_are_taken_where_they_were_hit(campaign):
+def test_impacts_in_misnamed_files_are_used_at_their_true_position(campaign):
     first, second = campaign.hammer[0].place, campaign.hammer[-1].place
     other = {first: second, second: first}
     moved = replace(campaign, hammer=tuple(replace(t, place=other.get(t.place, t.place)) for t in campaign.hammer))

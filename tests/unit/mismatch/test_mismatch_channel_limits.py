@@ -1,4 +1,4 @@
-"""Limits of channels: peaks that follow the trains, peaks that stay, peaks of which only the largest stay."""
+"""Limits of channels: peaks that follow the trains, constant peaks, and peaks with constant maxima."""
 
 from types import SimpleNamespace
 
@@ -13,26 +13,26 @@ PEAKS = np.log([40.0, 55.0, 70.0, 100.0, 140.0, 200.0])
 SCATTER = 0.1 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
 
 
-def test_peaks_that_stay_gain_the_logarithm_of_the_scatter_they_lack():
+def test_constant_peaks_gain_the_logarithm_of_the_missing_scatter():
     gain = saturation_gain(np.full(6, np.log(8.0)), PEAKS)
     assert np.isclose(
         gain, 3.0 * np.log(1.0 + np.var(PEAKS) / SATURATION.scatter_floor**2) - 0.5 * np.log(6.0), atol=0.0, rtol=1e-12
     )
 
 
-def test_peaks_that_follow_the_trains_gain_nothing():
+def test_peaks_that_follow_the_trains_have_no_evidence_of_a_limit():
     assert saturation_gain(PEAKS - 0.7 + SCATTER, PEAKS) < 2.0
 
 
 def test_only_the_strong_passages_may_reach_the_limit():
     peaks = np.minimum(np.log(90.0), PEAKS + 0.01 * SCATTER)
     assert saturation_gain(peaks, PEAKS) > 12.0
-    # the quiet ones alone are at no limit; whatever is flat gains something over what follows
+    # the quiet passages alone are at no limit; constant peaks always gain a little over following ones
     assert saturation_gain(peaks[::-1], PEAKS) < 0.5 * saturation_gain(peaks, PEAKS)
 
 
 @pytest.mark.parametrize("limit, found", [(None, ["A1"]), (1000.0, ["A1"]), (90.0, [])])
-def test_a_channel_at_the_range_that_its_file_states_is_no_faulty_one(limit, found):
+def test_a_channel_at_the_range_in_its_file_has_no_fault(limit, found):
     """Two of six passages stay below 90 m/s², where A1 ends: a fault, unless that is the range stated."""
 
     def passage(peak):
@@ -67,7 +67,7 @@ def test_impacts_of_a_flat_that_one_channel_shows_less_are_no_limit():
 
 
 @pytest.mark.parametrize("is_noise", [True, False])
-def test_peaks_of_noise_that_stay_are_no_limit_and_those_of_a_train_are(is_noise):
+def test_constant_peaks_of_noise_are_no_limit_and_those_of_a_train_are(is_noise):
     """A train is in the middle third of each recording. A1 stays within 90 m/s² always, or only under the train."""
     time, rng = np.linspace(0.0, 3.0, 3001), np.random.default_rng(2)
     under_train = np.where((time > 1.0) & (time < 2.0), 1.0, 0.02)

@@ -1,4 +1,4 @@
-"""Generic laws of single components: another value under trains, and one unlike its kind; and names they refute."""
+"""Generic effects of single components (another value under trains, an unusual value) and names that they refute."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of all supports", "made up 202
 
 
 class Supports(Case):
-    """Impacts and trains that see eight supports alike, ``deviations`` stiffer; a train sees them ``changes`` stiffer.
+    """Impacts and trains on eight supports, stiffer by ``deviations``; under a train also stiffer by ``changes``.
 
     The candidate is a change of all of them under trains: at no position, or at one.
     """
@@ -79,7 +79,7 @@ def with_values(values, error=0.01, groups=("support",) * N_SUPPORT):
 
 @pytest.mark.parametrize("changes", [in_one(0.0), in_one(0.4), [0.2] * N_SUPPORT])
 def test_the_evidence_is_that_of_dense_covariances(changes):
-    """Mean over supports of N(0, S + (3 sd)² c cᵀ) / N(0, S), with S of noise and values, c as trains see a support."""
+    """Mean over supports of N(0, S + (3 sd)² c cᵀ) / N(0, S), S of noise and values, c response of trains to a support."""
     case = Supports(changes)
     fit = fit_jointly(case)
     j, y = np.concatenate(list(case.jacobian.values())), np.concatenate([o.data for o in case.observations])
@@ -101,7 +101,7 @@ def test_impacts_or_trains_alone_show_no_difference():
         assert evidence_of_any_component(local_changes(case, fit_jointly(case))) == 0.0
 
 
-def test_components_that_are_not_alike_have_no_position():
+def test_components_with_different_responses_have_no_position():
     case = Supports(in_one(0.4))
     case.nuisances = tuple(replace(n, index=None) for n in case.nuisances)
     assert evidence_of_any_component(local_changes(case, fit_jointly(case))) == 0.0
@@ -110,8 +110,8 @@ def test_components_that_are_not_alike_have_no_position():
 @pytest.mark.parametrize(
     "at_one, where, answer", [(0.0, {}, "named"), (0.35, {}, "unknown"), (0.35, {"place": 3.0}, "named")]
 )
-def test_an_effect_of_the_whole_track_is_no_name_where_a_change_of_one_support_remains(at_one, where, answer):
-    """All supports stiffer explain most of it. A name at a position may leave an error of its shape."""
+def test_an_effect_of_the_whole_track_has_no_name_if_a_change_of_one_support_remains(at_one, where, answer):
+    """Stiffer supports everywhere explain most of it. A name at a position may leave an error of its shape."""
     verdict = diagnose(Supports([0.5 + at_one * (j == 2) for j in range(N_SUPPORT)], where)).verdict
     assert verdict.answer == answer and ("local_change_remains" in verdict.trail) is (answer == "unknown")
 
@@ -121,7 +121,7 @@ def test_an_effect_of_the_whole_track_is_no_name_where_a_change_of_one_support_r
     "where, frame", [({"place": 3.0}, "place"), ({"sensor": "A1"}, "sensor"), ({"sensor": "A1"}, "clock")]
 )
 def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(where, frame, place, gain, answer):
-    """One support is stiffer than all. The effect at ``place`` explains it, or not; strong evidence leaves as much."""
+    """One support is stiffer. The effect at ``place`` explains it or not; strong evidence may leave as much."""
     case = Supports([0.5 + 0.45 * (j == 2) for j in range(N_SUPPORT)])
     local = Candidate.of("local", SIZE, lambda values: values | {"support": place}, ((0.5,),), where, frame=frame)
     case.candidates = (*case.candidates, local)
@@ -134,7 +134,7 @@ def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(w
 
 
 @pytest.mark.parametrize("changes, answer", [([0.0] * N_SUPPORT, "none"), (in_one(0.25), "unknown")])
-def test_what_differs_in_one_support_alone_is_located_there_without_any_name(changes, answer):
+def test_a_difference_in_one_support_is_located_there_without_a_name(changes, answer):
     """The other supports absorb it: the residual is that of intact recordings, and no candidate explains it."""
     case = Supports(changes)
     case.candidates, case.control_level = (), {"hammer": 2.0, "train": 2.0}
@@ -166,8 +166,8 @@ def test_the_evidence_of_a_deviation_is_that_of_dense_covariances():
     "deviations, answer",
     [(in_one(0.0), "none"), (in_one(1.2), "unknown"), ([0.1, 0.4, 0.5, -0.4, 0.2, -0.5, 0.4, -0.4], "none")],
 )
-def test_a_component_unlike_its_kind_is_located_without_any_name(deviations, answer):
-    """The base model explains it by a value that is possible. Where all supports scatter as widely, it is ordinary."""
+def test_an_unusual_component_is_located_without_a_name(deviations, answer):
+    """The base model explains it by a possible value. If all supports scatter as widely, it is not unusual."""
     case = Supports(in_one(0.0), deviations=np.array(deviations))
     case.candidates, case.control_level = (), {"hammer": 2.0, "train": 2.0}
     diagnosis = diagnose(case)
@@ -198,33 +198,33 @@ class AlsoDisturbed(Supports):
     "changes, deviations, place",
     [(0.0, 0.0, 3.9), (0.4, 0.0, 1.2), (0.0, 1.2, 1.2), (0.0, -1.2, 1.2), (0.1, 0.0, 3.9)],
 )
-def test_an_unusual_component_is_the_position_where_there_is_enough_evidence_for_one(changes, deviations, place):
+def test_an_unusual_component_is_the_position_if_its_evidence_is_sufficient(changes, deviations, place):
     case = AlsoDisturbed(in_one(changes), np.array(in_one(deviations)))
     location = locate(case, fit_jointly(case))
     assert location.frame == "place" and location.place == pytest.approx(place)
 
 
 @pytest.mark.parametrize("force, place", [(1.0, 1.2), (3.0, 1.2), (10.0, 3.9)])
-def test_what_a_strong_cause_may_leave_in_other_components_is_no_position(force, place):
+def test_the_residual_of_a_strong_cause_in_other_components_is_no_position(force, place):
     """The change has 27 nats in all three. The force has 81, 150 and 765, and 12 with a twentieth of it are needed."""
     case = AlsoDisturbed(in_one(0.4), force=force)
     assert locate(case, fit_jointly(case)).place == pytest.approx(place)
 
 
-def test_an_unusual_component_does_not_stand_for_a_train():
-    """What a train has alone moves values of supports, too."""
+def test_a_cause_in_a_train_is_not_located_at_an_unusual_component():
+    """An effect of one train also changes values of supports."""
     case = AlsoDisturbed(in_one(0.4), level=("train", "railcar"))
     assert locate(case, fit_jointly(case)).train == "railcar"
 
 
-def test_beside_an_effect_its_error_of_shape_may_look_like_an_unusual_component():
+def test_an_error_of_the_shape_of_an_effect_is_not_located_at_an_unusual_component():
     case = AlsoDisturbed(in_one(0.4))
     fit = fit_jointly(case, case.candidates, np.array([0.01]))
     assert locate(case, fit).place == pytest.approx(3.9)
 
 
 @pytest.mark.parametrize("deviations", [[0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]])
-def test_two_components_unlike_their_kind_do_not_hide_each_other(deviations):
+def test_two_unusual_components_do_not_mask_each_other(deviations):
     deviations = np.concatenate([deviations, np.zeros(N_SUPPORT - len(deviations))])
     case = Supports(in_one(0.0), deviations=deviations)
     gains = [nats for _, nats in local_deviations(case, fit_jointly(case))]
@@ -232,7 +232,7 @@ def test_two_components_unlike_their_kind_do_not_hide_each_other(deviations):
 
 
 @pytest.mark.parametrize("error", [0.0, 0.3])
-def test_the_spread_is_that_of_the_others_of_a_group_and_has_the_errors_of_their_values(error):
+def test_the_spread_is_that_of_the_other_values_of_a_group_with_their_errors(error):
     """The spread of the component itself, and that of another group, do not count."""
     values = np.array([9.0, -0.2, -0.1, 0.1, 0.2, -0.2, 0.2, -0.1])
     case, fit = with_values(values, error)
@@ -240,7 +240,7 @@ def test_the_spread_is_that_of_the_others_of_a_group_and_has_the_errors_of_their
     assert spread_of_others(case, fit, case.nuisances[0]) == pytest.approx(np.hypot(others.std(), error))
     robust = np.median(np.abs(others - np.median(others))) / 0.6745
     assert spread_of_others(case, fit, case.nuisances[0], True) == pytest.approx(np.hypot(robust, error), rel=1e-4)
-    case, fit = with_values(values, error, ("support",) * 7 + ("pad",))  # six others are alike
+    case, fit = with_values(values, error, ("support",) * 7 + ("pad",))  # six others are similar
     assert spread_of_others(case, fit, case.nuisances[0]) == pytest.approx(np.hypot(values[1:7].std(), error))
     case, fit = with_values(values, error, ("support",) * 6 + ("pad",) * 2)  # five others give no spread
     assert spread_of_others(case, fit, case.nuisances[0]) is None
@@ -253,14 +253,14 @@ def test_a_component_within_the_prior_is_no_deviation_where_all_others_are_equal
     assert evidence_of_any_component(local_deviations(case, fit)) < 1.0
 
 
-def test_what_the_data_do_not_show_is_no_deviation():
+def test_a_value_that_the_data_do_not_determine_is_no_deviation():
     case = Supports(in_one(0.0))
     for jacobian in case.jacobian.values():
         jacobian[:] = 0.0
     assert [nats for _, nats in local_deviations(case, fit_jointly(case))] == [0.0] * N_SUPPORT
 
 
-def test_components_of_one_position_count_together():
+def test_the_evidence_of_components_at_one_position_is_combined():
     case = Supports(in_one(0.35))
     case.nuisances = tuple(replace(n, at=("place", 0.6 * (n.index // 2))) for n in case.nuisances)
     fit = fit_jointly(case)
@@ -286,7 +286,7 @@ class TwoVisits(Supports):
         return self.conditions
 
 
-def test_impacts_that_are_repeated_at_one_position_are_no_further_evidence_of_a_deviation():
+def test_repeated_impacts_at_one_position_add_no_evidence_of_a_deviation():
     """With twice the same data at one position the gain is that of one; the fit of other supports hardly differs."""
     gains = [
         dict((n.name, g) for n, g in local_deviations(case, fit_jointly(case)))["support_2"]

@@ -1,4 +1,4 @@
-"""Corrugation that its level shows has the phase that the free waves of the rail show, where they hold it."""
+"""Corrugation that its level reveals has the phase of the free waves of the rail in their band."""
 
 from types import SimpleNamespace
 
@@ -23,7 +23,7 @@ AMPLITUDE = (4e-5, 1.2e-5)
 
 
 class CorrugatedRail(Case):
-    """One recording that sees the free waves through a random matrix, on rail with this wave."""
+    """One recording that depends on the free waves by a random matrix, on rail with this wave."""
 
     def __init__(self, wave=None, seed=11):
         rng = np.random.default_rng(seed)
@@ -63,8 +63,8 @@ def test_the_phase_is_that_of_the_free_waves(phase):
     assert wave.gain > 10.0 and abs(wave.start - STRETCH[0]) <= 0.6 * LENGTH
 
 
-def test_the_penalty_of_a_phase_is_that_of_its_choice():
-    """Between nothing and the number of phases; nothing where the band holds nothing of the wave."""
+def test_the_penalty_of_a_phase_is_at_most_that_of_the_number_of_phases():
+    """It is above 0 and below the logarithm of the number of phases, and 0 for a wave outside the band."""
     true = physics.RailCorrugation(*STRETCH, 5e-5, 0.0, LENGTH, 2.5)
     for case in (CorrugatedRail(true), CorrugatedRail(None)):
         wave = wave_in_band(scan_of(case), STRETCH, (LENGTH, 0.025 * LENGTH), AMPLITUDE)
@@ -84,7 +84,7 @@ def test_on_intact_rail_the_best_phase_less_its_penalty_is_rarely_evidence():
 
 
 def test_a_candidate_of_the_level_starts_in_phase_and_expects_the_evidence_in_its_band():
-    """It competes with corrugation that the free waves alone suggest, whose promise is that of the band."""
+    """It competes with corrugation from the free waves alone, whose expected evidence is that of the band."""
     true = physics.RailCorrugation(20.5, 27.0, 1.5e-5, -2.5e-5, LENGTH)
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=()), (true,), 7))
     fit = SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances})

@@ -1,4 +1,4 @@
-"""Steps of the joint fit that promise too little are not simulated."""
+"""Steps of the joint fit with a too small predicted gain are not simulated."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from turnout.mismatch.engine.observation import Observation
 
 
 class Wall(Case):
-    """A number that a straight step promises to reach, and that falls by ``slope`` instead: nothing helps."""
+    """A number that rises by a linear prediction and falls by ``slope`` in fact: no step helps."""
 
     is_large = False
     nuisances = (Nuisance("x", "-", 0.0, 1e3),)
@@ -25,7 +25,7 @@ class Wall(Case):
 
 
 def trials(slope, least):
-    """Simulations of a step from 0, which promises 0.25 of minus twice the log posterior."""
+    """Simulations of a step from 0 with a predicted gain of 0.25 in minus twice the log posterior."""
     joint = JointProblem(Wall(slope))
     joint.min_decrease = least
     start, residuals = np.zeros(1), [np.array([0.5])]
@@ -44,15 +44,15 @@ def test_after_a_failure_a_step_that_would_end_the_fit_is_not_tried_again(slope)
 
 
 def test_a_step_with_a_larger_predicted_gain_is_tried_with_rising_damping():
-    """Each damping is six times the last, until a trial fails that promised less: 0.25 (1 + 2 d) / (1 + d)²."""
+    """Each damping is six times the last, until a trial with a lower prediction fails: 0.25 (1 + 2 d) / (1 + d)²."""
     least = 0.2
     promises = [0.25 * (1.0 + 2.0 * d) / (1.0 + d) ** 2 for d in (0.0, *(0.01 * 6.0**k for k in range(7)))]
     assert trials(50.0, least) == 1 + sum(p >= least for p in promises) == 5
 
 
 @pytest.mark.parametrize(("residual", "n_solved"), [(0.5, 1), (9.0, 5)])
-def test_the_scale_of_the_noise_is_sought_until_it_stays(monkeypatch, residual, n_solved):
-    """It is 1 for a residual within its error. Beyond, the prior lets each of five steps leave another scale."""
+def test_the_scale_of_the_noise_is_iterated_until_it_is_constant(monkeypatch, residual, n_solved):
+    """It is 1 for a residual within its error. For a larger one the prior gives another scale in each of five steps."""
     case = Wall(0.5)
     case.nuisances = (Nuisance("x", "-", 0.0, 1.0),)
     case.observations = (Observation("a", "a", np.array([residual]), 1.0),)

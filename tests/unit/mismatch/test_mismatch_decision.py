@@ -1,4 +1,4 @@
-"""The decision as tables: every rule has a reason on a page, can apply, and stands in the trail of its verdict."""
+"""The decision as tables: every rule has a reason and a page, can apply, and is in the trail of its verdict."""
 
 import ast
 import re
@@ -51,7 +51,7 @@ def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
     return Score(candidate, gain, worst, explained, fit, **more)
 
 
-def test_rules_have_names_of_their_own_and_a_page_that_exists(repository):
+def test_every_rule_has_a_unique_name_and_an_existing_page(repository):
     names = [rule.name for rule in RULES]
     assert len(names) == len(set(names)) and all(re.fullmatch(r"[a-z_]+", name) for name in names)
     assert all((repository / "docs" / rule.page).is_file() for rule in RULES)
@@ -59,7 +59,7 @@ def test_rules_have_names_of_their_own_and_a_page_that_exists(repository):
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_the_last_rule_of_a_table_applies_to_all_and_no_other_does(table):
+def test_only_the_last_rule_of_a_table_applies_to_all_cases(table):
     rules = getattr(decision, table)
     assert rules[-1].applies(None)
     for rule in rules[:-1]:
@@ -109,7 +109,7 @@ def test_each_rule_on_an_effect_applies_to_a_case_of_its_own(name):
     assert "{" not in verdict.reason and bool(verdict.reason) == bool(rule.reason)
 
 
-def test_the_reason_holds_the_figures_of_the_case():
+def test_the_reason_states_the_figures_of_the_case():
     verdict = judge([score(explained=0.4)], 2.0, MismatchSettings())
     assert verdict.reason == (
         "the best candidate effect explains only 40 % of the residual in excess of the intact state"
@@ -176,8 +176,8 @@ def test_reasons_are_sentences_without_internal_names(table):
         assert "_" not in reason and "{" not in reason, (rule.name, reason)
 
 
-def test_reason_of_a_slightly_worse_prediction_states_what_it_means():
-    """No loss of evidence is stated there: it may be 0, and would seem to contradict the sentence."""
+def test_the_reason_of_a_slightly_worse_prediction_explains_it():
+    """It states no loss of evidence, since a loss of 0 would seem to contradict the sentence."""
     (rule,) = (r for r in decision.RESERVED_RULES if r.name == "reserved_fit_falls_for_little_evidence")
     reason = rule.reason_for(evidence_with_names_of_two_words()["RESERVED_RULES"])
     assert reason.startswith("with soft pad at 3.0 m, held-out recordings are predicted slightly worse")

@@ -1,4 +1,4 @@
-"""Effects beyond the reach of a derivative are simulated where they may be: wheelsets far from their file's mass."""
+"""Effects beyond the range of a derivative are simulated at distant starts: wheelsets far from their filed mass."""
 
 from types import SimpleNamespace
 
@@ -50,8 +50,8 @@ class Pitch(Case):
 
 
 @pytest.mark.parametrize("true", [0.65, 1.6])
-def test_what_lies_behind_a_hump_is_found_from_afar(true):
-    """Four turns or more away a derivative says nothing of the way there: neither column nor twin promise 2 nats."""
+def test_an_effect_behind_a_barrier_is_found_from_a_distant_start(true):
+    """Four periods away a derivative is useless: neither column nor masking parameter predict a gain of 2 nats."""
     blind = Pitch(true)
     assert shortlist(Search(blind), fit_jointly(blind)) == []
     case = Pitch(true, MASSES)
@@ -59,7 +59,7 @@ def test_what_lies_behind_a_hump_is_found_from_afar(true):
     assert found.start == pytest.approx([true]) and found.values == {"tune": 0.0}
 
 
-def test_a_start_from_afar_that_gains_nothing_is_not_refitted():
+def test_a_distant_start_without_a_gain_is_not_refitted():
     case = Pitch(1.0, MASSES)
     assert shortlist(Search(case), fit_jointly(case)) == []
 

@@ -1,4 +1,4 @@
-"""What can be distinguished is decided by the data, and known before they are taken."""
+"""Planned recordings determine which effects can be distinguished, before they are taken."""
 
 import numpy as np
 import pytest
@@ -19,15 +19,15 @@ def one_warm_day():
     return of(small_plan((30.0,), passages=False))
 
 
-def test_at_one_temperature_soft_pads_may_be_warm_pads(one_warm_day):
-    """3 nats at one temperature, thousands at two: at one, the common pad stiffness takes it all."""
+def test_at_one_temperature_soft_pads_are_not_distinguished_from_warm_pads(one_warm_day):
+    """3 nats at one temperature, thousands at two: at one, the common pad stiffness absorbs the effect."""
     two = of(small_plan((5.0, 30.0), passages=False))
     assert one_warm_day.detectability[one_warm_day.names.index("pad_temperature")] < 5.0
     assert "none" in one_warm_day.confused_with("pad_temperature")
     assert two.detectability[two.names.index("pad_temperature")] > 1000.0 and two.confused_with("pad_temperature") == []
 
 
-def test_an_effect_explains_itself_and_no_explanation_beats_it(one_warm_day):
+def test_no_effect_explains_the_data_of_an_effect_better_than_itself(one_warm_day):
     assert np.all(np.diag(one_warm_day.loss) == 0.0)
     assert np.all(one_warm_day.loss <= one_warm_day.detectability[:, None] + 1e-6 * one_warm_day.detectability.max())
 
@@ -39,13 +39,13 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
     plan = small_plan((15.0,), speeds=(40.0,))
     rolling = of(replace(plan, hammer_points=()), ("zener_pad", "mount_resonance", "surface_dip"))
     assert "none" in rolling.confused_with("zener_pad")
-    # twenty times what a name needs: the model's own smooth errors, integrated out, take part of it
+    # twenty times what a name needs: the smooth errors of the model, integrated out, absorb a part
     assert one_warm_day.detectability[one_warm_day.names.index("zener_pad")] > 100.0
     ratio = {n: s for n, s in zip(rolling.names, rolling.detectability)}
     impacts = {n: s for n, s in zip(one_warm_day.names, one_warm_day.detectability)}
     # 5 nats of expected evidence are what a name needs
     assert ratio["mount_resonance"] < 5.0 < impacts["mount_resonance"]
-    # the rail's own waves, and each wheel's, take part of what a dip does; a hammer does not roll over it
+    # the waves of the rail and of each wheel absorb a part of a dip; a hammer does not roll over it
     assert ratio["surface_dip"] > 100.0 and "surface_dip" not in impacts
 
 
@@ -59,6 +59,6 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
         ),
     ],
 )
-def test_a_plan_that_can_show_nothing_is_rejected_in_a_sentence(more, said, capsys):
+def test_a_plan_that_can_show_no_effect_is_rejected_with_a_message(more, said, capsys):
     assert main(["distinguish", "--sensors", "23.4", *more]) == 2
     assert said in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""A source that no train carries with it: quiet stretches are compared with wheels equally far away."""
+"""A source that does not move with a train: quiet stretches are compared with wheels at equal distances."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -51,7 +51,7 @@ def test_a_train_with_rough_wheels_has_a_higher_level_at_every_distance_and_is_n
 
 
 @pytest.mark.parametrize("level", [0.3, 3.0])
-def test_another_train_is_found_in_the_passages_that_it_shakes(level):
+def test_another_train_is_detected_in_the_passages_that_it_disturbs(level):
     rng = np.random.default_rng(3)
 
     def source(time):
@@ -78,7 +78,7 @@ def test_a_train_that_may_be_longer_by_a_car_is_compared_behind_that_car():
     assert all(e.when == "before" for e in found(passages, [longer]))
 
 
-def test_one_passage_with_a_higher_level_after_its_train_shows_no_source_of_its_own():
+def test_one_passage_with_a_higher_level_after_its_train_is_no_other_source():
     def event(when, excess, train="ic3", name="p1"):
         return Disturbance(name, when, excess, 1e-9, train)
 
@@ -92,8 +92,8 @@ def test_one_passage_with_a_higher_level_after_its_train_shows_no_source_of_its_
     assert independent_of_trains([event("after", 5.0, ""), event("after", 5.0, "", "p2")])  # trains without a name
 
 
-def test_a_case_is_disturbed_only_by_a_source_that_no_train_carries(monkeypatch):
-    """Both passages are left out of the fit; the answer rests on them only if two trains show the source."""
+def test_only_a_source_that_does_not_move_with_a_train_disturbs_a_case(monkeypatch):
+    """Both passages are left out of the fit. They change the answer only if two trains show the source."""
     campaign = intact_campaign((24.0,), 3)
     case_data = cases.case_data
 

@@ -1,4 +1,4 @@
-"""The engine on systems small enough to know the answer by hand."""
+"""The engine on systems whose answer is known in closed form."""
 
 from dataclasses import replace
 
@@ -75,9 +75,9 @@ def test_the_held_out_density_is_that_of_the_marginal_normal():
     assert found == pytest.approx(direct, abs=1e-3)
 
 
-def test_nothing_is_named_where_nothing_is_missing():
+def test_without_a_missing_effect_there_is_no_name():
     answers = [diagnose(Line(lambda x: 1.2 * x + 0.1, seed=s)).verdict.answer for s in range(12)]
-    assert answers == ["none"] * 12  # 12 of 12; an upper 95 % limit of 22 % false alarms for this toy
+    assert answers == ["none"] * 12  # 12 of 12; an upper 95 % limit of 22 % false alarms for this example
 
 
 def test_a_missing_square_is_named_with_an_interval_that_covers_it():
@@ -95,7 +95,7 @@ def test_without_the_right_power_the_answer_is_unknown():
 
 
 def test_an_effect_that_the_base_absorbs_is_found_by_the_joint_fit_alone():
-    """Finding: on x > 0 a square looks like a steeper line. The residual of the fitted base hardly shows it."""
+    """On x > 0 a square is similar to a steeper line. The residual of the fitted base model hardly shows it."""
     case = Line(lambda x: x + 0.3 * np.tanh(2.0 * x), powers=())
     case.x = {n: np.linspace(0.8, 2.0, 60) + 0.1 * k for k, n in enumerate(case.x)}
     rng = np.random.default_rng(5)
@@ -105,7 +105,7 @@ def test_an_effect_that_the_base_absorbs_is_found_by_the_joint_fit_alone():
     case.observations, case.reserved = made, ()
     case.nuisances = (Nuisance("slope", "-", 1.0, 0.5), Nuisance("level", "-", 0.0, 1.0))
     base = fit_jointly(case)
-    assert base.values["slope"] > 1.2  # the base has bent to hide it
+    assert base.values["slope"] > 1.2  # the base model has absorbed it
     parameter = Parameter("amount", "-", 0.0, (-2.0, 2.0), "size of the step", "made up 2026")
     candidate = Candidate.of("step", (parameter,), lambda psi: psi["amount"], ((0.4,),), from_base=False)
     predict = case.predict
@@ -114,7 +114,7 @@ def test_an_effect_that_the_base_absorbs_is_found_by_the_joint_fit_alone():
     ]
     case.candidates = (candidate,)
     r, c = np.concatenate(base.residuals), np.concatenate([np.tanh(3.0 * (case.x[o.name] - 1.2)) for o in made])
-    naive = float(r @ c / (c @ c))  # what regressing the base's residual on the effect would say
+    naive = float(r @ c / (c @ c))  # the size from a regression of the residual of the base model on the effect
     found = diagnose(case)
     assert naive < 0.5 * 0.5  # less than half of it is left in the residual
     assert found.names == ("step",)
@@ -122,7 +122,7 @@ def test_an_effect_that_the_base_absorbs_is_found_by_the_joint_fit_alone():
     assert abs(found.fit.values["slope"] - 1.0) < 0.1
 
 
-def test_frames_are_called_where_one_level_is_odd_and_not_without_cause():
+def test_frames_are_reported_only_if_one_level_is_unusual():
     rng = np.random.default_rng(2)
     labels = {
         "sensor": np.array([f"S{k % 4}" for k in range(320)], dtype=object),
@@ -137,7 +137,7 @@ def test_frames_are_called_where_one_level_is_odd_and_not_without_cause():
     assert called <= 6  # 5 % of 40 is 2; more than 6 has a chance of 0.3 %
 
 
-def test_our_own_coarse_mesh_is_answered_numerics():
+def test_a_large_numerical_error_gives_the_answer_numerics():
     class Coarse(Line):
         def numerical_error(self, fit):
             return [0.35 * self.x[o.name] ** 2 for o in self.observations]
@@ -146,7 +146,7 @@ def test_our_own_coarse_mesh_is_answered_numerics():
     assert found.verdict.answer == "numerics" and not found.names
 
 
-def test_a_kept_fit_is_not_computed_again():
+def test_a_stored_fit_is_not_computed_again():
     store, calls = {}, []
     case = Line(lambda x: 1.2 * x + 0.4 * x**2)
     predict = case.predict
@@ -157,9 +157,9 @@ def test_a_kept_fit_is_not_computed_again():
     assert len(calls) < 16  # the verification alone, and its error by each of three fitted recordings
 
 
-def test_errors_of_another_generator_are_no_effect_where_they_are_integrated_out():
-    """Finding: a null of our own is too optimistic. A smooth error that our simulator does not make, one for each
-    recording, is named as physics when the noise is taken as independent, and not when it is a mode."""
+def test_errors_of_another_generator_are_no_effect_if_they_are_integrated_out():
+    """Controls from the own simulation are too optimistic. A smooth error of another simulation, one for each
+    recording, has the name of an effect if the noise counts as independent, and not if the error is a mode."""
 
     def foreign(seed, modes):
         case = Line(lambda x: 1.2 * x + 0.1, seed=seed, slope_sd=0.05)
@@ -175,7 +175,7 @@ def test_errors_of_another_generator_are_no_effect_where_they_are_integrated_out
 
     ignored = [foreign(seed, modes=False) for seed in range(8)]
     known = [foreign(seed, modes=True) for seed in range(8)]
-    assert ignored.count("none") == 0  # every control alarms
+    assert ignored.count("none") == 0  # all controls have false alarms
     assert known.count("none") == 8
 
 
@@ -191,7 +191,7 @@ def test_whitening_gives_unit_variance_to_the_modelled_noise():
 
 
 class Offset(Line):
-    """A sensor with an offset on x in 1 to 2; ``known`` tells whether the model has that nuisance."""
+    """A sensor with an offset on x in 1 to 2; ``known`` states whether the model has that nuisance."""
 
     def __init__(self, seed, known):
         super().__init__(lambda x: x, seed, powers=(2, 3))
@@ -207,18 +207,18 @@ class Offset(Line):
         return super().predict({"level": 0.0, **values}, terms, observations)
 
 
-def test_a_nuisance_that_is_missing_comes_back_as_physics_and_is_none_where_it_is_known():
-    """Finding: an offset forgotten in the model is a curved effect; with the offset free nothing is missing."""
+def test_a_missing_nuisance_appears_as_an_effect_and_a_modelled_one_does_not():
+    """An offset that the model lacks looks like a curved effect; with a free offset no effect is missing."""
     forgotten = [diagnose(Offset(seed, known=False)) for seed in range(6)]
     known = [diagnose(Offset(seed, known=True)).verdict.answer for seed in range(6)]
     best = [max(d.scores, key=lambda s: s.gain) for d in forgotten]
-    assert all(b.gain > MismatchSettings().threshold for b in best)  # each looks like a discovery
+    assert all(b.gain > MismatchSettings().threshold for b in best)  # each one is a false finding
     assert known == ["none"] * 6
 
 
-def test_two_effects_that_agree_on_one_condition_are_distinguished_by_another():
-    """Finding: what is left out must differ in condition. x|x| follows x³ on one reach with another slope; on further
-    reaches it cannot, although neither data nor noise are more."""
+def test_two_effects_that_agree_in_one_condition_are_distinguished_by_another():
+    """Held-out data must have another condition. x|x| agrees with x³ on one range with another slope; on further
+    ranges it does not, although there are no more data."""
 
     def margin(reaches, seed):
         case = Line(lambda x: x + 0.1 * x**3, seed, powers=(3,), noise=0.08)

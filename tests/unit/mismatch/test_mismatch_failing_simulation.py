@@ -1,4 +1,4 @@
-"""Simulations that cannot go somewhere cost what was asked of them there, never the diagnosis."""
+"""A simulation that fails at some values loses only the result at these values, not the diagnosis."""
 
 from types import SimpleNamespace
 
@@ -39,8 +39,8 @@ class Brittle(Case):
         return [sum(terms) * WAVE for _ in observations]
 
 
-def test_a_name_that_cannot_be_simulated_on_what_was_held_out_is_not_given():
-    """Without the fault it is named, and the fit after it is stated."""
+def test_a_name_whose_held_out_recordings_cannot_be_simulated_is_withdrawn():
+    """Without the failure it is named, and the fit with it is stated."""
     sound = diagnose(Brittle(lambda terms, observations: False))
     assert sound.names == ("wave",) and sound.verification.after > 80.0
     found = diagnose(Brittle(lambda terms, observations: bool(terms) and observations[0].name == "o3"))
@@ -48,14 +48,14 @@ def test_a_name_that_cannot_be_simulated_on_what_was_held_out_is_not_given():
     assert found.verification.n == 1
 
 
-def test_where_no_held_out_recording_can_be_simulated_the_others_decide():
+def test_if_no_held_out_recording_can_be_simulated_the_others_decide():
     found = diagnose(Brittle(lambda terms, observations: observations[0].name == "o3"))
     assert found.names == ("wave",)
     assert np.isnan(found.verification.before) and found.verification.after is None
 
 
-def test_a_dear_fit_keeps_its_updated_derivatives_where_no_new_ones_can_be_made():
-    """From 3 to the data's 1.2 in steps; derivatives are rejected from the second time on."""
+def test_a_large_fit_keeps_its_updated_derivatives_if_new_ones_fail():
+    """From 3 to the true 1.2 in steps; the derivatives fail from the second time on."""
 
     class Dear(Case):
         is_large, asked = True, 0
@@ -84,7 +84,7 @@ def test_a_train_of_two_lengths_is_rejected():
         CampaignInput(None, (), passages=(long, short))
 
 
-def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used(monkeypatch):
+def test_a_passage_that_cannot_be_simulated_has_a_note_and_the_others_are_used(monkeypatch):
     campaign = intact_campaign((24.0,), 3)
     (first, *_), names = campaign.passages, {p.name for p in campaign.passages}
 
@@ -101,8 +101,8 @@ def test_a_passage_that_cannot_be_simulated_is_noted_and_the_others_are_used(mon
     assert names - {first.name} >= set(case.aligned_passages) and len(case.aligned_passages) > 2
 
 
-def test_wheels_in_no_fitted_recording_are_not_called_polygonal():
-    """No slot of theirs was recorded; a recording too slow for short waves has no bin for them either."""
+def test_wheels_in_no_fitted_recording_are_no_candidates_of_polygons():
+    """No recording contains them; a recording with a too low rate for short waves has no bin for them either."""
     nothing = SimpleNamespace(level=np.full((2, 4, 60), np.nan))
     z, apart = wheel_excess([nothing], np.arange(20, 40), np.exp(-0.04 * np.arange(60)))
     assert apart == 0 and np.all(np.isneginf(z)) and z.shape == (4, 20)

@@ -1,4 +1,4 @@
-"""Frames of a residual: which level stands out of those by which intact recordings differ."""
+"""Frames of a residual: a level that exceeds the differences between intact recordings."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,7 @@ OF_A_ROW = {"place_low_m": 2.4, "place_high_m": 8.7, "wheel_within_m": None, "ev
             "n_hammer_tests": 6, "n_passages": 8, "n_sensors": 4}  # fmt: skip
 
 
-def test_a_train_of_high_level_is_found_though_each_of_its_axles_is_a_frame_of_its_own():
+def test_a_train_with_a_high_level_is_found_although_its_axles_are_frames_too():
     """Two nepers of log energy are 8.7 dB; 36 cells of each train err by 0.5 / 6 neper, 0.4 dB."""
     rng, trains = np.random.default_rng(0), ("ic3", "freight", "railcar", "locomotive")
     cells = [(t, a, s, p) for t in trains for _ in range(2) for a in range(4) for s in "ABC" for p in range(6)]
@@ -66,14 +66,14 @@ def cells_of_passages(seed, **raised):
 
 
 def test_intact_recordings_have_a_frame_below_five_per_cent_in_five_of_a_hundred():
-    """However alike the cells of a level are: shuffled one by one they had three to five such frames in each."""
+    """Also for correlated cells of a level: shuffles of single cells gave three to five such frames each."""
     called = sum(any(f.q < 0.05 for f in attribute(*cells_of_passages(seed))) for seed in range(200))
     low, high = binom.interval(0.95, 200, 0.05)
     assert low <= called <= high
 
 
 @pytest.mark.parametrize(("frame", "level"), [("place", "6.0"), ("wheel", "railcar, axle 3")])
-def test_a_bay_or_a_wheel_of_twice_the_amplitude_stands_out(frame, level):
+def test_a_bay_or_a_wheel_of_twice_the_amplitude_is_found(frame, level):
     """Twice the amplitude are 1.4 nepers of energy, 6 dB."""
     found = [attribute(*cells_of_passages(seed, **{frame: (level, 1.5)})) for seed in range(25)]
     of_frame = [next(f for f in frames if f.frame == frame) for frames in found]
@@ -93,8 +93,8 @@ def diagnosed(answer, candidates, frames):
     )  # fmt: skip
 
 
-def test_a_row_has_no_position_from_a_frame_of_the_residual():
-    """An effect of the whole track is in no sensor, and where nothing is missing there is nothing to be fixed to."""
+def test_a_frame_of_the_residual_gives_a_row_no_position():
+    """An effect of the whole track is in no sensor, and without a missing effect there is no position."""
     effect = physics.PadTemperature
     warm = Candidate.of("pad_temperature", effect.parameters, lambda p: effect(**p), (), {}, "condition")
     frames = [

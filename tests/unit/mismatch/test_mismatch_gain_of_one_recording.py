@@ -1,4 +1,4 @@
-"""A gain of one recording that its like do not share is that recording's own."""
+"""A gain in one recording that similar recordings do not have belongs to that recording alone."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def fitted(factors):
     return case, fit_jointly(case, case.candidates, [0.5], iterations=20)
 
 
-def test_plainness_is_the_energy_of_the_change():
+def test_the_visibility_of_an_effect_is_the_energy_of_its_change():
     case, fit = fitted((1.0, 2.0, 3.0))
     size = float(fit.psi[0])
     for name, energy in effect_energy(case, fit, case.candidates[0]).items():
@@ -56,11 +56,19 @@ def test_plainness_is_the_energy_of_the_change():
 @pytest.mark.parametrize(
     "factors, gains, alone",
     [
-        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b has twice the energy, c as much: none in them
+        (
+            (1.0, 2.0, 1.0),
+            {"a": 20.0, "b": 1.0, "c": 2.0},
+            "a",
+        ),  # b has twice the energy, c as much, and neither has a gain
         ((1.0, 1.02, 0.72), {"a": 20.0, "b": 1.0, "c": 2.0}, "a"),  # b and c show 0.52 of the energy of a
         ((1.0, 0.98, 0.72), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # b shows 0.48: one recording does not confirm itself
-        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 12.0}, ""),  # the others confirm it
-        ((1.0, 2.0, 1.0), {"a": 11.0, "b": 1.0, "c": -3.0}, ""),  # it does not hang on a, which would not do
+        ((1.0, 2.0, 1.0), {"a": 20.0, "b": 1.0, "c": 12.0}, ""),  # the other recordings confirm it
+        (
+            (1.0, 2.0, 1.0),
+            {"a": 11.0, "b": 1.0, "c": -3.0},
+            "",
+        ),  # it does not depend on a, whose gain alone is too small
         ((1.0, 2.0, 1.0), {}, ""),
         ((1.0, 2.0, -1.0), {"a": 20.0, "b": 1.0, "c": 2.0}, ""),  # it cannot be compared with no effect
     ],
@@ -75,8 +83,8 @@ def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gai
 @pytest.mark.parametrize(
     "factors, nats",
     [
-        ((1.0, 0.13, 0.0), 32.0),  # half of 0.13 squared is 0.8 % of the energy: not seen in b, nor in c
-        ((1.0, 0.15, 0.0), 30.0),  # 1.1 %: b may hold what the first leaves
+        ((1.0, 0.13, 0.0), 32.0),  # half of 0.13 squared is 0.8 % of the energy: b and c do not show it
+        ((1.0, 0.15, 0.0), 30.0),  # 1.1 %: b may contain the residual of the first effect
         ((1.0, 0.9, 1.0), 0.0),
         ((1.0, 0.13, -1.0), 0.0),  # it cannot be compared with no effect
     ],
@@ -85,13 +93,15 @@ def test_recordings_without_the_first_effect_show_the_second(factors, nats):
     case, fit = fitted(factors)
     gains = {"a": 7.0, "b": 2.0, "c": 30.0}
     assert gain_where_unmasked(case, fit, gains) == nats
-    assert gain_where_unmasked(case, replace(fit, candidates=()), gains) == 0.0  # a first effect has none before it
+    assert (
+        gain_where_unmasked(case, replace(fit, candidates=()), gains) == 0.0
+    )  # there is no effect before the first one
 
 
 @pytest.mark.parametrize(
     "apart, places, answer", [(12.5, 1, "named"), (11.5, 1, "unknown"), (15.1, 20, "named"), (14.9, 20, "unknown")]
 )
-def test_evidence_of_other_recordings_need_not_explain_the_residual_of_the_first_effect(apart, places, answer):
+def test_evidence_in_other_recordings_need_not_explain_the_residual_of_the_first_effect(apart, places, answer):
     """A tenth of an excess of twice the control level, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
     candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
@@ -119,7 +129,7 @@ class ImpactCampaigns(Days):
             (0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5),
             16.0,
             "all impacts at 4.2 m",
-        ),  # 13 against 2.5; no campaign would do alone
+        ),  # 13 against 2.5; no campaign would be enough alone
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 1.9), 36.0, "all impacts at 4.2 m"),  # 33, and 5.9 of the others
         ((0.5, 1.0, 17.0, 16.0, 1.0, 1.5, 2.1), 36.0, ""),  # 6.1 of the others: half a name confirms one
         ((0.5, -1.0, 5.0, 6.0, 1.0, 0.5, 1.5), 14.0, "all impacts at 4.2 m"),  # 11, half a name, against 2.5
@@ -127,13 +137,17 @@ class ImpactCampaigns(Days):
         ((0.5, -1.0, 5.0, 6.0, 4.0, 1.5, 1.5), 19.9, REPETITION),  # 8 of 16 by repetition, and 11.9 without them
         ((3.0, 3.5, 3.0, 2.5, 7.0, 6.5, -1.0), 19.0, REPETITION),  # an intact track, the same at both visits
         ((3.0, 3.5, 3.0, 2.5, 7.0, 6.5, 12.0), 36.0, ""),  # a train confirms it
-        ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it hang on 5.5
+        ((0.5, -1.0, 2.5, 3.0, 1.0, 0.5, 1.5), 8.0, ""),  # nor does it depend on 5.5
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 12.0), 26.0, ""),  # the train confirms it
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 30.0, "all impacts at 4.2 m"),  # 15.5 are most of 30
         ((0.5, -1.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, ""),  # and not of 32: the rest is the penalty of nuisances
         ((0.5, -4.0, 7.0, 6.0, 1.0, 0.5, 1.5), 32.0, "all impacts at 4.2 m"),  # yet others contradict it by 0.5
-        ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 12.1), 34.0, ""),  # a train alone is enough, whatever other impacts lose
-        ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 11.9), 34.0, "all impacts at 4.2 m"),  # and here it is not
+        (
+            (0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 12.1),
+            34.0,
+            "",
+        ),  # a train alone is enough, even if other impacts lose evidence
+        ((0.5, -9.0, 14.0, 13.0, 1.0, 0.5, 11.9), 34.0, "all impacts at 4.2 m"),  # and here it is not enough
     ],
 )
 def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
@@ -143,7 +157,7 @@ def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
     assert single_source(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
 
 
-def test_of_two_positions_neither_is_the_single_one():
+def test_with_two_positions_neither_is_the_single_source():
     case, fit = fitted((1.0, 1.0, 1.0))
     of_two = ImpactCampaigns(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
@@ -152,7 +166,7 @@ def test_of_two_positions_neither_is_the_single_one():
 
 
 @pytest.mark.parametrize("gain, answer", [(20.0, "none"), (60.0, "unknown")])
-def test_it_gets_no_name(gain, answer):
+def test_an_effect_of_a_single_recording_has_no_name(gain, answer):
     candidate = Candidate.of("bump", (), lambda p: None, ())
     score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_source="a")
     said = judge([score], 0.8, MismatchSettings())
