@@ -79,7 +79,8 @@ def with_values(values, error=0.01, groups=("support",) * N_SUPPORT):
 
 @pytest.mark.parametrize("changes", [in_one(0.0), in_one(0.4), [0.2] * N_SUPPORT])
 def test_the_evidence_is_that_of_dense_covariances(changes):
-    """Mean over supports of N(0, S + (3 sd)² c cᵀ) / N(0, S), S of noise and values, c response of trains to a support."""
+    """Mean over supports of N(0, S + (3 sd)² c cᵀ) / N(0, S), S of noise and values, c response of trains to a
+    support."""
     case = Supports(changes)
     fit = fit_jointly(case)
     j, y = np.concatenate(list(case.jacobian.values())), np.concatenate([o.data for o in case.observations])

@@ -1,4 +1,4 @@
-"""Flats by their impacts, dips by what the waves of the rail took in, polygonal wheels by their line: closed forms."""
+"""Closed forms of flats by their impacts, dips absorbed by waves of the rail, and polygons by their line."""
 
 from types import SimpleNamespace
 
@@ -55,14 +55,14 @@ def scanned(passages):
     return [best_flat_on_wheel(passages, excesses, w) for w in range(len(WHEELS))]
 
 
-def test_a_series_of_impacts_identifies_the_wheel_its_radius_and_where_the_flat_meets_the_rail():
+def test_a_series_of_impacts_identifies_wheel_radius_and_angle_of_a_flat():
     passages = [passage(1.1, 1, "a", 0.446, seed=1), passage(2.3, 1, "b", 0.446, seed=2)]
     found = scanned(passages)
     nats = [n for n, *_ in found]
     assert int(np.argmax(nats)) == 1 and nats[1] > 20.0
     _, radius, phases = found[1]
     assert radius == pytest.approx(0.446, abs=0.0046)  # one step of the scan
-    # impacts near the sensors, on the third turn or so, lie where they did
+    # impacts near the sensors, at about the third turn, have the true positions
     for (_, at), true in zip(phases, (1.1, 2.3)):
         way = np.array([at + k * 2 * np.pi * radius for k in range(4)])[:, None]
         assert np.abs(way - [true + k * 2 * np.pi * 0.446 for k in range(4)]).min() < 0.2
@@ -88,9 +88,9 @@ def with_nose(made, place, strengths, seed):
 
 
 def test_a_nose_at_which_every_wheel_has_an_impact_is_no_flat_of_the_strongest():
-    """The axles of a bogie stand a turn apart. So the rear one seems to have two impacts, its own and that of the axle
-    ahead, in eight passages: that is evidence against a flat. A flat of the last wheel beside that nose is found in
-    its bogie, of which the other wheel is a turn away, with more evidence for the last wheel."""
+    """The axles of a bogie are a turn apart. So the rear one seems to have two impacts, its own and that of the axle
+    ahead, in eight passages, which is evidence against a flat. A flat of the last wheel beside that nose is found in
+    its bogie, whose other wheel is a turn away, with more evidence for the last wheel."""
     uneven = (20.0, 30.0, 20.0, 20.0)
     intact = [with_nose(passage(1.1, 3, f"{s}", strength=0.0, seed=s), 4.5, uneven, s + 50) for s in range(20, 28)]
     assert max(n for n, *_ in scanned(intact)) < 0.0
@@ -104,11 +104,11 @@ def test_a_flat_of_one_of_two_wheels_is_no_impact_of_the_rail():
     for wheels in ([0.0, 4.9], [0.0]):
         made = passage(1.1, 0, "a", seed=6)
         made.passage.vehicle = wagon(wheels)
-        assert best_flat_on_wheel([made], [band_excess(made)], 0)[0] > 15.0  # the larger of two would leave it nothing
+        assert best_flat_on_wheel([made], [band_excess(made)], 0)[0] > 15.0  # less than the larger of two
 
 
 def test_no_single_impact_has_more_evidence_than_its_bound():
-    """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its middle over that of the odd."""
+    """ln of ((1-e) / sqrt(2 pi) + e U) / (e U), the density of noise at its maximum over that of outliers."""
     bound = np.log(
         ((1.0 - FLATS.outlier_share) / np.sqrt(2.0 * np.pi) + FLATS.outlier_share * FLATS.outlier_density)
         / (FLATS.outlier_share * FLATS.outlier_density)
@@ -141,7 +141,7 @@ def test_the_evidence_of_a_wave_is_that_of_two_normal_amplitudes_integrated_out(
     assert row[0] == pytest.approx(np.log(np.sum(weight * np.exp(power))), abs=1e-6)
 
 
-def test_a_wheel_is_round_where_its_angle_is_not_known():
+def test_a_wheel_without_a_known_angle_is_simulated_as_round():
     term = physics.OutOfRound(2, 1e-4, 0.0, order=5, radius=0.45, train="loaded", phases=(("a", 0.3),))
     assert term.under_conditions({"train": "railcar", "name": "a"}).paths(None, None) == ()
     assert term.under_conditions({"train": "loaded", "name": "b"}).paths(None, None) == ()
@@ -154,7 +154,7 @@ def test_a_wheel_is_round_where_its_angle_is_not_known():
 
 
 class OnlyWaves(Case):
-    """One recording that a handful of waves of the rail are seen in through a random matrix."""
+    """One recording that depends on a few waves of the rail by a random matrix."""
 
     def __init__(self):
         rng = np.random.default_rng(11)
@@ -171,7 +171,7 @@ class OnlyWaves(Case):
         return [self.columns]
 
 
-def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_its_column_beside_the_waves():
+def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_the_waves():
     case = OnlyWaves()
     fit = fit_jointly(case, iterations=3)
     scan = RailScan(case, fit)
@@ -185,7 +185,7 @@ def test_the_gain_of_a_shape_is_that_of_a_least_squares_fit_with_its_column_besi
     costs = [np.sum((right - m @ np.linalg.lstsq(m, right, rcond=None)[0]) ** 2) for m in (rows, wider)]
     assert slope[0] ** 2 / size[0, 0] == pytest.approx(costs[0] - costs[1], rel=1e-6)
 
-    theta = np.linalg.lstsq(wider, right, rcond=None)[0]  # the waves that are left are those of that fit
+    theta = np.linalg.lstsq(wider, right, rcond=None)[0]  # the remaining waves are those of that fit
     height = slope[0] / size[0, 0]
     left = scan.waves_without(height * shape)
     assert [left[n] for n in case.waves.names] == pytest.approx(theta[:-1], rel=1e-5, abs=1e-6 * case.waves.sd.max())
@@ -206,14 +206,15 @@ class RoughCase(OnlyWaves):
 
 
 @pytest.mark.parametrize("wavelength", [0.26, 0.285, 0.31, 0.45, 0.7])
-def test_corrugation_of_each_length_that_free_waves_hold_is_found(wavelength):
-    """What the waves of the rail absorb has a candidate of its length. They go to 0.25 m; the search once did not."""
+def test_corrugation_of_each_length_of_free_waves_is_found(wavelength):
+    """Corrugation that the free waves absorb has a candidate of its length, down to 0.25 m. Formerly the search ended
+    earlier."""
     case = RoughCase(wavelength)
     (found,) = scan_rail(case, fit_jointly(case, iterations=3), ["rail_corrugation"])
     assert found.where["wavelength"] == pytest.approx(wavelength, rel=0.02)
 
 
-def test_waves_of_the_rail_and_of_wheels_are_sought_from_the_shortest_free_wave_on():
+def test_waves_of_rail_and_wheels_are_tested_from_the_shortest_free_wave_on():
     """Neighbours of rail 3 % apart, of wheels 1.2 %: over 10 m half a period of the shortest."""
     shortest = Waves(PLACES, 0.0).lengths.min()
     for module, step in ((rail_defects, 0.03), (out_of_roundness, 0.0125)):

@@ -1,4 +1,4 @@
-"""Limits of channels under the hammer: what holds on both sides, what grows, what is known to end there."""
+"""Limits of channels under the hammer: limits of both sides, peaks that grow, and known ranges."""
 
 from types import SimpleNamespace
 
@@ -37,11 +37,11 @@ def at(place, name="A", mounting="rail web"):
 
 
 def uneven(x, limit=30.0):
-    """One side holds at 1.2, the other at 0.8 of ``limit``."""
+    """One side ends at 1.2, the other at 0.8 of ``limit``."""
     return np.clip(x, -0.8 * limit, 1.2 * limit)
 
 
-def test_peaks_that_hold_gain_the_logarithm_of_the_growth_they_lack():
+def test_constant_peaks_gain_the_logarithm_of_the_missing_growth():
     x = np.log(FORCES)
     limit, gain = common_limit([(x, np.full(6, np.log(50.0)))])
     assert limit == pytest.approx(50.0)
@@ -49,13 +49,13 @@ def test_peaks_that_hold_gain_the_logarithm_of_the_growth_they_lack():
 
 
 @pytest.mark.parametrize("slope", [1.0, 1.4])
-def test_peaks_that_grow_with_the_force_or_faster_gain_nothing(slope):
+def test_peaks_that_grow_with_the_force_or_faster_have_no_evidence_of_a_limit(slope):
     scatter = 0.01 * np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0])
     x = np.log(FORCES)
     assert common_limit([(x, slope * x - 5.0 + scatter), (x, slope * x - 6.0 - scatter)])[1] < 0.0
 
 
-def test_one_limit_holds_in_all_tests_that_reach_it():
+def test_one_limit_applies_to_all_tests_that_reach_it():
     """A far test stays below the limit; of two that reach it each alone has half of the evidence."""
     x, top = np.log(FORCES), np.log(50.0)
     near, far = (x, np.minimum(top, x - 4.9)), (x, 1.3 * x - 9.5)
@@ -64,8 +64,8 @@ def test_one_limit_holds_in_all_tests_that_reach_it():
     assert both > 1.6 * one > 12.0
 
 
-def test_each_side_of_an_amplifier_holds_for_itself():
-    """Limits of 36 and 24 m/s² are one of 30; a twentieth of that is within the scatter that is allowed for."""
+def test_the_two_sides_of_an_amplifier_may_have_different_limits():
+    """Limits of 36 and 24 m/s² count as one of 30; a twentieth of that is within the tolerated scatter."""
     limit, gain = limit_under_impacts([hammer_input(3.0, uneven), hammer_input(6.0, uneven, share=0.2)], at(3.0))
     assert gain > 12.0
     assert limit == pytest.approx(30.0, rel=0.05)
@@ -77,8 +77,8 @@ def test_a_linear_channel_has_no_limit():
     assert gain == 0.0
 
 
-def test_beside_the_impact_a_limit_of_one_side_proves_nothing():
-    """There waves of all lengths meet: at 6 m, where no impact is, a channel has to hold on both sides."""
+def test_a_limit_of_one_side_is_evidence_only_at_the_impact():
+    """At 6 m, away from all impacts, waves of all lengths interfere: there a channel must have limits on both sides."""
 
     def one_side(x):
         return np.minimum(x, 24.0)
@@ -105,7 +105,7 @@ def test_a_range_that_the_file_states_is_no_fault():
     assert limit_under_impacts([hammer_input(3.0, lambda x: np.clip(x, -24.0, 24.0), limit=24.0)], at(3.0))[1] == 0.0
 
 
-def test_a_channel_that_was_not_there_has_none():
+def test_a_missing_channel_has_no_limit():
     assert limit_under_impacts([hammer_input(3.0, uneven)], at(3.0, "B"))[1] == 0.0
     assert limit_under_impacts([], at(3.0))[1] == 0.0
 
@@ -115,7 +115,7 @@ def two_tests():
 
 
 def campaign(names="ABC", hammer=(), peaks=()):
-    """Sensors 3 m apart, the first where impacts fall; of each passage the peak that A shows and that of all others."""
+    """Sensors 3 m apart, the first at the impacts; of each passage the peak of A and that of all others."""
     sensors = [at(3.0 * (k + 1), name) for k, name in enumerate(names)]
     channels = tuple(Channel(name, "acceleration") for name in names)
     wave, passages = np.sin(np.linspace(0.0, 50.0, 1001)), []
@@ -126,15 +126,15 @@ def campaign(names="ABC", hammer=(), peaks=()):
 
 
 @pytest.mark.parametrize("names, found", [("ABC", ["A"]), ("AB", ["A"]), ("A", [])])
-def test_impacts_alone_show_a_limit_but_not_of_the_only_channel(names, found):
+def test_impacts_alone_show_a_limit_unless_there_is_only_one_channel(names, found):
     known = saturated_channels(campaign(names, two_tests()), 12.0)
     assert list(known) == found
     assert all(c.limit == pytest.approx(30.0, rel=0.05) for c in known.values())
 
 
 @pytest.mark.parametrize("shown, found", [(40.0, ["A"]), (45.0, [])])
-def test_no_limit_lies_far_below_what_trains_have_shown(shown, found):
-    """Of 30 a square wave rings up to 38 m/s² in the recorder's filter, of the larger side by a tenth more."""
+def test_no_limit_is_far_below_the_peaks_of_trains(shown, found):
+    """A square wave of 30 overshoots to 38 m/s² in the recorder's filter; the larger side by a tenth more."""
     assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
 
 

@@ -1,4 +1,4 @@
-"""Fits to hammer tests end in one place, wherever they start."""
+"""Fits to hammer tests end at the same values from any start."""
 
 from dataclasses import replace
 
@@ -21,9 +21,9 @@ from turnout.simulate.turnout_track import TurnoutTrack
 
 
 @pytest.mark.parametrize("seed", [3, 5])
-def test_whatever_the_start_the_end_is_the_same(seed):
-    """Pads a third softer and ballast half as stiff again, each support with a scatter four times that of the priors:
-    a common factor trades against thirty own ones, and some end at their bounds."""
+def test_a_fit_ends_at_the_same_values_from_any_start(seed):
+    """Pads a third softer and ballast 1.5 times as stiff; the scatter of supports is four times that of the priors.
+    A common factor is exchangeable with thirty single ones, and some end at their bounds."""
     rng = np.random.default_rng(seed)
     small = small_plan((5.0, 25.0), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
@@ -41,7 +41,7 @@ def test_whatever_the_start_the_end_is_the_same(seed):
 
 
 class Line(Case):
-    """A straight line through the origin, and where it may not go on."""
+    """A straight line through the origin with a bound of its slope."""
 
     def __init__(self):
         x = np.arange(1.0, 5.0)
@@ -53,8 +53,8 @@ class Line(Case):
         return [values["slope"] * self.x + values["rest"] * self.x**2]
 
 
-def test_what_is_at_its_bound_stays_and_the_others_take_their_best():
-    """With the slope held at 0.5 the rest's best is a plain regression, and 0.5 at most."""
+def test_a_value_at_its_bound_stays_and_the_others_reach_their_optimum():
+    """With the slope fixed at 0.5 the optimum of the others is a regression, and 0.5 at most."""
     case = Line()
     found = fit_jointly(case, iterations=20)
     assert found.values["slope"] == 0.5 and found.values["rest"] == 0.5
@@ -70,7 +70,7 @@ def test_what_is_at_its_bound_stays_and_the_others_take_their_best():
 
 
 class Arctangent(Case):
-    """The arctangent of a number, zero as measured. From 1.3917 Newton's step leads to -1.3917, and back for ever."""
+    """The arctangent of a number, measured as zero. From 1.3917 Newton's step leads to -1.3917, and back again."""
 
     nuisances = (Nuisance("x", "-", 0.0, 1e3),)
     observations = (Observation("a", "a", np.zeros(1), np.full(1, 0.01)),)
@@ -83,7 +83,7 @@ class Arctangent(Case):
 
 
 @pytest.mark.parametrize("start", [1.39, 1.391, -1.3917])
-def test_a_step_to_the_other_side_of_a_valley_is_no_end_of_a_fit(start):
+def test_a_fit_does_not_end_at_a_step_to_the_other_side_of_a_valley(start):
     """2 x / (1 + x²) = arctan x has its root at 1.39175. Just below it a full step gains less than half a nat."""
     options = {"iterations": THRESHOLDS.max_hammer_steps, "min_gain": THRESHOLDS.min_hammer_step_gain}
     assert abs(fit_jointly(Arctangent(), values={"x": start}, **options).values["x"]) < 0.02
@@ -107,7 +107,7 @@ class Vibration(HammerCase):
 
 @pytest.mark.parametrize("x", [0.4, 3.3])
 def test_a_fit_to_all_tests_ends_in_the_deepest_minimum(x):
-    """From the mean of the prior a fit ends beside an x of 1.6 standard deviations, with broad errors as well."""
+    """From the mean of the prior a fit ends beside an x of 1.6 standard deviations, also with larger errors."""
     case = Vibration(x)
     from_mean = fit_jointly(case, values=fit_jointly(case.with_broad_errors(), iterations=30).values, iterations=30)
     assert (abs(from_mean.values["x"] - x) < 0.01) == (x == 0.4)

@@ -1,4 +1,4 @@
-"""A turnout with hammer tests alone: what can still be said, and what is rejected."""
+"""A turnout with hammer tests alone: possible answers, and rejected input."""
 
 import json
 from dataclasses import replace
@@ -40,7 +40,7 @@ def found_in(plan, *terms, seed=3):
 
 
 @pytest.mark.slow
-def test_where_nothing_is_missing_the_answer_is_none(plan):
+def test_without_a_missing_effect_the_answer_is_none(plan):
     _, found = found_in(plan)
     assert found.verdict.answer == "none"
     assert found.verdict.probability > 0.5
@@ -61,8 +61,8 @@ def test_warm_pads_are_named_from_two_temperatures(plan):
 
 
 @pytest.mark.slow
-def test_a_sensor_wired_the_other_way_round_is_named(plan):
-    """Everything that it shows has the other sign, in every band: no delay does that."""
+def test_a_sensor_with_reversed_polarity_is_named(plan):
+    """Its signal has the other sign in every band, which no delay causes."""
     _, found = found_in(plan, physics.SensorGain("S3", -1.0))
     assert found.names == ("sensor_gain",)
     assert found.fit.candidates[0].where == {"sensor": "S3"}
@@ -74,7 +74,7 @@ def test_a_campaign_without_recordings_is_an_error():
         CampaignInput(TurnoutTrack(uniform_track(12.0)), ())
 
 
-def test_a_reserved_recording_that_is_not_there_is_named(plan):
+def test_an_error_names_a_missing_reserved_recording(plan):
     campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:1]), seed=1)
     with pytest.raises(SimulationError, match="light 9"):
         replace(campaign, reserved=("light 9",))
@@ -85,7 +85,7 @@ def test_a_reserved_recording_that_is_not_there_is_named(plan):
 
 
 def test_fits_start_from_tests_that_are_not_held_out(plan):
-    """What a reserved test shows does not matter, be it three times as much."""
+    """The content of a reserved test does not matter, even if it is three times as large."""
     campaign, starts = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1), []
     kept = campaign.hammer[1]
     for factor in (1.0, 3.0):
@@ -107,8 +107,8 @@ def test_channels_without_impacts_are_left_out_with_a_note(plan):
 
 
 @pytest.mark.slow
-def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
-    """The fits start from a rail moved to where impacts have it; what is named is still what the file's rail lacks,
+def test_the_size_of_a_soft_rail_in_shear_refers_to_the_rail_of_the_file(plan):
+    """The fits start from a rail that impacts have calibrated. The named size still refers to the rail of the file,
     4 per GN beside its own 4.1."""
     case, found = found_in(plan, physics.RailShear(4.0))
     assert case.predictor.rail["rail_shear"] < -0.05
@@ -116,8 +116,8 @@ def test_a_rail_soft_in_shear_is_sized_against_the_rail_of_its_file(plan):
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]
 
 
-def test_a_shear_stiffness_is_tried_in_the_rail_that_impacts_calibrated():
-    """A term about the rail is relative to its file; the rest stays as impacts calibrated it, for passages as well."""
+def test_a_shear_stiffness_is_applied_to_the_rail_that_impacts_calibrated():
+    """A term of the rail is relative to its file; other values stay as impacts calibrated them, also for passages."""
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 3))
     predictor = case.predictor.recentre({"rail_bending": 0.03, "rail_shear": -0.2})
     file, bent = predictor.site.nominal.turnout.track.rail, predictor.track().rail
@@ -130,7 +130,7 @@ def test_a_shear_stiffness_is_tried_in_the_rail_that_impacts_calibrated():
     assert predictor.track(terms=(physics.RailShear(2.0),)).rail.bending_stiffness < sheared.bending_stiffness
 
 
-def test_a_receptance_follows_the_rail_however_far_it_goes(plan):
+def test_a_receptance_is_that_of_the_rail_also_far_from_the_file(plan):
     """A rail whose shear stiffness is exp(-0.41) of its file's: the receptance is that of such a rail, to 1e-3."""
     case = TrackCase(measured_campaign(plan, (), 3))
     (name, pair), *_ = case.frf_pairs.items()
@@ -155,9 +155,9 @@ def test_an_impact_is_not_compared_at_sensors_far_from_it():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("limit", "most"), [(1000.0, 0.8), (4000.0, 0.45)])
-def test_an_impact_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit, most):
-    """Time histories with dry friction against its secant: one rate for both leaves 0.77 and 0.54 of the change
-    at 20 mm/s, 0.98 and 0.41 at 2 mm/s."""
+def test_dry_friction_slips_at_a_low_limit_and_sticks_at_a_high_one(plan, limit, most):
+    """Time histories with dry friction against its equivalent damper: a common rate for both limits leaves 0.77 and
+    0.54 of the change at 20 mm/s, 0.98 and 0.41 at 2 mm/s."""
     plan = replace(plan, turnout=TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)}))
     support = plan.turnout.track.nearest_support(22.2)
     case = TrackCase(measured_campaign(plan, (physics.DryFriction(support, limit),), 3))
@@ -168,8 +168,8 @@ def test_an_impact_slips_in_a_loose_joint_and_sticks_in_a_tight_one(plan, limit,
     assert left < most**2 * change
 
 
-def test_a_derivative_goes_to_the_side_where_the_simulation_can():
-    """A passage quadratic in the load that cannot be simulated above: the slope from below, 2 x 3 less the step."""
+def test_a_derivative_uses_the_side_on_which_the_simulation_succeeds():
+    """A passage is quadratic in the load and fails above a limit: the slope from below is 2 x 3 less the step."""
 
     def simulated(values, terms, made, with_probes):
         if values["load"] > 3.0:
@@ -182,9 +182,9 @@ def test_a_derivative_goes_to_the_side_where_the_simulation_can():
 
 
 @pytest.mark.slow
-def test_a_track_that_still_rings_when_the_record_ends_shows_the_receptance_of_its_model():
-    """Ballast of 2 % of critical damping, as under Tommerup's switch panel: in a record of 0.15 s the last tenth of the
-    motion is missing, which at 36 Hz is a quarter of a plain quotient of transforms."""
+def test_a_record_that_ends_before_the_decay_gives_the_receptance_of_the_model():
+    """Ballast of 2 % of critical damping, as under the switch panel at Tommerup: a record of 0.15 s lacks the last
+    tenth of the motion, which changes a quotient of transforms at 36 Hz by a quarter."""
     values = {"ballast_stiffness": 238e6, "ballast_damping": 7.9e3, "sleeper_mass": 170.0}
     track, sensor = uniform_track(60.0, **values), Sensor("S1", 30.0)
     recordings = simulate_hammer(track, 30.0, Hammer(position_spread=0.0), (sensor,), 4, seed=5, duration=0.15)

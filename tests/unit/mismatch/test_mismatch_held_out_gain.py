@@ -1,4 +1,4 @@
-"""The standard error of what a name gains on held-out recordings, against the scatter of many draws."""
+"""The standard error of the gain of a name on held-out recordings, against the scatter of many draws."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,12 @@ import pytest
 from turnout.mismatch.engine.fit_quality import fit_percent, gain_error
 from turnout.mismatch.engine.observation import Observation
 
-STRETCH = 40  # samples over which the noise of a draw stays alike
+STRETCH = 40  # samples over which the noise of a draw is correlated
 
 
 def drawn(rng):
-    """Two recordings of unequal length, noise alike over short stretches, and predictions by two models."""
+    """Two recordings of unequal length, noise that is correlated over short stretches, and predictions by two
+    models."""
     found = []
     for n, level in ((6000, 1.0), (4000, 0.6)):
         t = np.arange(n) / 500.0
@@ -21,7 +22,7 @@ def drawn(rng):
 
 
 def test_the_stated_error_is_the_scatter_of_the_gain():
-    """400 draws tell a standard deviation to 3.5 %; 25 stretches of a recording to some 15 %."""
+    """400 draws determine a standard deviation to 3.5 %, 25 stretches of a recording to about 15 %."""
     rng, gains, stated = np.random.default_rng(3), [], []
     for _ in range(400):
         observations, before, after = drawn(rng)
@@ -30,9 +31,9 @@ def test_the_stated_error_is_the_scatter_of_the_gain():
     assert np.median(stated) == pytest.approx(np.std(gains), rel=0.2)
 
 
-def test_sensors_that_miss_alike_are_no_further_evidence():
-    """Four sensors under one train miss the same: the gain scatters as that of one, and half of it would be stated were
-    each sensor's stretch an observation of its own."""
+def test_sensors_with_equal_errors_are_not_independent():
+    """Four sensors under one train have the same error: the gain scatters as that of one sensor. Half of the error
+    would be stated if each sensor were an observation of its own."""
     rng, gains, stated, apart = np.random.default_rng(6), [], [], []
     for _ in range(400):
         observations, before, after = drawn(rng)
@@ -45,14 +46,14 @@ def test_sensors_that_miss_alike_are_no_further_evidence():
     assert np.median(apart) < 0.7 * np.std(gains)
 
 
-def test_models_with_equal_predictions_differ_by_nothing():
+def test_models_with_equal_predictions_have_a_gain_of_0():
     observations, before, _ = drawn(np.random.default_rng(4))
     assert gain_error(observations, before, before) == 0.0
 
 
-def test_noise_that_both_miss_is_not_in_the_error_of_the_gain():
-    """Three times the noise makes either fit uncertain; the gain of two models that differ in one stretch has the
-    error of one stretch among fifty."""
+def test_noise_that_no_model_predicts_is_not_part_of_the_error_of_the_gain():
+    """Three times the noise makes each fit uncertain. The gain of two models that differ in one stretch has the error
+    of one stretch among fifty."""
     observations, before, _ = (list(x) for x in drawn(np.random.default_rng(5)))
     after = [p.copy() for p in before]
     after[0][:240] = observations[0].data[:240]

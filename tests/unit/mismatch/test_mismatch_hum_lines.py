@@ -1,4 +1,4 @@
-"""Mains hum has a phase of its own in each recording, which the channel shows where no wheel is near."""
+"""Mains hum has its own phase in each recording, which the channel shows while no wheel is near."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,14 +29,14 @@ def test_frequency_and_phase_are_those_of_the_line_across_a_gap_and_beside_an_of
         assert np.angle(np.exp(1j * middle)) == pytest.approx(0.0, abs=0.01)
 
 
-def test_noise_alone_does_not_move_the_frequency_far():
+def test_with_noise_alone_the_frequency_follows_its_prior():
     """Without a line the prior decides: the mean of the squares is near its variance, not that of the trial range."""
     rng, time = np.random.default_rng(3), np.concatenate([np.arange(0.0, 0.5, 4e-3), np.arange(6.0, 6.5, 4e-3)])
     deviations = [f - 50.0 for f, _ in mains_lines(rng.normal(size=(200, time.size)), time, 50.0)]
     assert np.sqrt(np.mean(np.square(deviations))) < 0.05  # a uniform choice among the trials: 0.07
 
 
-def test_a_channel_without_a_known_line_hums_from_the_start_of_the_record():
+def test_the_phase_of_hum_without_a_known_line_refers_to_the_start_of_the_record():
     hum = physics.Hum("A3", 0.8, 0.6)
     assert hum.under_conditions({"start": 0.25}) == replace(hum, start=0.25)
     assert hum.under_conditions({"hum_lines": {"A1": (49.9, 1.2)}}) == hum
@@ -88,7 +88,7 @@ def hum_campaign(frequency, amplitude=AMPLITUDE):
 
 @pytest.mark.parametrize("frequency, most", [(50.0, 0.1), (50.1, 0.1)])
 def test_one_amplitude_describes_the_hum_of_all_recordings(frequency, most):
-    """Recordings start at any phase. What the effect adds to each prediction is the line that was added to each.
+    """Recordings start at any phase. The effect adds to each prediction the line that was added to the recording.
 
     Mains that are 0.1 Hz off turn by 36 degrees in a second.
     """
@@ -118,7 +118,7 @@ def test_one_amplitude_describes_the_hum_of_all_recordings(frequency, most):
     assert "channel S3 shows a line at 50 Hz" in answer.words
 
 
-def test_ordinary_hum_is_no_clear_part_of_the_response():
+def test_weak_hum_is_not_reported():
     assert line_without_wheel(TrackCase(hum_campaign(50.0, 0.1))) is None
 
 

@@ -1,4 +1,4 @@
-"""Intact panels of a real turnout's track file, lightly damped ones and the crossing among them, are no mismatch."""
+"""Intact panels of the track file of a real turnout, also lightly damped ones and the crossing, are no mismatch."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,14 @@ from turnout.mismatch.turnout.campaign import HammerInput, PassageInput
 from turnout.simulate import Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import Hammer
 
-SPEEDS = (39.0, 43.0)  # m/s; the faster, the nearer to frequencies that the track carries far
+SPEEDS = (39.0, 43.0)  # m/s; at higher speeds the frequencies are nearer to those with low decay along the track
 # s of a hammer record, 0.12 of them after the impact: some impacts would be rejected as cut off with less
 RECORD = 0.17
 
 
 def measured(places, seed):
-    """Impacts at the first place and two trains over one rail; the owner's file is the very track."""
+    """Impacts at the first position and two trains over one rail; the file of the owner describes exactly this
+    track."""
     turnout = load_track("tommerup")
     sensors = tuple(Sensor(f"S{x:g}", x, noise=0.05) for x in places)
     impacts = simulate_hammer(turnout, places[0], Hammer(position_spread=0.004), sensors, 5, seed=seed, duration=RECORD)
@@ -32,7 +33,8 @@ def measured(places, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize(("places", "seed"), [((3.6,), 1), ((13.8,), 7), ((24.6, 26.4), 7)])
 def test_the_residual_of_intact_panels_is_that_of_controls(places, seed):
-    """Switch, closure and crossing panel; by the settings' levels, which come from another generator's plain track."""
+    """Switch, closure and crossing panel; with the control levels of the settings, which are from plain track of
+    another simulation."""
     case = TrackCase(measured(places, seed))
     assert len(case.aligned_passages) == len(SPEEDS)
     base = fit_jointly(case, iterations=case.settings.base_iterations)

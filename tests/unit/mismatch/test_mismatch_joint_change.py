@@ -1,4 +1,4 @@
-"""One quantity that an effect and a tolerance change: recordings show the joint change, the priors divide it."""
+"""A quantity that an effect and a tolerance change: recordings determine the total change, priors its division."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def end_of_fit(case, candidate, size, tolerance_sds):
 @pytest.mark.parametrize(
     "family, size", [("unsprung_mass", 1.36), ("sensor_gain", 0.7), ("sensor_gain", -1.1), ("sensor_position", 0.31)]
 )
-def test_a_division_changes_no_prediction_and_costs_less(case, family, size):
+def test_a_division_changes_no_prediction_and_has_a_lower_cost(case, family, size):
     joint, point, jacobian, k = end_of_fit(case, of_family(case, family), size, 3.0)
     moved, rows = with_probable_division(joint, point, jacobian)
     assert abs(moved.theta[k] - joint.mean[k]) < abs(point.theta[k] - joint.mean[k]) / 2
@@ -70,7 +70,7 @@ def test_every_fit_ends_with_the_division_of_the_priors(case):
     assert fit.values[tolerance.name] < tolerance.sd
 
 
-def test_an_effect_at_its_bound_goes_no_further(case):
+def test_an_effect_at_its_bound_stays_there(case):
     candidate = of_family(case, "unsprung_mass")
     lowest = candidate.parameters[0].bounds[0]
     joint, point, jacobian, _ = end_of_fit(case, candidate, lowest, -2.0)  # the priors would have a smaller one
@@ -78,7 +78,7 @@ def test_an_effect_at_its_bound_goes_no_further(case):
     assert moved is point
 
 
-def test_pads_of_which_the_tolerance_changes_the_damper_in_another_way_are_not_divided(case):
+def test_pads_whose_tolerance_changes_the_damper_differently_are_not_divided(case):
     joint, point, jacobian, _ = end_of_fit(case, of_family(case, "local_pad"), 0.4, 3.0)
     moved, rows = with_probable_division(joint, point, jacobian)
     assert moved is point and all(a is b for a, b in zip(rows, jacobian, strict=True))

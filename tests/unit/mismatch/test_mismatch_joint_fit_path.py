@@ -1,4 +1,4 @@
-"""Long ways of the joint fit: a dear Jacobian goes stale, a promise does not hold, clipped tops say little."""
+"""Joint fits with many steps: outdated Jacobians, predicted gains that are not reached, and clipped peaks."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -25,7 +25,7 @@ from turnout.records import Channel, Recording
 
 
 class Bent(Case):
-    """Sixty numbers that go with the hyperbolic tangents and sines of twelve nuisances; a long way from the prior."""
+    """Sixty numbers by hyperbolic tangents and sines of twelve nuisances, far from the prior."""
 
     def __init__(self, frozen):
         rng = np.random.default_rng(4)
@@ -42,9 +42,9 @@ class Bent(Case):
         return [self._shown(np.array([values[n.name] for n in self.nuisances]))]
 
 
-def test_a_dear_jacobian_is_made_anew_on_a_long_way():
-    """The fit ends where one with new derivatives at every step does, but for what ends an iteration, 0.1 of its cost;
-    one that only updates its first derivatives does not."""
+def test_a_large_fit_computes_its_jacobian_again_far_from_its_start():
+    """The fit ends where one with new derivatives at every step ends, to the limit of the iteration, 0.1 of its cost.
+    A fit that only updates its first derivatives does not."""
     full, renewed = fit_jointly(Bent(False), iterations=40), fit_jointly(Bent(True), iterations=25)
     first = fit_jointly(Bent(True), iterations=1).jacobian
     updated = fit_jointly(Bent(True), reused_jacobian=first, iterations=25)
@@ -52,8 +52,8 @@ def test_a_dear_jacobian_is_made_anew_on_a_long_way():
     assert updated.cost > full.cost + 1.0
 
 
-def test_after_a_step_that_costs_more_come_new_derivatives_before_smaller_steps(monkeypatch):
-    """Updated derivatives of the wrong sign cost one trial each time, and the fit ends where it does with true ones."""
+def test_after_a_step_with_a_higher_cost_new_derivatives_precede_smaller_steps(monkeypatch):
+    """Updated derivatives of the wrong sign cause one more trial each time, and the fit ends at the same values."""
     trials, first_improvement = [], DampedSteps.first_improvement
 
     def recorded(self, cost, damping, max_tries=None):
@@ -72,13 +72,14 @@ def test_after_a_step_that_costs_more_come_new_derivatives_before_smaller_steps(
     assert fit.cost == pytest.approx(fit_jointly(Bent(False), iterations=40).cost, abs=0.2)
 
 
-def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
-    """Twenty of the cost per sample are 1,200 in all, which ends it early; leaders go on for a fifth of others'."""
+def test_a_large_fit_that_decides_the_answer_continues_for_smaller_gains(monkeypatch):
+    """A limit of twenty per sample, 1,200 in all, ends the fit early; leaders continue for a fifth of the usual
+    limit."""
     early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (20.0, THRESHOLDS.fine_stall))
     assert early.cost > late.cost + 1.0
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(
         late.cost, abs=0.2
-    )  # a small case: none
+    )  # a small case has no such limit
     asked = []
     search = Search(Bent(True))
     monkeypatch.setattr(Search, "fit", lambda *a, stall=THRESHOLDS.stall: asked.append(stall) or late)
@@ -88,8 +89,8 @@ def test_a_dear_fit_on_which_the_verdict_rests_goes_on_for_less(monkeypatch):
 
 
 @pytest.mark.parametrize(("gain", "ended"), [(5.0, 0), (8.0, 1), (20.0, 1)])
-def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch, gain, ended):
-    """A name needs 12 nats; from half of them on the fit goes on to its end."""
+def test_effects_near_the_threshold_are_fitted_to_convergence_like_leaders(monkeypatch, gain, ended):
+    """A name needs 12 nats; from half of them on the fit continues to convergence."""
     score, asked = SimpleNamespace(gain=gain, is_reportable=True, family="a"), []
     monkeypatch.setattr(
         refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key="a"))]
@@ -106,8 +107,8 @@ def test_what_comes_near_a_name_is_fitted_to_its_end_as_leaders_are(monkeypatch,
 
 
 @pytest.mark.parametrize(("beside", "begun"), [((), ["a"]), (("a name",), [])])
-def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, beside, begun):
-    """Of two leaders; beside a name what is left is that one's shape as well."""
+def test_only_the_first_leader_of_a_first_effect_is_restarted(monkeypatch, beside, begun):
+    """Of two leaders; beside a name the residual may be an error of the shape of that name."""
     scores = {f: SimpleNamespace(gain=g, is_reportable=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
     entries = [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key=f)) for f in "ba"]
     asked = []
@@ -126,10 +127,10 @@ def test_only_the_first_leader_of_a_first_effect_is_begun_anew(monkeypatch, besi
 
 
 @pytest.mark.parametrize(("stall", "again"), [(20.0, True), (0.05, False)])
-def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_effect(monkeypatch, stall, again):
-    """A leader with 20 nats of its own, fitted to its end, on top of a fit that had stopped before: from the leader's
-    nuisances that one comes to its end as well. What it owed goes off, and where that is more than a name needs, all
-    are asked again on top of the better fit."""
+def test_the_missing_convergence_of_the_base_fit_is_no_evidence_for_an_effect(monkeypatch, stall, again):
+    """A leader with 20 nats of its own is fitted to convergence, the base fit has stopped earlier. From the nuisances
+    of the leader the base fit converges as well. Its gain is subtracted from the evidence. If it exceeds the threshold
+    of a name, all candidates are scored again with the better base fit."""
     early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, THRESHOLDS.fine_stall))
     owed = late.evidence - early.evidence
     assert (owed > MismatchSettings().threshold) == again
@@ -152,8 +153,9 @@ def test_what_the_fit_without_an_effect_had_not_come_to_is_no_evidence_for_the_e
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
 
 
-def test_a_fit_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_sought():
-    """At the start, without a step, if that cost is far below the optimum; never if the optimum is below it."""
+def test_a_fit_ends_early_only_if_its_steps_do_not_lead_to_the_target_cost():
+    """At the start, without a step, if the target is far below the optimum; never if the optimum is below the
+    target."""
     optimum = fit_jointly(Bent(True), iterations=25)
     start = fit_jointly(Bent(True), iterations=0)
     found = fit_jointly(Bent(True), iterations=25, sought_cost=optimum.cost + 1.0)
@@ -176,7 +178,7 @@ def test_the_predicted_gain_of_a_step_is_its_gain_where_the_model_is_linear():
     assert steps.promise == pytest.approx(gained, rel=1e-4) and gained > 0.01
 
 
-def test_a_trial_costs_what_the_fit_costs_without_its_last_derivatives(monkeypatch):
+def test_a_trial_has_the_cost_of_the_fit_without_its_last_derivatives(monkeypatch):
     asked, jacobian = [], JointProblem.jacobian
     monkeypatch.setattr(JointProblem, "jacobian", lambda self, *a: asked.append(1) or jacobian(self, *a))
     case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
@@ -186,15 +188,15 @@ def test_a_trial_costs_what_the_fit_costs_without_its_last_derivatives(monkeypat
     assert (cost, values) == (fit.cost, fit.values) and len(asked) == 3 + 4
 
 
-def test_a_trial_ends_early_only_where_its_steps_do_not_lead_to_the_cost_that_is_sought():
+def test_a_trial_ends_early_only_if_its_steps_do_not_lead_to_the_target_cost():
     case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
     start, end = (steps_from(case, (), np.zeros(0), at, steps)[0] for steps in (0, 3))
     assert steps_from(case, (), np.zeros(0), at, 3, end + 1.0)[0] == end < start
     assert steps_from(case, (), np.zeros(0), at, 3, -1e6)[0] == start
 
 
-def test_a_fit_goes_on_from_the_end_of_its_trial(monkeypatch):
-    """It ends where a fit from the priors does, and the steps of the trial are not made again."""
+def test_a_fit_continues_from_the_end_of_its_trial(monkeypatch):
+    """It ends where a fit from the priors ends, and does not repeat the steps of the trial."""
     case, base, predicted = Bent(False), fit_jointly(Bent(False), iterations=40), []
     monkeypatch.setattr(Bent, "predict", lambda *given, predict=Bent.predict: predicted.append(1) or predict(*given))
     candidate = SimpleNamespace(
@@ -214,8 +216,8 @@ def test_a_fit_goes_on_from_the_end_of_its_trial(monkeypatch):
     assert n_after < n_alone
 
 
-def test_sites_are_tried_until_they_do_not_lead_to_the_two_best(monkeypatch):
-    """In order of what their columns promise; a further family of the group uses the same trials."""
+def test_sites_are_tried_until_they_are_not_among_the_two_best(monkeypatch):
+    """In the order of the predicted gains of their columns; a further effect of the group uses the same trials."""
     gains, sought = {"a": 10.0, "b": 30.0, "c": 20.0, "d": 5.0}, []
 
     def trial_gain(step, candidate, start, sought_gain):
@@ -236,7 +238,7 @@ def test_sites_are_tried_until_they_do_not_lead_to_the_two_best(monkeypatch):
 
 
 @pytest.mark.parametrize("order", [(1.0, 2.0, 3.0), (3.0, 1.0, 2.0)])
-def test_of_the_starts_of_a_whole_track_the_one_that_gains_most_is_taken(monkeypatch, order):
+def test_of_the_starts_of_an_effect_of_the_whole_track_the_best_one_is_used(monkeypatch, order):
     sought = []
 
     def trial_gain(step, candidate, start, sought_gain):
@@ -251,13 +253,13 @@ def test_of_the_starts_of_a_whole_track_the_one_that_gains_most_is_taken(monkeyp
     assert sought == [-np.inf, *np.maximum.accumulate(order[::-1])[:-1]]  # the most promising start is the last
 
 
-def test_a_fit_is_not_made_again_where_nobody_would_be_named():
+def test_the_base_fit_is_not_repeated_if_no_effect_would_be_named():
     late = fit_jointly(Bent(True), iterations=25, stall=THRESHOLDS.fine_stall)
     silent = [Score(SimpleNamespace(key="a"), 11.0, 0.0, 1.0, late)]
     assert refit._base_from_leader(Search(Bent(True)), late, silent) is None
 
 
-def test_a_passage_with_a_channel_at_its_range_confirms_only_its_size():
+def test_samples_at_the_range_of_a_channel_have_errors_of_the_size_of_its_signal():
     rate, n = 4000.0, 4000
     samples = 3.0 * np.sin(2 * np.pi * 20.0 * np.arange(n) / rate) * np.ones((2, 1))
     samples[0, 2000] = -50.0
@@ -281,8 +283,8 @@ def test_a_passage_with_a_channel_at_its_range_confirms_only_its_size():
 
 
 @pytest.mark.parametrize("gain, gives_up", [(40.0, False), (60.0, True)])
-def test_from_a_strong_leader_only_a_base_that_is_better_by_a_threshold_is_sought(monkeypatch, gain, gives_up):
-    """The base is at its optimum already; from the leader's nuisances the fit would come back to it."""
+def test_with_a_strong_leader_only_a_base_fit_better_by_a_threshold_is_searched(monkeypatch, gain, gives_up):
+    """The base fit is at its optimum already; from the nuisances of the leader the fit would return to it."""
     case, continued = Bent(True), []
     base = fit_jointly(case, iterations=25)
     elsewhere = replace(base, values={name: 0.9 * value for name, value in base.values.items()})
@@ -295,7 +297,7 @@ def test_from_a_strong_leader_only_a_base_that_is_better_by_a_threshold_is_sough
 
 @pytest.mark.parametrize(("gain", "kept"), [(30.0, 30.0), (-100.0, 7.5)])
 def test_the_limit_of_a_leader_is_refitted_from_its_nuisances(monkeypatch, gain, kept):
-    """From its own start a gap of 2.5 mm had ended 250 nats too low. The better of both fits counts."""
+    """From its own start the fit of a gap of 2.5 mm ended 250 nats too low. The better of both fits counts."""
     calls = []
 
     def refitted(search, fit, task, is_far):

@@ -1,4 +1,4 @@
-"""A single value far beyond its prior: what normal priors spread over neighbours is found where it is."""
+"""A single value far beyond its prior is found at its position, although normal priors spread it over neighbours."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ MIXING = np.tile([[0.75 ** abs(i - j) for j in range(N)] for i in range(9)], (6,
 
 
 class Springs(Case):
-    """Springs in a row, each with the logarithm of its stiffness; sensors feel neighbours, too."""
+    """Springs in a row, each with the logarithm of its stiffness; sensors also respond to neighbours."""
 
     def __init__(self, truth, power=1.0, seed=1):
         rng = np.random.default_rng(seed)
@@ -63,12 +63,12 @@ def test_the_evidence_of_a_large_value_is_that_of_the_density_of_all_data():
 @pytest.mark.parametrize("size", [-1.6, 1.6])
 @pytest.mark.parametrize("where", [1, 3])
 def test_one_spring_with_a_fifth_or_five_times_its_stiffness_is_found_with_its_size(size, where):
-    """The base fit cannot leave its bound of six prior sd; a wide prior lets it, and leaves the neighbours."""
+    """The base fit cannot exceed its bound of six prior sd; a wide prior allows that, and neighbours stay."""
     truth = np.zeros(N)
     truth[where] = size
     case = Springs(truth)
     search, base = base_of(case)
-    assert abs(base.values[f"k{where}"]) <= 0.6 + 1e-9  # what it is about
+    assert abs(base.values[f"k{where}"]) <= 0.6 + 1e-9  # the precondition of this test
     fit = fit_large_values(search, base, NAMES, WIDE)
     assert fit.evidence > base.evidence + np.log(N)
     others = [abs(fit.values[n]) for j, n in enumerate(NAMES) if j != where]
@@ -77,10 +77,10 @@ def test_one_spring_with_a_fifth_or_five_times_its_stiffness_is_found_with_its_s
 
 
 @pytest.mark.parametrize(("power", "size"), [(1.0, -1.6), (-2.0, 1.6), (3.0, -1.6)])
-def test_a_start_seeks_a_lower_cost_than_the_starts_before_it(monkeypatch, power, size):
-    """With the other powers one or two of the starts end in valleys of ten times the cost, in the last case the first.
+def test_the_target_cost_of_a_start_is_below_that_of_the_starts_before_it(monkeypatch, power, size):
+    """With the other powers one or two of the starts end in minima of ten times the cost, in the last case the first.
 
-    The answer is the best of the starts run by themselves.
+    The result is the best of all starts when they run separately.
     """
     search, base = base_of(Springs([0.0, size, 0.0, 0.0, 0.0, 0.0, 0.0], power))
     runs, fit_of_search = [], Search.fit
@@ -99,14 +99,14 @@ def test_a_start_seeks_a_lower_cost_than_the_starts_before_it(monkeypatch, power
     assert best.cost == pytest.approx(alone, abs=0.01)
 
 
-def test_two_large_values_are_found_one_after_the_other():
+def test_two_large_values_are_found_in_turn():
     case = Springs([0.0, -0.9, 0.0, 0.0, 0.0, -0.8, 0.0])
     fit = fit_large_values(*base_of(case), NAMES, WIDE)
     assert [fit.values["k1"], fit.values["k5"]] == pytest.approx([-0.9, -0.8], abs=0.15)
 
 
-def test_ordinary_scatter_has_no_large_value():
-    """Ordinary springs, n = 20: the fit is the base fit itself."""
+def test_the_usual_scatter_has_no_large_value():
+    """Springs with usual scatter, n = 20: the fit is the base fit itself."""
     rng = np.random.default_rng(3)
     for seed in range(20):
         search, base = base_of(Springs(PRIOR * rng.normal(size=N), seed=seed))
@@ -129,7 +129,7 @@ class TwoValleys(Springs):
         return MIXING @ y
 
 
-def test_a_large_value_behind_a_ridge_is_found_from_a_start_of_its_own():
+def test_a_large_value_behind_a_barrier_is_found_from_a_separate_start():
     truth = np.zeros(N)
     truth[2] = 1.4
     case = TwoValleys(truth)

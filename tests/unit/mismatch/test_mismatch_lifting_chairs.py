@@ -1,4 +1,4 @@
-"""Slide chairs that open under impacts: receptances with them agree with a march in time."""
+"""Slide chairs that open under impacts: receptances with them agree with a simulation in time."""
 
 from dataclasses import replace
 
@@ -15,14 +15,14 @@ from turnout.physics.slide_chair_gap import SlideChairGap
 
 @pytest.fixture(scope="module")
 def case():
-    """Three impacts amid the blade, on a track that is exactly as filed, simulated with chairs that press only."""
+    """Three impacts in the middle of the blade, on a track as in the file, simulated with chairs that only press."""
     plan = small_plan((15.0,), passages=False, hammer_positions=(23.4,))
     turnout = with_blade(plan.turnout)
     return TrackCase(measured_campaign(replace(plan, turnout=turnout, n_impacts=3), (), 3))
 
 
 def rms_error(case, lifting):
-    """Relative error of the receptances of the file's track, rms over all lines and sensors."""
+    """Relative error of the receptances of the track in the file, rms over all lines and sensors."""
     predictor = case.predictor.with_lifting(lifting)
     values = {n.name: n.mean for n in case.nuisances}
     predicted = predictor.predict(values, (), case.observations)
@@ -34,13 +34,13 @@ def file_chairs(case):
     return lifting_chairs(case.predictor.site.nominal.turnout.track_of("main"), case.frf_pairs.values())
 
 
-def test_receptances_with_chairs_that_open_agree_with_a_march_in_time(case):
-    """The recordings are a march at 20 kHz with the hammer as a mass; receptances alone err by a tenth and more."""
+def test_receptances_with_chairs_that_open_agree_with_a_simulation_in_time(case):
+    """The recordings are simulated at 20 kHz with the hammer as a mass; linear receptances err by a tenth and more."""
     assert rms_error(case, None) > 0.1
     assert rms_error(case, file_chairs(case)) < 0.35 * rms_error(case, None)
 
 
-def test_only_a_track_with_slide_chairs_has_them(case):
+def test_only_a_track_with_slide_chairs_has_this_correction(case):
     assert rms_error(case, case.predictor.lifting) < 0.35 * rms_error(case, None)
     assert case.hammer_case().predictor.lifting is case.predictor.lifting
     plain = case.predictor.site.nominal.turnout.track_of("main").with_(blade=None)
@@ -48,7 +48,7 @@ def test_only_a_track_with_slide_chairs_has_them(case):
 
 
 def test_a_weak_impact_opens_no_chair(case):
-    """At a hundredth of the force no bearer falls away from the blade faster than its weight draws it."""
+    """At a hundredth of the force the weight of the blade keeps all chairs closed."""
     chairs = file_chairs(case)
     weak = replace(
         chairs,
@@ -59,7 +59,7 @@ def test_a_weak_impact_opens_no_chair(case):
         assert np.max(np.abs(weak.change(pair, ()))) < 1e-3 * np.max(np.abs(chairs.change(pair, ())))
 
 
-def test_chairs_without_contact_have_none_to_lose(case):
+def test_chairs_without_contact_do_not_open(case):
     chairs = file_chairs(case)
     track = chairs.track
     gaps = [SlideChairGap(j, 2e-3) for j in track.blade.slide_chairs(track)]
@@ -91,8 +91,8 @@ def information(case, lifting):
     return total
 
 
-def test_a_repeated_test_makes_nothing_surer_that_the_same_chairs_change(case):
-    """Chairs open alike at each visit: the error is that of the model, not of a visit."""
+def test_a_repeated_test_does_not_reduce_the_error_by_the_same_chairs(case):
+    """Chairs open in the same way at each visit: the error belongs to the model, not to a visit."""
     test, *_ = case.campaign.hammer
     repeated = TrackCase(replace(case.campaign, hammer=(test, replace(test, name="again"))))
     assert len(repeated.observations) == 2 * len(case.observations)

@@ -1,4 +1,4 @@
-"""A residual without a name is localized: evidence for subspaces, stretches before a train, losses of the fit."""
+"""Localization of a residual without a name: evidence for subspaces, quiet segments, and losses of the fit."""
 
 from types import SimpleNamespace
 
@@ -44,7 +44,7 @@ def test_evidence_of_a_subspace_is_the_closed_form(i, j):
     inside = np.sqrt(floor + AMPLITUDES[i])
     basis = orthonormal(N, N)
     r = basis @ np.concatenate([np.full(K, inside), np.full(N - K, np.sqrt(floor))])
-    b = 7.0 * basis[:, :K]  # the scale of the columns must not matter
+    b = 7.0 * basis[:, :K]  # independent of the scale of the columns
     expected = 0.5 * N * np.log(NOISE_FACTORS[j]) - 0.5 * K * np.log1p(AMPLITUDES[i] / floor)
     assert subspace_evidence(b.T @ b, b.T @ r, r @ r, N, floor) == pytest.approx(expected, rel=1e-9)
 
@@ -58,7 +58,7 @@ def test_the_residual_of_intact_recordings_is_no_evidence():
 
 
 class Places(Case):
-    """Three sensors; a force at place 0, 1 or 2 is seen by them with the rows of ``seen``; no nuisance."""
+    """Three sensors that respond to a force at place 0, 1 or 2 with the rows of ``seen``; no nuisance."""
 
     seen = np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.5], [0.2, 0.5, 1.0]])
 
@@ -92,8 +92,8 @@ def test_a_force_is_distinguished_from_a_channel(mix, frame, level):
 
 
 @pytest.mark.parametrize("mix, frame", [([0.2, 0.5, 1.0], "place"), ([0, 1, 0], "sensor")])
-def test_no_position_is_stated_for_what_intact_turnouts_leave_as_well(mix, frame):
-    """The bound is that of positions: a channel with as much evidence is stated."""
+def test_a_residual_like_that_of_intact_turnouts_has_no_position(mix, frame):
+    """The limit applies to positions: a channel with the same evidence is stated."""
     rng = np.random.default_rng(8)
     case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(mix, rng.normal(size=40)))
     fit = fit_jointly(case)
@@ -105,8 +105,8 @@ def test_no_position_is_stated_for_what_intact_turnouts_leave_as_well(mix, frame
 
 
 @pytest.mark.parametrize("position", [0, 1, 2])
-def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_recordings(position):
-    """The whole residual is 0.3 of the control level: were that level the noise, no place would have any evidence."""
+def test_an_absorbed_cause_is_located_also_if_the_residual_is_below_the_control_level(position):
+    """The residual is 0.3 of the control level: with that level as the noise no position would have evidence."""
     rng = np.random.default_rng(8)
     rows = 0.3 * rng.normal(size=(3, 150)) + 0.7 * np.outer(Places.seen[position], rng.normal(size=150))
     case = Places(rows)
@@ -121,8 +121,8 @@ def test_an_absorbed_cause_is_located_where_a_fit_leaves_less_than_intact_record
     "at, text", [(("train", "railcar"), "on railcar"), (("frequency", "track"), "along the whole track"),
                  (("sensor", "S1"), "in channel S1")],
 )  # fmt: skip
-def test_a_value_that_has_absorbed_all_is_the_location(at, text):
-    """The residual is noise, at no place more than at others."""
+def test_a_value_that_has_absorbed_the_whole_effect_is_the_location(at, text):
+    """The residual is noise, and equal at all positions."""
     rows = np.random.default_rng(8).normal(size=(3, 150))
     case = Places(0.3 * rows)
     absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=at), 6.0, 15.0)
@@ -130,7 +130,7 @@ def test_a_value_that_has_absorbed_all_is_the_location(at, text):
 
 
 class Bursts(Places):
-    """A force acts during five samples alone."""
+    """A force acts during five samples only."""
 
     def residual_spaces(self, fit):
         for space in super().residual_spaces(fit):
@@ -140,9 +140,9 @@ class Bursts(Places):
 
 
 @pytest.mark.parametrize("noise, frame", [(0.2, "train"), (1.2, "place")])
-def test_a_residual_like_that_of_intact_recordings_does_not_move_what_a_value_has_absorbed(noise, frame):
-    """One place has more evidence than the value in both. In the first the whole residual is below the control level:
-    the track differs from its model there, as it does in recordings without any effect."""
+def test_a_residual_like_that_of_intact_recordings_does_not_change_the_location_of_an_absorbed_effect(noise, frame):
+    """In both cases one position has more evidence than the value. In the first case the whole residual is below the
+    control level: the track differs from its model there, as in recordings without an effect."""
     rng = np.random.default_rng(8)
     burst = 6.0 * np.sin(1.0 + np.arange(400.0)) * (np.arange(400) < 5)
     case = Bursts(noise * rng.normal(size=(3, 400)) + np.outer(Places.seen[2], burst))
@@ -165,8 +165,8 @@ def test_the_residual_at_one_position_outweighs_an_absorbing_value_by_evidence_o
     assert locate(case, fit_jointly(case), absorbed=absorbed).frame == frame
 
 
-def test_what_all_trains_show_is_no_train():
-    """Wheels of a train count for what those of other trains do not show."""
+def test_an_effect_in_all_trains_is_not_located_in_one_train():
+    """Only the part of the evidence that other trains do not have counts for a train."""
     of_trains = [
         SpaceEvidence("train", "A", 30.0),
         SpaceEvidence("train", "B", 26.0),
@@ -177,7 +177,7 @@ def test_what_all_trains_show_is_no_train():
 
 
 class Support(Case):
-    """Two recordings of six nuisances. In the first, an unknown cause acts along ``columns``, which the nuisances can
+    """Two recordings with six nuisances. In the first, an unknown cause acts along ``columns``, which the nuisances can
     imitate."""
 
     def __init__(self, rng, n=40, k=3):
@@ -199,7 +199,7 @@ class Support(Case):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_nuisances_pay_for_imitating_a_cause_is_evidence_for_it(seed):
+def test_the_prior_cost_of_nuisances_that_imitate_a_cause_is_evidence_for_the_cause(seed):
     """The evidence is that of dense covariances: the data given the other recording, N(m, C), with the cause
     N(m, C + a²BBᵀ)."""
     case = Support(np.random.default_rng(seed))
@@ -221,8 +221,8 @@ def test_what_nuisances_pay_for_imitating_a_cause_is_evidence_for_it(seed):
 
 
 class TrainAndImpacts(Case):
-    """A passage and two impacts. A force at 0 or 1 is seen in the passage; a change at one of them or at both in the
-    impacts, all impacts alike or not."""
+    """A passage and two impacts. The passage shows a force at 0 or 1. The impacts show a change at one or both of
+    these, equal in all impacts or not."""
 
     def __init__(self, passage, impacts):
         data = {"p": passage, "h1": impacts[0], "h2": impacts[1]}
@@ -250,7 +250,7 @@ def test_a_cause_at_two_positions_that_differs_between_impacts_is_located_betwee
     fit = fit_jointly(case)
     evidence = {(w.frame, w.level): w for w in weigh_spaces(case, fit, {"passage": 1.0, "hammer": 1.0})}
     both, zero = evidence["place", (0.0, 1.0)], evidence["place", 0.0]
-    assert set(both.by_space) == {"p", "h1", "h2"}  # of the two effects, one counts
+    assert set(both.by_space) == {"p", "h1", "h2"}  # one of the two effects counts
     assert both.by_space["p"] == zero.by_space["p"] > evidence["place", 1.0].by_space["p"]
     found = locate(case, fit)
     assert (found.level, found.place, found.low, found.high) == ((0.0, 1.0), 0.5, 0.0, 1.0)
@@ -261,7 +261,7 @@ def test_nothing_is_located_in_noise():
     assert locate(case, fit_jointly(case)) is None
 
 
-def test_the_rejected_candidate_gives_the_localization_where_it_explains_more():
+def test_a_rejected_candidate_is_the_location_if_it_explains_more():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
     candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k", position=None)
     rejected = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
@@ -284,14 +284,14 @@ def test_degrees_of_freedom_of_a_quiet_segment():
     assert seen == pytest.approx(2.0 / drawn[0][1], rel=4.0 * np.sqrt(2.0 / power.size))
 
 
-def test_quiet_segments_of_noise_have_uniform_chances():
+def test_quiet_segments_of_noise_have_uniform_p_values():
     rng = np.random.default_rng(5)
     chances = np.array([disturbances.excess_over(levels_of(rng), [levels_of(rng)])[1] for _ in range(600)])
     for q in (0.1, 0.5):
         assert abs(np.mean(chances < q) - q) < 4.0 * np.sqrt(q * (1.0 - q) / chances.size)
 
 
-def test_another_train_shakes_all_sensors_and_a_noisy_channel_is_alone():
+def test_another_train_raises_the_level_of_all_sensors_and_a_noisy_channel_only_its_own():
     rng = np.random.default_rng(6)
     others = [levels_of(rng) for _ in range(5)]
     excess, p = disturbances.excess_over(levels_of(rng, scale=2.0), others)  # twice the amplitude: 6 dB
@@ -310,7 +310,9 @@ def test_a_fall_of_the_held_out_fit_counts_beyond_two_standard_errors():
     assert is_significantly_worse(held, [y - e], [y - 2.0 * e], 0.5)  # every stretch is worse
     assert not is_significantly_worse(held, [y - 2.0 * e], [y - e], 0.5)
     assert not is_significantly_worse(held, [y - e], [y - e], 0.0)
-    mixed = np.where(np.arange(2500) < 1250, 0.0, np.sqrt(2.05)) * e  # half gains what the other half loses, nearly
+    mixed = (
+        np.where(np.arange(2500) < 1250, 0.0, np.sqrt(2.05)) * e
+    )  # one half gains nearly as much as the other half loses
     assert not is_significantly_worse(held, [y - e], [y - mixed], 0.0)
     assert not is_significantly_worse(held, [y - e], [y - 1.001 * e], 0.5)  # worse everywhere, but not by half a point
 
@@ -328,7 +330,7 @@ def test_the_stated_probability_is_between_the_observed_share_and_the_softmax():
     assert posterior["none"] / posterior["b"] == pytest.approx(0.2 / 0.15)
 
 
-def test_another_train_makes_an_unknown_of_nothing_else():
+def test_another_train_changes_the_answer_none_to_unknown():
     settings = MismatchSettings()
     assert judge([], 0.5, settings).answer == "none"
     verdict = judge([], 0.5, settings, disturbed=True)
@@ -337,8 +339,8 @@ def test_another_train_makes_an_unknown_of_nothing_else():
 
 
 def test_recordings_that_were_not_fitted_localize_only_if_they_are_the_reason():
-    """What the sensors show beyond controls is in the recordings that were fitted: a force at a place, whatever shook
-    the sensors in another one, and whoever came in a third."""
+    """The excess over controls is in the fitted recordings: a force at a position. A disturbance in another recording
+    and an unknown train in a third one do not change that."""
     rng, settings = np.random.default_rng(8), MismatchSettings()
     case = Places(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer([0.2, 0.5, 1.0], rng.normal(size=40)))
     case.disturbed_recordings, case.mismatched_trains = (
@@ -356,7 +358,7 @@ def test_recordings_that_were_not_fitted_localize_only_if_they_are_the_reason():
     assert locate(case, fit, None, "train").train == "freight"
 
 
-def test_passages_with_different_sensors_are_compared_by_those_they_share():
+def test_passages_with_different_sensors_are_compared_by_their_common_sensors():
     levels = {
         "a": ({"S1": 4.0, "S2": 8.0, "S3": 1.0}, 50.0),
         "b": ({"S1": 1.0, "S2": 2.0}, 50.0),
@@ -376,7 +378,7 @@ def test_passages_with_different_sensors_are_compared_by_those_they_share():
         (9.0, "beyond 8.1 m, at an unknown distance"),
     ],
 )
-def test_a_position_beyond_the_measured_range_is_not_stated_to_a_metre(place, text):
+def test_a_position_beyond_the_measured_range_is_stated_as_such(place, text):
     found = Location("place", place, 40.0, place, place - 0.6, place + 0.6, measured_range=(2.4, 8.1))
     assert str(found) == text
 
@@ -388,15 +390,15 @@ def test_a_position_beyond_the_measured_range_is_not_stated_to_a_metre(place, te
             "condition",
             {},
             "along the whole track",
-        ),  # as of pads that soften with temperature: no recording has it alone
+        ),  # for example pads that soften with temperature: not in one recording alone
         ("frequency", {}, "along the whole track"),
-        ("clock", {"sensor": "S1"}, "in channel S1"),  # as of a time offset
+        ("clock", {"sensor": "S1"}, "in channel S1"),  # for example a time offset
         ("wavelength", {"wavelength": 0.05}, "along the rail, at the wavelength 0.050 m"),
         ("wheel", {"train": "railcar", "axle": 3}, "on axle 3 of railcar"),
         ("place", {"place": 3.0}, "at 3.0 m, between 3.0 and 3.0 m"),
     ],
 )
-def test_a_candidate_without_a_name_is_the_location_in_words(frame, where, text):
+def test_a_candidate_without_a_name_is_stated_as_the_location(frame, where, text):
     candidate = Candidate.of("soft", (), dict, (), where, frame=frame)
     assert str(_location_of_candidate(Score(candidate, 40.0, 0.0, 1.0, None))) == text
 
@@ -405,7 +407,7 @@ def test_a_candidate_without_a_name_is_the_location_in_words(frame, where, text)
     ("frame", "text"),
     [("clock", "in all channels of the recording r 7"), ("condition", "in the recordings of r 7")],
 )
-def test_evidence_for_a_recording_or_a_visit_names_it(frame, text):
+def test_the_location_states_the_recording_or_visit_with_the_evidence(frame, text):
     assert str(Location(frame, "r 7", 40.0)) == text
 
 
@@ -418,7 +420,7 @@ def test_a_position_at_several_possible_supports_is_stated_with_its_interval(err
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e3])
-def test_what_a_prediction_loses_does_not_depend_on_the_unit_of_a_recording(unit):
+def test_the_loss_of_a_prediction_does_not_depend_on_the_unit_of_a_recording(unit):
     """One recording halves its residual, the other gains a tenth: in errors squared -0.75 and +0.21."""
     e, y = np.random.default_rng(4).standard_normal((2, 400))
     pair = [Observation("a", "a", y, 1.0), Observation("b", "b", unit * y, unit)]

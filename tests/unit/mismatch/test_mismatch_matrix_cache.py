@@ -1,4 +1,4 @@
-"""Matrices filled into a skeleton are those assembled in full."""
+"""Matrices from a stored skeleton equal those of a full assembly."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -28,9 +28,9 @@ TERMS = [
 
 
 @pytest.mark.parametrize("terms", TERMS, ids=lambda terms: "+".join(t.name for t in terms) or "none")
-def test_a_filled_skeleton_is_the_assembled_track(terms):
+def test_matrices_from_a_skeleton_equal_the_assembled_ones(terms):
     rng, track = np.random.default_rng(1), uniform_track(24.0)
-    for _ in range(2):  # the second time the skeleton is known
+    for _ in range(2):  # the second time the skeleton is stored
         n = track.support.size
         other = track.with_(
             pad_stiffness=track.pad_stiffness * np.exp(0.1 * rng.normal(size=n)),
@@ -44,8 +44,8 @@ def test_a_filled_skeleton_is_the_assembled_track(terms):
             assert b == pytest.approx(a, rel=1e-9, abs=1e-9 * np.abs(a).max())
 
 
-def test_a_skeleton_does_not_know_which_track_came_first():
-    """Bit for bit: an interrupted diagnosis asks for the same tracks in another order."""
+def test_matrices_do_not_depend_on_the_track_that_made_the_skeleton():
+    """Bit for bit, since an interrupted diagnosis needs the same tracks in another order."""
     rng, track = np.random.default_rng(4), uniform_track(24.0)
     n = track.support.size
     one, other = (track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.3 * rng.normal(size=n))) for _ in range(2))
@@ -58,8 +58,8 @@ def test_a_skeleton_does_not_know_which_track_came_first():
 
 
 @pytest.mark.parametrize("terms", [(), (physics.HeelSupport(22, 23, 0.3),)], ids=["none", "heel"])
-def test_tracks_that_differ_in_chairs_and_toe_share_a_skeleton_and_are_the_assembled_ones(terms):
-    """The toe lies between the supports at 6.6 and 7.2 m: within a tenth of a bay it would be on one of them."""
+def test_tracks_that_differ_in_chairs_and_toe_share_a_skeleton(terms):
+    """The toe is between the supports at 6.6 and 7.2 m; nearer than a tenth of a bay it would be on a support."""
     track = uniform_track(24.0)
     matrix_cache._templates.clear()
     for toe, stiffness, damping in ((6.7, 3e8, 3e4), (6.73, 2e8, 5e4), (6.7, 2e8, 5e4)):
@@ -74,8 +74,8 @@ def test_tracks_that_differ_in_chairs_and_toe_share_a_skeleton_and_are_the_assem
 
 
 @pytest.mark.parametrize("first", [0, 1, 2, 3])
-def test_blades_with_the_same_nodes_that_differ_in_heel_rail_or_direction_are_the_assembled_ones(first):
-    """Each after each other one, so that no matrices of one blade are taken for those of another."""
+def test_blades_with_equal_nodes_and_other_heel_rail_or_direction_are_distinguished(first):
+    """In all orders: matrices of one blade must not be used for another."""
     track = uniform_track(24.0)
     light = replace(track.rail, mass=0.7 * track.rail.mass)
     ends = (6.6, 13.2, 18.0, track.rail), (6.6, 10.2, 18.0, track.rail), (18.0, 13.2, 6.6, track.rail)
@@ -93,7 +93,7 @@ PAIR = SimpleNamespace(test=SimpleNamespace(place=10.7), seat=("S", 11.0))
 
 
 def sensitivity_of(model, seat):
-    """Of two impacts and a sensor that moved, not all of them paired, so that a pair taken for another shows."""
+    """Of two impacts and a shifted sensor, not all of them paired, to detect confused pairs."""
     first, second = ("S", 8.0), ("S", 11.0)
     pairs = (9.1, first), (10.7, first), (10.7, second)
     zone = SimpleNamespace(first=18, last=19, castings=castings_of(model.track, 9.95, 11.4))
@@ -112,7 +112,7 @@ FOLLOWING = [
 
 
 @pytest.mark.parametrize("term", FOLLOWING, ids=lambda term: repr(term)[:30])
-def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
+def test_derivatives_by_supports_include_terms_that_depend_on_them(term):
     """Against differences of the receptance: a free sleeper's ballast, a share of soft ballast, a pad's branch."""
     rng, track = np.random.default_rng(2), uniform_track(24.0)
     own = {o.field: np.exp(0.2 * rng.normal(size=track.support.size)) for o in SUPPORT_PARAMETERS}
@@ -134,9 +134,9 @@ def test_derivatives_by_supports_know_what_follows_them_in_a_term(term):
 
 
 @pytest.mark.parametrize("name", ["bending_stiffness", "shear_stiffness"])
-def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
-    """Closed form of the elements' two modes against differences of full solutions, to 1.5 %: what their consistent
-    mass hangs on the share of shear; impact and sensor apart, supports uneven."""
+def test_the_derivative_of_the_rail_is_that_of_a_slightly_stiffer_rail(name):
+    """Closed form by two modes of each element against differences of full solutions, to 1.5 %: the consistent mass
+    depends on the share of shear. Impact and sensor at different positions, supports uneven."""
     rng, track = np.random.default_rng(3), uniform_track(24.0)
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
 
@@ -152,10 +152,10 @@ def test_the_rails_derivative_is_that_of_a_slightly_stiffer_rail(name):
 
 
 @pytest.mark.parametrize("name", ["bending_stiffness", "mass"])
-def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
-    """Of every piece of a casting of 3 m whose ends lie within elements, and of what lies half a bay beyond them:
-    differences of full solutions; 0.2 % are met. A casting beyond the zone has no pieces; where a term puts another
-    rail a piece changes nothing."""
+def test_the_derivative_of_a_casting_is_that_of_a_slightly_changed_one(name):
+    """For every piece of a casting of 3 m whose ends lie within elements, and for half a bay beyond the ends:
+    differences of full solutions; the error is 0.2 %. A casting beyond the zone has no pieces; where a term has another
+    rail a piece has no effect."""
     rng, track = np.random.default_rng(4), uniform_track(24.0)
     track = track.with_(pad_stiffness=track.pad_stiffness * np.exp(0.2 * rng.normal(size=track.support.size)))
     cast = replace(track.rail, bending_stiffness=1.8 * track.rail.bending_stiffness, mass=2.5 * track.rail.mass)
@@ -178,9 +178,9 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_other_one(name):
 
 
 @pytest.mark.parametrize("cast", [False, True])
-def test_the_shear_of_the_file_is_a_share_of_a_rail_that_a_term_softens(cast):
-    """Derivative by the file's shear stiffness, with which that of castings goes, beside a term of as much flexibility
-    again, against differences."""
+def test_the_derivative_by_shear_is_a_share_for_a_rail_that_a_term_softens(cast):
+    """Derivative by the shear stiffness of the file, with that of castings, beside a term of equal flexibility, against
+    differences."""
     track, term = uniform_track(24.0), (physics.RailShear(4.0),)
     rail = track.rail
     heavy = replace(rail, mass=2.5 * rail.mass, shear_stiffness=2.5 * rail.shear_stiffness)

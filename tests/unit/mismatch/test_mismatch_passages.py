@@ -1,4 +1,4 @@
-"""Passages: columns against the simulation, a flat found in the residual, our own numerics."""
+"""Passages: columns against the simulation, a flat in the residual, and numerical errors."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -42,8 +42,8 @@ def intact(campaign):
 
 
 def test_the_column_of_a_linear_channel_is_what_the_case_predicts(intact):
-    """Of every start of every such effect, once beside a gain of the same channel; what is left is the end of the
-    record, at which the case cuts the signal between channel and band."""
+    """For every start of every such effect, once beside a gain of the same channel. The error is that of the end of the
+    record, where the case cuts the signal between channel and band."""
     case, values = intact
     (o,) = (o for o in case.observations if o.name == "heavy 2")
     chosen = [(c, k) for c in case.candidates if c.where.get("sensor") == "S3" for k in range(len(c.starts))]
@@ -60,7 +60,7 @@ def test_the_column_of_a_linear_channel_is_what_the_case_predicts(intact):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wavelength", [0.9, 0.5])
-def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(intact, wavelength):
+def test_the_derivative_by_a_wave_of_the_rail_has_the_direction_of_the_simulated_change(intact, wavelength):
     case, values = intact
     name = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - wavelength)))]
     index = [n.name for n in case.nuisances].index(name)
@@ -73,9 +73,9 @@ def test_the_derivative_by_a_wave_of_the_rail_points_where_the_simulation_goes(i
 
 
 @pytest.mark.slow
-def test_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(intact):
-    """The wheel rings on over supports of other stiffness. As if it stood at each node, the derivatives err by 0.28 at
-    50 Hz; with the sidebands of the moving wheel by 0.16, which the wheels beside it leave."""
+def test_the_derivative_by_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(intact):
+    """The wheel vibrates on over supports of other stiffness. Derivatives for a wheel at rest at each node err by 0.28
+    at 50 Hz; with the sidebands of the moving wheel by 0.16, because of its neighbouring wheels."""
     case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     waves, (before,) = case.predictor.waves, case.predict(values, (), [seen])
@@ -98,8 +98,8 @@ def test_a_wave_near_the_resonance_of_the_wheel_is_as_simulated(intact):
         physics.UnsprungMass(2.5, "heavy"),
     ],
 )
-def test_derivatives_of_passages_are_those_beside_the_term(intact, term):
-    """A wave of the rail and a pad, seen by S3 with the position, time and gain of the term, pressed by such wheels."""
+def test_derivatives_of_passages_include_the_terms(intact, term):
+    """A wave of the rail and a pad, in S3 with position, time and gain of the term, under the wheels of the term."""
     case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     wave = case.predictor.waves.names[2 * int(np.argmin(np.abs(case.predictor.waves.lengths - 0.7)))]
@@ -116,10 +116,10 @@ def test_derivatives_of_passages_are_those_beside_the_term(intact, term):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hangs", [False, True])
-def test_a_wave_has_the_simulated_level_where_supports_differ(intact, hangs):
-    """Waves of 50 to 75 Hz, whitened as the fit sees it: a wheel presses by the rail that it meets, and a sleeper that
-    hangs gives way. 0.93 and 14 % are met; with the rail of the middle alone it is a third less, with the hanging
-    sleeper on its bed a sixth."""
+def test_the_derivative_by_a_wave_has_the_simulated_level_on_uneven_supports(intact, hangs):
+    """Waves of 50 to 75 Hz, whitened as in the fit. The force of a wheel depends on the rail under it, and a hanging
+    sleeper gives way. Met are 0.93 and 14 %; with the rail of the middle alone the level is a third lower, with the
+    hanging sleeper on its ballast a sixth."""
     case, values = intact
     middle = int(np.argmin(np.abs(case.predictor.track().support - 24.0)))
     term = (physics.HangingSleeper(middle, 1.5e-3, 0.05),) if hangs else ()
@@ -149,9 +149,9 @@ def test_a_wave_has_the_simulated_level_where_supports_differ(intact, hangs):
     ],
 )
 def test_derivatives_by_supports_are_those_of_the_simulation(intact, name, cosine, size):
-    """Whitened, against a difference of 0.01. Stiffness and ballast damping of all supports are simulated. A mass
-    presses by the second derivative of the motion at 1.8 kHz, and a wheel feels it as at rest: it says which way. The
-    dampers of single supports had no derivative at all, and fits of a crossing stopped 6 nats short."""
+    """Whitened, against a difference of 0.01. Derivatives by stiffness and ballast damping of all supports are
+    simulated. A mass acts by the second derivative of the motion at 1.8 kHz, for a wheel at rest: only the direction is
+    right. Without derivatives by dampers of single supports, fits of a crossing ended 6 nats too low."""
     case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     before = case.predict(values, (), [seen])[0]
@@ -167,8 +167,8 @@ def test_derivatives_by_supports_are_those_of_the_simulation(intact, name, cosin
     ("name", "step", "error"), [("speed", 2e-3, 0.12), ("load", 1e-4, 0.03), ("wheels", 1e-4, 0.03)]
 )
 def test_derivatives_by_a_train_are_those_of_the_simulation(intact, name, step, error):
-    """Against central differences. That by the speed is a stretch of time; differences below 0.001 have the grid of the
-    simulation in them, a third of their size."""
+    """Against central differences. The derivative by the speed is a scale of time. Differences below 0.001 contain the
+    grid of the simulation, a third of their size."""
     case, values = intact
     (seen,) = (o for o in case.observations if o.name == "heavy 2")
     name = "wheels_heavy" if name == "wheels" else f"{name}@heavy 2"
@@ -182,7 +182,7 @@ def test_derivatives_by_a_train_are_those_of_the_simulation(intact, name, step, 
 
 
 @pytest.mark.slow
-def test_a_flat_is_found_on_its_wheel_with_the_position_where_it_meets_the_rail(plan):
+def test_a_flat_is_found_on_its_wheel_with_its_angle(plan):
     flat = physics.WheelFlat(2, 0.07, 0.43, 1.1, "heavy")
     case = TrackCase(measured_campaign(plan, (flat,), 7))
     found = flat_candidates(case, fit_jointly(case, iterations=12))
@@ -195,14 +195,15 @@ def test_a_flat_is_found_on_its_wheel_with_the_position_where_it_meets_the_rail(
 
 
 @pytest.mark.slow
-def test_no_wheel_is_named_where_none_has_a_flat(plan, intact):
+def test_without_a_flat_no_wheel_is_named(plan, intact):
     case, _ = intact
     assert flat_candidates(case, fit_jointly(case, iterations=12)) == ()
 
 
 @pytest.mark.slow
-def test_too_coarse_a_step_is_answered_numerics_and_carries_no_name(plan):
-    """Gauss's scheme at 1.8 kHz folds what four elements per bay excite into the band, see docs/decisions."""
+def test_a_too_coarse_step_gives_the_answer_numerics_and_no_name(plan):
+    """With Gauss's scheme at 1.8 kHz the high modes of four elements per bay cause aliases in the band, see
+    docs/decisions."""
     one_passage = replace(plan, trains=plan.trains[-1:])
     case = TrackCase(measured_campaign(one_passage, (), 7), solver=Track1D(1800.0, "gauss", 4))
     found = diagnose(case)
@@ -224,7 +225,7 @@ def test_the_derivative_by_the_position_of_a_sensor_is_that_of_the_simulation(in
 
 
 @pytest.mark.parametrize("without_worst", [False, True])
-def test_all_lags_at_once_are_as_good_as_one_by_one(without_worst):
+def test_all_lags_together_give_the_results_of_single_lags(without_worst):
     """Correlations by transforms, of all sensors together, against sums of products for each sensor and lag."""
     rng = np.random.default_rng(3)
     low = limit_band(rng.normal(size=(3, 900)), 1800.0, high=ALIGNMENT.band_end)
@@ -256,9 +257,9 @@ def heavy_passage(intact):
 
 
 @pytest.mark.parametrize("wrong", [0, 1])
-def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_does(heavy_passage, wrong):
-    """Its sign reversed, four sensors are alike by (3 - 1) / 4 at most; three of them as before. Two reversed, or the
-    wrong train, stay below what is asked for."""
+def test_a_passage_with_one_wrong_sensor_is_used_and_one_of_a_wrong_train_is_not(heavy_passage, wrong):
+    """With one reversed sign the correlation over four sensors is (3 - 1) / 4 at most; over the other three it is as
+    before. With two reversed signs, or the wrong train, it is below the limit."""
     case, passage, sensors, signals, light = heavy_passage
     reference, speed, _ = align(passage, low_pass(passage.recording, sensors), signals, case.predictor.solver.rate)
     rows = [passage.recording.index(s.name) for s in sensors]
@@ -281,9 +282,9 @@ def test_one_sensor_that_disagrees_does_not_cost_the_passage_but_a_wrong_train_d
     )
 
 
-def test_impacts_many_times_as_strong_as_any_axle_do_not_hide_which_train_it_is(heavy_passage):
-    """Three of eight times the largest acceleration, 20 ms long and 160 ms apart: what was recorded is hardly like
-    itself with them, and of a wrong train they make none."""
+def test_impacts_much_stronger_than_any_axle_do_not_prevent_the_recognition_of_the_train(heavy_passage):
+    """Three impacts of eight times the largest acceleration, 20 ms long and 160 ms apart. The correlation with and
+    without them is low. The right train is still accepted and the wrong one is not."""
     case, passage, sensors, signals, light = heavy_passage
     quiet = low_pass(passage.recording, sensors)
     reference = align(passage, quiet, signals, case.predictor.solver.rate)[0]
@@ -307,9 +308,9 @@ def power(case, train):
 
 
 @pytest.mark.slow
-def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(intact):
-    """The prior of roughness knows the wheels' mass: with twice the mass P2 comes down, by 1 / sqrt 2 where the rail is
-    a spring, and what roughness does below 60 Hz grows; the other train's errors stay what they were."""
+def test_errors_of_a_passage_are_those_of_wheels_with_the_fitted_mass(intact):
+    """The prior of roughness depends on the mass of wheels. Twice the mass lowers the P2 frequency, by 1 / sqrt 2 if
+    the rail is a spring, and raises the effect of roughness below 60 Hz; the errors of the other train stay."""
     case, values = intact
     fit = fit_jointly(case, values=values, iterations=1)
     assert case.with_updated_errors(fit) is case
@@ -325,9 +326,9 @@ def test_errors_of_a_passage_are_those_of_wheels_as_heavy_as_the_fit_has_them(in
 
 
 @pytest.mark.slow
-def test_passages_roll_on_the_rail_that_the_fit_has(intact):
-    """Impacts that an effect had bent gave the rail; with the effect in the model it is another. Passages, and
-    errors of all of them, are then those of a case that was made with that rail, and impacts are as they were."""
+def test_passages_are_simulated_on_the_fitted_rail(intact):
+    """The rail was calibrated by impacts with an effect; with the effect in the model the rail differs. Passages and
+    their errors are then those of a case with the new rail, and impacts stay as they were."""
     case, values = intact
     fit = fit_jointly(case, values=values, iterations=1)
     bent = {name: at - 0.1 * (name == "rail_shear") for name, at in case.predictor.rail.items()}
@@ -344,8 +345,8 @@ def test_passages_roll_on_the_rail_that_the_fit_has(intact):
         assert (again is old) is (old.name in case.frf_pairs)
 
 
-def test_a_train_that_is_unlike_its_type_is_reported_and_localized(campaign):
-    """The heavy train came with other wheelsets than its file has: none of its passages is used, nor passed over."""
+def test_a_train_that_differs_from_its_type_is_reported_and_localized(campaign):
+    """The heavy train has other wheelsets than its file: none of its passages is used, and this is reported."""
     other = {p.train: p.vehicle for p in campaign.passages}
     swapped = [replace(p, vehicle=other["light"]) if p.train == "heavy" else p for p in campaign.passages]
     case = TrackCase(replace(campaign, passages=tuple(swapped)))
@@ -362,7 +363,9 @@ def test_a_train_that_is_unlike_its_type_is_reported_and_localized(campaign):
     where = locate(case, None, cause=verdict.cause)
     assert where.frame == "train" and where.train == "heavy"
     one = [p for p in campaign.passages if p.train == "light"] + [p for p in swapped if p.train == "heavy"][:1]
-    assert TrackCase(replace(campaign, passages=tuple(one))).mismatched_trains == ()  # one passage may be another train
+    assert (
+        TrackCase(replace(campaign, passages=tuple(one))).mismatched_trains == ()
+    )  # a single passage may be that of another train
     intact = [replace(p, name=f"{p.name} again") for p in campaign.passages if p.train == "heavy"][:1]
     most = TrackCase(replace(campaign, passages=(*swapped, *intact)))
     assert most.mismatched_trains == (
@@ -370,7 +373,7 @@ def test_a_train_that_is_unlike_its_type_is_reported_and_localized(campaign):
     )  # a polygon that lifts its wheels shows at some speeds and not at others
 
 
-def test_trains_none_of_which_is_like_its_simulation_are_no_sign_of_an_intact_turnout(campaign):
+def test_without_any_train_like_its_simulation_the_answer_is_not_none(campaign):
     """A dip of a millimetre, or wrong files of all vehicles: hammer tests alone agree, and no train was compared."""
     light, heavy = (next(p.vehicle for p in campaign.passages if p.train == t) for t in ("light", "heavy"))
     swapped = [replace(p, vehicle=heavy if p.train == "light" else light) for p in campaign.passages]
@@ -379,13 +382,13 @@ def test_trains_none_of_which_is_like_its_simulation_are_no_sign_of_an_intact_tu
     diagnosis = diagnose(case)
     assert diagnosis.verdict.answer == "unknown" and "no_train_matches" in diagnosis.verdict.trail
     assert diagnosis.where is None and sentence(diagnosis).startswith("No passage resembles the simulation")
-    assert locate(case, None, cause="all trains") is None  # whatever the hammer tests leave
+    assert locate(case, None, cause="all trains") is None  # with any residual of the hammer tests
     single = TrackCase(replace(campaign, passages=tuple(swapped[:1])))
     assert not single.aligned_passages and not single.no_train_matches  # it may be another train
 
 
-def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(intact, monkeypatch):
-    """Recordings that end too early, or have too few samples, are no word on the wheels that came: no alarm."""
+def test_a_train_that_cannot_be_compared_is_not_reported_as_different(intact, monkeypatch):
+    """Recordings that end too early or have too few samples give no information on the wheels: no alarm."""
     plain = passage_observation.observe_passage
 
     def cut_short(passage, *more):
@@ -400,8 +403,9 @@ def test_a_train_that_could_not_be_looked_at_is_no_train_of_another_file(intact,
 
 
 @pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
-def test_a_wheel_with_impacts_nearly_as_strong_is_sized_as_well(intact, monkeypatch, behind, offered):
-    """What impacts cannot tell apart the band may: a wheel of three rough ones came before the one with the flat."""
+def test_a_wheel_with_nearly_as_strong_impacts_is_a_candidate_as_well(intact, monkeypatch, behind, offered):
+    """The fitted band may distinguish wheels that impacts do not: one of three rough wheels preceded the one with the
+    flat."""
     case, _ = intact
     (made, *_), radius = case.aligned_passages.values(), 0.46
     train, phases = made.conditions["train"], ((made.name, 0.5),)
@@ -415,5 +419,5 @@ def test_a_wheel_with_impacts_nearly_as_strong_is_sized_as_well(intact, monkeypa
     assert [c.where["axle"] for c in found] == offered
     heavy, flat = (SimpleNamespace(where={"train": train, **more}) for more in ({}, {"axle": 3}))
     beside = flat_candidates(case, SimpleNamespace(candidates=(heavy,)))
-    assert [c.where["axle"] for c in beside] == offered  # all wheels heavy is no reason against a flat on one
+    assert [c.where["axle"] for c in beside] == offered  # heavy wheels do not exclude a flat on one of them
     assert flat_candidates(case, SimpleNamespace(candidates=(flat,))) == ()
