@@ -1,4 +1,4 @@
-"""Fits to hammer tests alone with an effect more are never worse than without it, in whatever basin they start."""
+"""Fits to hammer tests with a further effect are never worse than without it, from any start."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,8 @@ SIZE = (Parameter("size", "-", 0.0, (-1.0, 1.0), "amount", "test"),)
 
 
 class TwoBasins(Case):
-    """A number is 1 or -1, by its square; a second sample says which, within ``error``. An effect moves a third."""
+    """A number is 1 or -1, by its square; a second sample shows which, within ``error``. An effect changes a third
+    one."""
 
     nuisances = (Nuisance("x", "-", 0.3, 3.0),)
 
@@ -42,7 +43,7 @@ def base_fit(case, x):
     return fit_jointly(case, values={"x": x}, iterations=60)
 
 
-def test_a_fit_with_an_effect_is_not_left_in_a_basin_worse_than_none():
+def test_a_fit_with_an_effect_does_not_end_in_a_worse_minimum_than_without():
     """Without a second start it ends at x = -1, where b alone costs more than c gains by the effect."""
     step = prescreen_from(0.8)
     effect = Candidate.of("effect", SIZE, lambda p: p["size"], ((0.5,),))
@@ -54,8 +55,9 @@ def test_a_fit_with_an_effect_is_not_left_in_a_basin_worse_than_none():
     assert best.cost < step.base.cost
 
 
-def test_what_the_base_gains_from_the_nuisances_of_an_effect_is_no_evidence_for_it():
-    """The base in the worse basin; that of the effect leads it to the better one, as far as that is better."""
+def test_a_gain_of_the_base_fit_from_the_nuisances_of_an_effect_is_no_evidence():
+    """The base fit is in the worse minimum. The nuisances of the effect lead it to the better one, and that gain is no
+    evidence."""
     step = prescreen_from(-0.8)
     better, beside = base_fit(step.hammer_case, 0.8), SimpleNamespace(values={"x": 1.0})
     found = step.base_shortfall(beside)

@@ -1,4 +1,4 @@
-"""Every numeric constant of the case of a turnout says its unit, its reason and its source."""
+"""Every numeric constant of the case of a turnout states its unit, its reason and its source."""
 
 import ast
 import re

@@ -1,4 +1,4 @@
-"""Rail as rough as intact rail is, beyond the stretch of free waves, is no mismatch where the track carries far."""
+"""Usual roughness beyond the stretch of free waves is no mismatch on track with a low decay rate."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from turnout.simulate.roughness import level
 
 @pytest.fixture(scope="module")
 def lightly_damped():
-    """A case, values of a track that carries far, and a heavy train at 144 km/h with the errors that it has there."""
+    """A case, values of a track with a low decay rate, and a heavy train at 144 km/h with its errors there."""
     case = TrackCase(intact_campaign((24.0,), 7))
     values = {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
     values |= {"ballast_damping": -1.6, "pad_damping": -0.7}
@@ -27,9 +27,9 @@ def lightly_damped():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("behind", "wavelength"), [(False, 0.36), (True, 0.3)])
-def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lightly_damped, behind, wavelength):
-    """All that ISO 3095 allows in the third octave, in one line, is one standard deviation of what the errors hold: no
-    sample may stand out by two. Without them some do by more than three, with a mean square near the control level.
+def test_the_errors_of_a_passage_include_rough_rail_beyond_the_free_waves(lightly_damped, behind, wavelength):
+    """The whole limit of ISO 3095 in a third octave, as one line, is one standard deviation of the errors: no sample
+    may exceed two. Without these errors some exceed three, with a mean square near the control level.
     """
     case, values, seen = lightly_damped
     allowed = np.sqrt(2.0) * 1e-6 * 10.0 ** (float(level(np.array([wavelength]), 0.0)[0]) / 20.0)
@@ -42,7 +42,7 @@ def test_rough_rail_beyond_the_free_waves_is_an_error_that_the_passage_knows(lig
     assert np.max(squares[1]) < 4.0
 
 
-def test_a_mass_on_the_rail_is_tried_over_sleepers_and_in_the_middle_between_them(lightly_damped):
+def test_candidates_of_a_mass_on_the_rail_are_over_sleepers_and_in_the_middle_between_them(lightly_damped):
     case, _, _ = lightly_damped
     masses = [c for c in case.candidates if c.family == "attached_resonator"]
     over = sorted(c.position for c in masses if "sleeper" in c.where)
@@ -56,7 +56,7 @@ def test_a_mass_on_the_rail_is_tried_over_sleepers_and_in_the_middle_between_the
 
 
 def test_no_effect_is_tested_more_than_a_bay_beyond_the_measured_range(lightly_damped):
-    """What lies farther out cannot be distinguished from all that lies beyond it; it has values, no names."""
+    """Effects farther out cannot be distinguished from each other; they have values and no names."""
     case, _, _ = lightly_damped
     measured = case.campaign.positions()
     asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
@@ -77,10 +77,10 @@ def slow_train():
 
 @pytest.mark.parametrize("wavelength", [0.293, 0.286])
 def test_ordinary_waves_beyond_the_band_leave_no_evidence_for_other_effects(slow_train, wavelength):
-    """A wave of one prior standard deviation costs a joint fit its own prior penalty at most, 1 in chi-squared.
+    """A wave of one prior standard deviation raises the cost of a joint fit by its prior penalty at most, 1.
 
-    Its frequency is beyond the band. But its line is as wide as the time in which a wheel passes a sensor is short, so
-    that a part is inside. Where no free wave and no wave of a wheel is so short it costs 8: evidence for any sharp dip.
+    Its frequency is beyond the band, but its line is wide, since a wheel passes a sensor in a short time. So a part is
+    within the band. Without free waves of this length the cost rises by 8, which would be evidence for a sharp dip.
     """
     case, values, seen = slow_train
     change = _whitened_change(slow_train, wavelength)
@@ -90,7 +90,7 @@ def test_ordinary_waves_beyond_the_band_leave_no_evidence_for_other_effects(slow
     assert change @ change - along @ np.linalg.solve(columns.T @ columns + np.eye(along.size), along) < 1.0
 
 
-def test_the_waves_next_to_the_shortest_free_one_do_not_show(slow_train):
+def test_waves_just_below_the_shortest_free_one_have_no_visible_effect(slow_train):
     """The first harmonic that is not free adds less than a tenth in chi-squared; from 0.3 m on it would add 12."""
     waves = slow_train[0].predictor.waves
     change = _whitened_change(slow_train, waves.length / (round(waves.length / waves.lengths.min()) + 1))
@@ -98,7 +98,7 @@ def test_the_waves_next_to_the_shortest_free_one_do_not_show(slow_train):
 
 
 @pytest.mark.parametrize(("centre", "offset"), [(0.8, 0.0), (0.4, 6.0)])
-def test_the_waves_of_a_third_octave_have_together_the_power_of_the_limit_curve(centre, offset):
+def test_the_waves_of_a_third_octave_have_the_power_of_the_limit_curve(centre, offset):
     """ISO 3095: 10^(L / 10) µm², here the mean over the octave. Cosine and sine of one standard deviation each are a
     wave of this variance. 0.5 %: whole waves in a period of 2 km, and the width of the band for its logarithm."""
     length, edge = 2000.0, 2.0 ** (1 / 6)
@@ -110,7 +110,7 @@ def test_the_waves_of_a_third_octave_have_together_the_power_of_the_limit_curve(
 
 
 def _whitened_change(passage, wavelength):
-    """(n,) what a wave of one prior standard deviation all along the free waves changes in a passage, simulated."""
+    """(n,) simulated change of a passage by a wave of one prior standard deviation along all free waves."""
     case, values, seen = passage
     waves = case.predictor.waves
     size = float(amplitude_sd(np.array([wavelength]), waves.length, 0.0)[0])

@@ -1,4 +1,4 @@
-"""Reasons of a diagnosis are for people who have never heard of the engine: no private word, every unit explained."""
+"""Reasons of a diagnosis are for readers who do not know the engine: words of the field, and every unit explained."""
 
 import re
 
@@ -11,6 +11,6 @@ PRIVATE = ("excess", "control level", "nats", "threshold", "candidate explains",
 
 @pytest.mark.parametrize("rule", [r for r in RULES if r.reason], ids=lambda r: r.name)
 def test_a_reason_uses_words_of_the_field(rule):
-    """Evidence stands in a reason through ``evidence_in_words``, which gives the odds that it means."""
+    """A reason states evidence by ``evidence_in_words``, which adds the odds."""
     words = re.sub(r"{[^}]*}", "0", rule.reason)
     assert not [p for p in PRIVATE if p in words.replace("in excess of the intact state", "")]

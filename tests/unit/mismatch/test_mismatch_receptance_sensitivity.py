@@ -20,7 +20,7 @@ J = 27
 
 @pytest.fixture(scope="module")
 def somewhere():
-    """(case, nuisances off their means, unlike at every support; the rail where models are made)."""
+    """(case, nuisances that differ from their means and between supports); the rail is that of the models."""
     small = small_plan((25.0,), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
     plan = replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
@@ -30,7 +30,7 @@ def somewhere():
 
 
 def off(case, values, old, new):
-    """How far the step from ``old`` is from the one predicted, over its size."""
+    """Relative error of the predicted step from ``old`` to ``new``."""
     before = case.predict(values, (old,), case.observations)
     short = np.concatenate(case.predict_near(values, (old,), (new,), case.observations, before))
     exact, before = np.concatenate(case.predict(values, (new,), case.observations)), np.concatenate(before)
@@ -51,7 +51,7 @@ def off(case, values, old, new):
     ],
 )
 def test_a_step_of_a_parameter_is_right_to_first_order(somewhere, term):
-    """A tangent errs by the square of the step: over its size a quarter of the step leaves a quarter of the error."""
+    """The error of a tangent is of second order: a quarter of the step has a quarter of the relative error."""
     whole, quarter = (off(*somewhere, term(0.0), term(s)) for s in (1.0, 0.25))
     assert quarter < 0.05
     assert quarter == pytest.approx(whole / 4.0, rel=0.1)
@@ -66,12 +66,12 @@ def test_a_step_of_a_parameter_is_right_to_first_order(somewhere, term):
         (physics.DryFriction(J, 0.0), physics.DryFriction(J, 100.0)),
     ],
 )
-def test_what_is_no_change_of_links_is_predicted(somewhere, old, new):
+def test_a_step_that_is_no_change_of_links_is_predicted_exactly(somewhere, old, new):
     """Another rail, a channel, a link that was not there."""
     assert off(*somewhere, old, new) < 1e-9
 
 
-def test_links_that_are_others_are_no_small_step(somewhere):
+def test_a_change_to_other_links_is_no_small_step(somewhere):
     case, values = somewhere
     model = case.predictor.pair_sensitivity(
         values, (physics.LocalBallast(J, 0.5),), next(iter(case.frf_pairs.values()))
@@ -82,8 +82,8 @@ def test_links_that_are_others_are_no_small_step(somewhere):
     assert ends.shape[0] == 0 and impedance.shape == (0, receptance_observation.LINES.size)
 
 
-def test_tests_of_several_days_share_what_does_not_depend_on_the_day(somewhere):
-    """The same track and the same pairs, unless its pads are softer on the warmer day: they are then solved twice."""
+def test_tests_of_several_days_share_solutions_that_do_not_depend_on_the_day(somewhere):
+    """The track and the pairs are the same, unless pads are softer on the warmer day, which needs two solutions."""
     case, values = somewhere
     pairs = {n: replace(p, conditions={"rail_temperature": 5.0}) for n, p in case.frf_pairs.items()}
     pairs |= {f"{n} later": replace(p, conditions={"rail_temperature": 25.0}) for n, p in case.frf_pairs.items()}
@@ -110,9 +110,9 @@ def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
             assert np.linalg.norm(found - (after - before)) < 1e-9 * np.linalg.norm(after - before)
 
 
-def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere):
-    """A gain, a lag, a corner: exact. Another seat: but for the rail's correction there, which is that of the old seat;
-    with the rail off its grid by two hundredths it errs by less than that share of the change."""
+def test_the_effect_of_a_channel_on_a_receptance_is_that_of_the_case(somewhere):
+    """A gain, a lag, a corner frequency: exact. Another seat: exact except for the correction of the rail, which is
+    that of the old seat. With the rail two hundredths from its grid the error is below that share of the change."""
     case, values = somewhere
     values = values | {"rail_shear": 0.02}
     predicted = case.predict(values, (), case.observations)
@@ -128,7 +128,7 @@ def test_what_a_channel_does_to_a_receptance_is_what_the_case_predicts(somewhere
 
 
 def _compared(case, fit, observation, old, chosen):
-    """Candidates on the channel of an observation, and the columns that they are given."""
+    """Candidates on the channel of an observation, and their columns."""
     found = _pair_channel_changes(case, fit, observation, old, chosen)
     return [c for c, k in chosen if (c.key, k) in found], found.values()
 
@@ -161,7 +161,7 @@ def test_pairs_of_different_lines_are_predicted_together_as_each_alone(somewhere
 
 
 @pytest.mark.parametrize("name", ["gain_S3", "rail_shear", f"pad_{J}", "ballast_damping"])
-def test_a_derivative_of_all_pairs_is_where_their_predictions_go(somewhere, name):
+def test_a_derivative_of_all_pairs_is_the_direction_of_their_predictions(somewhere, name):
     case, values = somewhere
     k, step = [n.name for n in case.nuisances].index(name), 1e-5
     before = case.predict(values, (), case.observations)
@@ -174,7 +174,8 @@ def test_a_derivative_of_all_pairs_is_where_their_predictions_go(somewhere, name
 
 
 def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
-    """The same channel at the same place, mounted otherwise in the second test: each pair is predicted as if alone."""
+    """The same channel at the same position has another mounting in the second test: each pair is predicted as if
+    alone."""
     case, values = somewhere
     first, second = [o for o in case.observations if ":S1" in o.name][:2]
     sleeper = replace(case.frf_pairs[second.name].sensor, mounting="sleeper")

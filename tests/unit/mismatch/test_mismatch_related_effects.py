@@ -1,4 +1,4 @@
-"""Effects of one part: refitted side by side, distinguished where they can be, compared only with their like."""
+"""Effects of one part: they are refitted together, distinguished if possible, and compared within their group."""
 
 from types import SimpleNamespace
 
@@ -38,14 +38,14 @@ def answer(*scores):
 
 
 @pytest.mark.parametrize("factor, said", [(0.05, "a_or_b"), (0.12, "a_or_b"), (0.40, "named")])
-def test_ballast_that_carries_nothing_may_be_a_gap_that_no_train_closes(factor, said):
+def test_ballast_without_reaction_may_be_a_gap_that_no_train_closes(factor, said):
     ballast = score(candidate("local_ballast", limit_form="hanging_sleeper"), 600.0, factor, 0.1)
     verdict = answer(ballast, score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4))
     assert verdict.answer == said
     assert verdict.names[0] == "local_ballast"
 
 
-def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
+def test_a_gap_elsewhere_or_without_explanation_is_no_limit_form_of_ballast():
     ballast = score(candidate("local_ballast", limit_form="hanging_sleeper"), 600.0, 0.05, 0.1)
     elsewhere = score(candidate("hanging_sleeper", {"sleeper": 9, "place": 5.4}), 500.0, 2e-3, 2e-4)
     useless = score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4, explained=0.1)
@@ -57,9 +57,9 @@ def test_a_gap_elsewhere_or_one_that_explains_nothing_is_no_limit():
     "times, usual",
     [(share * THRESHOLDS.max_ordinary_spreads, abs(share) < 1.0) for share in (0.9, 1.1, -1.1)],
 )
-def test_a_support_is_odd_against_the_spread_of_its_like(times, usual):
-    """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2; pad 0 is its
-    own candidate; ballast is not its like, nor is what all pads have in common."""
+def test_a_support_is_unusual_against_the_spread_of_its_group(times, usual):
+    """Seven other pads have logarithms of mean 0.3 and variance 4e-2, each known to a variance of 9e-2. Pad 0 is the
+    candidate; ballast is no part of the group, nor is the common value of all pads."""
     values = 0.3 + 0.2 * np.sqrt(7.0 / 6.0) * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 0.0])
     names = ["pad_0", *(f"pad_{k + 1}" for k in range(7)), "ballast_3", "pad_stiffness"]
     nuisances = [Nuisance(n, "-", 0.0, 0.1, group="pad", index=k) for k, n in enumerate(names[:8])]
@@ -89,7 +89,7 @@ def test_effects_of_the_leading_parts_are_refitted_from_their_best_starts():
 
 @pytest.mark.parametrize("behind, said", [(0.9, "a_or_b"), (1.1, "named")])
 def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, said):
-    """13 nats and 8 are odds of 150 to 1 between the two, whatever either is worth against nothing."""
+    """13 nats and 8 are odds of 150 to 1 between the two, for any evidence against the base model."""
     settings = MismatchSettings()
     best = settings.threshold + 1.0
     rival = best - behind * settings.margin
@@ -100,8 +100,8 @@ def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, said)
 @pytest.mark.parametrize(
     "gain, excess, said", [(1.1, 0.9, "none"), (2.1, 0.9, "unknown"), (1.1, 1.2, "unknown"), (20.0, 0.5, "unknown")]
 )
-def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_explain(gain, excess, said):
-    """``gain`` in thresholds, ``excess`` over the control level: either by itself keeps the question open."""
+def test_a_weak_name_that_predicts_worse_has_the_answer_none_without_an_excess(gain, excess, said):
+    """``gain`` in thresholds, ``excess`` over the control level: either one alone gives the answer unknown."""
     settings = MismatchSettings()
     found = score(candidate("rail_shear", {}), gain * settings.threshold, 2.0, 0.1)
     assert judge([found], excess, settings, consistent=False).answer == said
@@ -117,8 +117,8 @@ def test_a_weak_name_that_predicts_worse_is_nothing_where_nothing_is_left_to_exp
         (10.0, -2.1, 0.5, "unknown"),
     ],
 )
-def test_a_name_that_one_condition_contradicts_is_none(gain, worst, excess, said):
-    """``gain`` and ``worst`` in thresholds: half of one is chance, a fifth of the gain is not."""
+def test_a_name_that_one_condition_contradicts_is_withdrawn(gain, worst, excess, said):
+    """``gain`` and ``worst`` in thresholds: a loss of half a threshold may be chance, a fifth of the gain is not."""
     settings = MismatchSettings()
     fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]), part=first)
     found = Score(candidate("rail_shear", {}), gain * settings.threshold, worst * settings.threshold, 1.0, fit)
@@ -136,21 +136,21 @@ def test_a_name_that_one_condition_contradicts_is_none(gain, worst, excess, said
     ],
 )
 @pytest.mark.parametrize("explained", [0.08, -0.03])
-def test_a_name_with_evidence_of_its_own_need_not_explain_what_the_fit_leaves(
+def test_a_name_with_separate_evidence_need_not_explain_the_residual_of_the_fit(
     aside, scanned, sounding, gain, said, explained
 ):
-    """Impacts that come once a turn are a flat's, though the waveform in the band, which takes the angle to the
-    millimetre, stays as it was: 30 nats less ln 20 are more than a threshold of 12, and 13 less ln 20 are not. A
-    channel's limit, or a line above the band, is no such evidence. A gain of less than 30 less ln 20, 27.004, means
-    that the fit has become worse: by more than a margin of 6, which its numbers cost, that speaks against it; the
-    strongest channel alone, whose level it may raise, does not."""
+    """Impacts once a turn are those of a flat, although the waveform in the band does not fit, which needs the angle to
+    the millimetre: 30 nats less ln 20 exceed the threshold of 12, and 13 less ln 20 do not. A limit of a channel or a
+    line above the band is no such evidence. A gain below 30 less ln 20, 27.004, means that the fit has become worse. A
+    loss of more than the margin of 6, the penalty of its numbers, contradicts the name; a higher level of the strongest
+    channel alone does not."""
     where = {"train": "railcar", "axle": 1}
     flat = candidate("wheel_flat", where, external_evidence=aside, n_scanned=scanned, evidence_suffices=sounding)
     verdict = answer(score(flat, gain, 0.08, 0.01, explained=explained))
     assert verdict.answer == said and f"{100 * explained:.0f} %" in verdict.reason
 
 
-def test_a_candidate_that_explains_too_little_does_not_lead_against_other_data():
+def test_a_candidate_that_explains_too_little_is_no_leader_against_other_data():
     """A gain in a sensor that a flat keeps above the control level: both are named, and tested together."""
     flat = candidate(
         "wheel_flat", {"train": "railcar", "axle": 1}, external_evidence=43.6, n_scanned=20, evidence_suffices=True
@@ -163,7 +163,7 @@ def test_a_candidate_that_explains_too_little_does_not_lead_against_other_data()
     assert answer(found[0]).answer == "unknown"
 
 
-def test_a_fit_that_was_made_is_a_better_start_than_a_column():
+def test_an_existing_fit_is_a_better_start_than_a_column():
     here, there = candidate("sensor_gain", {"sensor": "A1"}), candidate("sensor_gain", {"sensor": "A2"})
     column = Entry(90.0, here, np.array([0.85]), {})
     made = Entry(60.0, here, np.array([0.66]), {"gain_A1": 0.0})

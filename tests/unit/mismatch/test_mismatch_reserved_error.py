@@ -1,4 +1,4 @@
-"""The standard error of a held-out gain counts the recordings that were fitted: against the scatter of many draws."""
+"""The standard error of a held-out gain includes the scatter of the fitted recordings, against many draws."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ DELAY_SD = 0.5
 
 
 class Waves(Case):
-    """A running surface of twelve values, and an effect that shows in the fitted recordings alone.
+    """A running surface of twelve values, and an effect in the fitted recordings alone.
 
     ``between`` is the scatter of the surface from recording to recording, ``delays`` are values of each recording.
     """
@@ -56,8 +56,9 @@ def gain_with_errors(case):
 
 
 @pytest.mark.parametrize("delays", [False, True])
-def test_the_error_is_the_scatter_of_the_gain_when_all_recordings_are_drawn_anew(delays):
-    """120 draws tell a standard deviation to 6.5 %. The models as they are state six tenths of it."""
+def test_the_error_is_the_scatter_of_the_gain_over_new_draws_of_all_recordings(delays):
+    """120 draws determine a standard deviation to 6.5 %. With fixed models the stated error would be six tenths of
+    it."""
     rng = np.random.default_rng(5)
     gains, as_they_are, fitted = np.array([gain_with_errors(Waves(rng, delays=delays)) for _ in range(120)]).T
     total = np.hypot(as_they_are, fitted)
@@ -65,7 +66,7 @@ def test_the_error_is_the_scatter_of_the_gain_when_all_recordings_are_drawn_anew
     assert np.sqrt(np.mean(total**2)) == pytest.approx(np.std(gains), rel=0.35)
 
 
-def test_without_derivatives_or_with_too_few_recordings_nothing_is_added():
+def test_without_derivatives_or_with_too_few_recordings_no_error_is_added():
     case = Waves(np.random.default_rng(1))
     base = fit_jointly(case, iterations=30)
     fit = fit_jointly(case, (case.candidates[0],), np.array([0.5]), iterations=30)

@@ -1,4 +1,4 @@
-"""A family that promises a name is fitted again from the priors where its refit from the base fit gains none."""
+"""An effect with the predicted gain of a name is fitted from the priors if its refit from the base fit gains less."""
 
 from dataclasses import replace
 
@@ -46,20 +46,20 @@ class Imitated(Case):
 
 
 def ranked(monkeypatch, case, promises=(20.0, 0.0), fit=None):
-    """(base fit, scores by family) of tasks with these promises."""
+    """(base fit, scores by effect) of tasks with these predicted gains."""
     base = fit or fit_jointly(case, values={"stiffness": IMITATION})
     tasks = [RefitTask(c, np.array([0.1]), {}, p) for c, p in zip(case.candidates, promises)]
     monkeypatch.setattr(refit, "shortlist", lambda *a: tasks)
     return base, {s.family: s for s in _rank_families(Search.of(case), base, ())}
 
 
-def test_a_base_fit_that_imitates_the_effect_stays_there():
-    """The test is of no use otherwise."""
+def test_a_base_fit_that_imitates_the_effect_does_not_leave_that_minimum():
+    """The precondition of the other tests."""
     base = fit_jointly(Imitated(), values={"stiffness": IMITATION})
     assert base.values["stiffness"] == pytest.approx(IMITATION, abs=0.3)
 
 
-def test_a_promise_that_no_refit_keeps_begins_again_from_the_priors(monkeypatch):
+def test_a_predicted_gain_that_no_refit_reaches_causes_a_restart_from_the_priors(monkeypatch):
     _, scores = ranked(monkeypatch, Imitated())
     wave = scores["wave"]
     assert wave.estimates[0][0] == pytest.approx(1.0, abs=4.0 * wave.estimates[1][0])
@@ -67,21 +67,22 @@ def test_a_promise_that_no_refit_keeps_begins_again_from_the_priors(monkeypatch)
 
 
 @pytest.mark.parametrize("promise", [0.0, 11.0])
-def test_a_promise_below_a_name_does_not(monkeypatch, promise):
-    """Restarts cost many simulations; without any effect no promise comes near a name."""
+def test_a_predicted_gain_below_the_threshold_causes_no_restart(monkeypatch, promise):
+    """Restarts need many simulations; without any effect no predicted gain is near the threshold of a name."""
     _, scores = ranked(monkeypatch, Imitated(), (promise, 0.0))
     assert scores["wave"].fit.values["stiffness"] == pytest.approx(IMITATION, abs=0.3)
 
 
 def test_a_restart_that_gains_less_changes_nothing(monkeypatch):
-    """The wave that is not there promises much: its restart ends with the nuisance at 0 and the wave unexplained."""
+    """The absent wave has a large predicted gain: its restart ends with the nuisance at 0 and the wave unexplained."""
     base, before = ranked(monkeypatch, Imitated(), (0.0, 0.0))
     _, after = ranked(monkeypatch, Imitated(), (0.0, 20.0), base)
     assert after["other wave"].gain == before["other wave"].gain
 
 
-def test_a_restart_ends_where_it_does_not_lead_to_half_a_name(monkeypatch):
-    """The bar is below the cost of the fit without the effect, so a restart without a gain does not use all steps."""
+def test_a_restart_ends_if_it_does_not_lead_to_half_of_the_threshold(monkeypatch):
+    """The target is below the cost of the fit without the effect, so a restart without a gain does not use all
+    steps."""
     case, bars = Imitated(), []
     base, fit = fit_jointly(case, values={"stiffness": IMITATION}), Search.fit
     monkeypatch.setattr(Search, "fit", lambda self, *a, **k: bars.append(k.get("sought_cost")) or fit(self, *a, **k))
@@ -91,7 +92,7 @@ def test_a_restart_ends_where_it_does_not_lead_to_half_a_name(monkeypatch):
 
 
 @pytest.mark.parametrize(("family", "is_continued"), [("wave", True), ("other wave", False)])
-def test_only_a_restart_that_leads_to_a_gain_goes_on_to_convergence(monkeypatch, family, is_continued):
+def test_only_a_restart_with_a_gain_is_continued_to_convergence(monkeypatch, family, is_continued):
     case, continued = Imitated(), []
     base, converge = fit_jointly(case, values={"stiffness": IMITATION}), Search.converge
     monkeypatch.setattr(Search, "converge", lambda self, fit: continued.append(fit) or converge(self, fit))
@@ -100,7 +101,7 @@ def test_only_a_restart_that_leads_to_a_gain_goes_on_to_convergence(monkeypatch,
     assert bool(continued) == is_continued
 
 
-def test_none_begins_again_where_another_effect_gains_a_name(monkeypatch):
+def test_there_is_no_restart_if_another_effect_reaches_the_threshold(monkeypatch):
     case, begun = Imitated(), []
     monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
     score_task = refit._score_task
@@ -113,8 +114,8 @@ def test_none_begins_again_where_another_effect_gains_a_name(monkeypatch):
     assert [t.candidate.family for t in begun] == ["wave"]
 
 
-def test_none_begins_again_beside_an_effect_or_in_a_small_case(monkeypatch):
-    """Beside another effect what is left is also an error in its shape; a small case starts everywhere."""
+def test_there_is_no_restart_beside_an_effect_or_in_a_small_case(monkeypatch):
+    """Beside another effect the residual may be an error of its shape; a small case tries all starts anyway."""
     begun = []
     monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
     case = Imitated()
@@ -124,16 +125,16 @@ def test_none_begins_again_beside_an_effect_or_in_a_small_case(monkeypatch):
     assert begun == []
 
 
-def test_rivals_begin_again_together(monkeypatch):
-    """Two effects that act alike: a name for one of them would be wrong where only that one began again."""
+def test_rivals_are_restarted_together(monkeypatch):
+    """Two effects with equal responses: if only one of them were restarted, its name would be wrong."""
     case = Imitated()
     case.candidates = (case.candidates[0], Candidate.of("twin", SIZE, lambda p: p, ((0.1,),), {}))
     _, scores = ranked(monkeypatch, case, (20.0, 15.0))
     assert scores["twin"].gain == pytest.approx(scores["wave"].gain, abs=0.5) and scores["twin"].gain > 10.0
 
 
-def test_a_promise_is_that_of_the_entry_which_was_chosen(monkeypatch):
-    """Another entry of the candidate, fitted to few recordings, gives the start, not the promise."""
+def test_the_predicted_gain_is_that_of_the_chosen_entry(monkeypatch):
+    """Another entry of the candidate, fitted to few recordings, gives the start and not the predicted gain."""
     case = Imitated()
     base, wave = fit_jointly(case, values={"stiffness": IMITATION}), case.candidates[0]
     entry = Entry(18.0, wave, np.array([0.1]), {})
@@ -142,8 +143,8 @@ def test_a_promise_is_that_of_the_entry_which_was_chosen(monkeypatch):
     assert task.promise == 18.0 and task.start == [0.7] and task.values == {"stiffness": 0.4}
 
 
-def test_the_best_of_those_that_begin_again_moves_along_the_track(monkeypatch):
-    """The others keep the sites that they promised for."""
+def test_the_best_restarted_effect_moves_along_the_track(monkeypatch):
+    """The others keep the sites of their predicted gains."""
     moved = []
     monkeypatch.setattr(refit, "_refine_leaders", lambda search, fit, scores: scores)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: moved.append(s.family) or s)

@@ -1,4 +1,4 @@
-"""A leader in the wrong valley is begun again where it costs least."""
+"""A leader in a wrong minimum is restarted at the start with the lowest cost."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ SHAPE = (
 
 
 class Turning(Case):
-    """A wave of two numbers that turns with both, four recordings, and a ramp that the base may bend for it."""
+    """A wave whose phase depends on two numbers, four recordings, and a ramp of the base model that can imitate it."""
 
     is_large = True
 
@@ -49,8 +49,8 @@ def scored(case, base, start, ramp):
     return score_of(Search(case), base, found, case.candidates[0])
 
 
-def test_a_leader_in_the_wrong_valley_is_begun_again_at_a_smaller_size():
-    """2.0 and 9.0 turns end in a valley that leaves nearly all; half of either lies in that of 1.1 and 4.6."""
+def test_a_leader_in_a_wrong_minimum_is_restarted_at_a_smaller_size():
+    """A fit from 2.0 and 9.0 ends in a minimum that explains hardly anything; half of both leads to 1.1 and 4.6."""
     case = Turning()
     base = fit_jointly(case)
     stuck = scored(case, base, [2.0, 9.0], 2.0)
@@ -60,7 +60,7 @@ def test_a_leader_in_the_wrong_valley_is_begun_again_at_a_smaller_size():
     assert again.gain > stuck.gain + 1000.0
 
 
-def test_what_explains_enough_or_has_no_size_stays():
+def test_a_leader_that_explains_enough_or_has_no_size_is_not_restarted():
     case = Turning()
     base = fit_jointly(case)
     found = scored(case, base, [1.0, 4.5], 0.0)

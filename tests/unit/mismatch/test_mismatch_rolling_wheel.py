@@ -15,7 +15,7 @@ def test_on_even_rail_the_force_is_that_of_a_wheel_at_rest():
     assert force[:, 1] == pytest.approx(np.full(43, -0.5 / (1e-9 * (1.0 + 1j) * 81.0)), rel=1e-9)
 
 
-def test_the_force_rings_behind_a_soft_support_and_not_before_it():
+def test_the_force_oscillates_behind_a_soft_support_and_not_before_it():
     """A resonance at 46 Hz whose half width is 3 Hz decays by exp(-2 pi 3 Hz x / v), here to a half in 1.0 m."""
     line, soft = LINES[:, None], np.ones(43)
     soft[20] = 1.3

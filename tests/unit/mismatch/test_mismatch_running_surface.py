@@ -1,4 +1,4 @@
-"""A nose that is not quite the track file's is no mismatch: its numbers are known as well as their priors say."""
+"""A nose that differs slightly from the track file is no mismatch: its numbers have priors."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -32,12 +32,12 @@ WAVES = Waves([s.place for s in PLAN.sensors], 0.0)
 
 @pytest.fixture(scope="module")
 def campaign():
-    """Two trains at two speeds over the ``TRUE`` nose, held against the one that the file has."""
+    """Two trains at two speeds over the ``TRUE`` nose; the track file has another one."""
     true = replace(PLAN.turnout, routes={"main": ((TRUE, JOINT, FAR),)})
     return replace(measured_campaign(replace(PLAN, turnout=true), (), 7), turnout=FILED)
 
 
-def test_values_with_a_prior_may_be_off_where_recordings_show_them():
+def test_values_of_a_surface_with_a_prior_are_nuisances_where_recordings_show_them():
     surface = RunningSurface(FILED, WAVES, ("main",))
     assert surface.names == (*(f"surface_0_{f}" for f in (*SPREADS[NOSE], "power")), "surface_1_depth")
     known = {n.name: n for n in surface.nuisances()}
@@ -45,10 +45,10 @@ def test_values_with_a_prior_may_be_off_where_recordings_show_them():
     assert known["surface_0_depth"].sd == 0.5 and known["surface_0_depth"].unit == "-"
     assert known["surface_0_place"].max_step_sd * known["surface_0_place"].sd < 0.5 * NOSE.length
     assert 0.55 * np.exp(known["surface_0_share"].bounds[1]) < 1.0
-    assert 1.0 < 2.0 * np.exp(known["surface_0_power"].bounds[0]) < 1.02  # a V, and nothing that overhangs
+    assert 1.0 < 2.0 * np.exp(known["surface_0_power"].bounds[0]) < 1.02  # the limit is a V, without an overhang
 
 
-def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():
+def test_the_shape_of_a_nose_is_uncertain_if_its_depth_is():
     for spread, more in (
         ({"depth": 0.5}, {"power": SURFACE.shape_sd}),
         ({"place": 0.02}, {}),
@@ -58,7 +58,7 @@ def test_the_shape_of_a_nose_is_unsure_where_its_depth_is():
         assert {u.field: u.spread for u in surface.parameters} == spread | more
 
 
-def test_a_surface_has_the_numbers_that_it_is_given():
+def test_a_surface_has_its_given_numbers():
     surface = RunningSurface(FILED, WAVES, ("main",))
     values = dict.fromkeys(surface.names, 0.0)
     assert surface.surfaces("main", values) == FILED.surfaces("main")
@@ -68,7 +68,7 @@ def test_a_surface_has_the_numbers_that_it_is_given():
     assert [nose.place, nose.depth, nose.length, nose.share] == pytest.approx([25.35, 1.3e-3, 0.9, 0.55])
 
 
-def test_a_measured_profile_may_be_off_by_a_factor_and_a_position_at_the_origin_may_not():
+def test_a_measured_profile_has_an_uncertain_factor_and_a_position_at_the_origin_is_certain():
     profile, blade = Sections((23.0, 24.0, 25.0), (0.0, 1e-3, 0.0)), Kink(0.0, 1e-3, 1.0)
     spreads = {profile: {"places": 0.1, "dips": 0.2}, blade: {"place": 0.2}}
     surface = RunningSurface(
@@ -79,23 +79,24 @@ def test_a_measured_profile_may_be_off_by_a_factor_and_a_position_at_the_origin_
     assert changed.dips == pytest.approx((0.0, 1.5e-3, 0.0)) and changed.places == profile.places
 
 
-def test_numbers_of_a_route_that_no_train_took_are_not_asked():
+def test_numbers_of_a_route_without_trains_are_no_nuisances():
     forked = replace(FILED, routes={"main": ((NOSE,),), "diverging": ((JOINT, FAR),)})
     assert RunningSurface(forked, WAVES, ("diverging",)).names == ("surface_0_depth",)
     assert len(RunningSurface(forked, WAVES, ("main",)).names) == len(SPREADS[NOSE]) + 1
 
 
 @pytest.mark.parametrize(("prior", "by", "said"), [(0.5, 0.2, True), (0.15, 0.7, True), (0.15, 0.2, False)])
-def test_a_value_is_reported_where_it_is_more_certain_than_in_the_file_or_differs_from_it(prior, by, said):
-    """To 10 % and the fit's own 3: a prior of 15 % knows as much, but 0.7 of a logarithm off is another nose."""
+def test_a_value_is_reported_if_it_is_more_certain_than_in_the_file_or_differs_from_it(prior, by, said):
+    """An error of 10 % and 3 % of the fit: a prior of 15 % is nearly as good, but a logarithm of 0.7 is another
+    nose."""
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"share": prior}}), WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
     fit = SimpleNamespace(values={surface.names[0]: by}, covariance=np.array([[0.03**2]]), jacobian=[])
     assert bool(list(surface.estimate(case, fit))) is said
 
 
-def test_a_reported_value_is_not_drawn_to_the_file():
-    """Recordings that say 0.3 ± 0.2 under a prior of 0.5 have their posterior at 0.26 ± 0.19."""
+def test_a_reported_value_is_the_measured_one_without_the_prior():
+    """Recordings of 0.3 ± 0.2 with a prior of 0.5 have their posterior at 0.26 ± 0.19."""
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"length": 0.5}}), WAVES, ("main",))
     weights = np.array([0.2, 0.5]) ** -2.0
     values = {surface.names[0]: 0.3 * weights[0] / weights.sum()}
@@ -123,7 +124,7 @@ def number(value, unit, prior=None):
 
 
 def test_priors_are_those_of_the_track_file(tmp_path):
-    """Of parts listed, common to several surfaces, and on one of them; a number without a prior is certain."""
+    """For listed parts, common to several surfaces or on one of them; a number without a prior is certain."""
     content = YAML(typ="safe").load(TOMMERUP.read_text(encoding="utf-8"))
     content.pop("locations")
     dips = [number(0.0, "mm", 0.1), number(1.0, "mm", 0.2)]
@@ -150,14 +151,14 @@ def case(campaign):
 
 @pytest.fixture(scope="module")
 def certain(campaign):
-    """The same recordings with the numbers of the file for certain."""
+    """The same recordings with certain numbers in the file."""
     return TrackCase(replace(campaign, turnout=replace(FILED, spreads={})))
 
 
 @pytest.mark.slow
-def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign, case, certain):
-    """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search is to come within a tenth of the
-    shortest wave of 30 Hz of the truth, and all trains look like themselves then."""
+def test_a_coarse_search_finds_a_nose_that_linear_steps_do_not_reach(campaign, case, certain):
+    """0.4 m further, 10 ms at 40 m/s: more than a period at 112 Hz. The search has to come within a tenth of the
+    shortest wave of 30 Hz of the truth, and all trains then resemble their simulation."""
     found = {u.name: u.value_at(case.start_values[u.name]) for u in case.predictor.surface.parameters}
     assert abs(found["surface_0_place"] - TRUE.place) < 0.1
     assert found["surface_0_depth"] == pytest.approx(TRUE.depth, rel=0.3)
@@ -165,24 +166,27 @@ def test_a_rough_search_finds_the_nose_from_where_no_straight_step_does(campaign
     assert not set(found) & set(certain.start_values)
     standing = AcceptedEffect(
         "local_pad", {"sleeper": 24.0}, {"factor": (0.7, 0.05)}
-    )  # what impacts tell of it is no nose
+    )  # impacts contain no information on the nose
     beside = TrackCase(campaign, accepted=(standing,)).start_values
     assert {n: beside[n] for n in found} == {n: case.start_values[n] for n in found} and beside != case.start_values
 
 
 @pytest.mark.slow
 def test_a_nose_within_its_prior_is_estimated_and_leaves_the_residual_of_an_intact_track(case, certain):
-    """Place, depth and length of the true nose lie within two standard errors; with the file's numbers for certain
-    the same recordings are left with five times as much, and the answer was a dip."""
+    """Position, depth and length of the true nose are within two standard errors. With certain numbers of the file the
+    residual of the same recordings is five times as large, and the answer is a dip."""
     fit = fit_jointly(case, iterations=15)
     told = {(t["term"], t["name"]): t for t in surface_estimates(case, fit)}
     for field in ("place", "depth", "length"):
         t = told["running_surface_kink", field]
         assert abs(t["value"] - getattr(TRUE, field)) < 2.0 * t["se"]
     depth = told["running_surface_kink", "depth"]
-    half = 0.5 * SPREADS[NOSE]["depth"] * NOSE.depth  # of what the file leaves open
+    half = 0.5 * SPREADS[NOSE]["depth"] * NOSE.depth  # of the uncertainty in the file
     assert depth["filed"] == NOSE.depth and depth["se"] < half
-    assert ("running_surface_dip", "depth") not in told  # 3.5 m before the free waves: nothing here tells its depth
+    assert (
+        "running_surface_dip",
+        "depth",
+    ) not in told  # 3.5 m before the free waves: no recording depends on its depth
     fit_of_the_file = fit_jointly(certain, iterations=15)
     assert fit_of_the_file.level["passage"] > 5.0 * fit.level["passage"]
     assert fit.level["passage"] < case.control_level["passage"]

@@ -1,4 +1,4 @@
-"""A search that costs more simulations than its case allows ends with "cannot tell" and says why."""
+"""A search with more simulations than its case allows ends with "cannot tell" and states the reason."""
 
 from dataclasses import replace
 
@@ -41,14 +41,14 @@ class Counted(Case):
 
 
 @pytest.mark.parametrize(("most", "count"), [(None, 10_000), (5, 4), (5, 5), (0, 0)])
-def test_a_search_may_cost_as_much_as_its_bound(most, count):
+def test_a_search_may_use_as_many_simulations_as_its_limit(most, count):
     case = Counted(most)
     case.count = 7 + count
     check_limit(case, 7)
 
 
 @pytest.mark.parametrize(("most", "count"), [(5, 6), (0, 1)])
-def test_one_simulation_more_ends_it_with_both_numbers(most, count):
+def test_one_more_simulation_ends_the_search_with_both_numbers_in_the_message(most, count):
     case = Counted(most)
     case.count = 7 + count
     with pytest.raises(SearchLimitError, match=f"has cost {count} simulations, of at most {most}") as end:
@@ -57,12 +57,12 @@ def test_one_simulation_more_ends_it_with_both_numbers(most, count):
 
 
 @pytest.mark.parametrize("most", [None, 100_000])
-def test_a_search_within_its_bound_is_not_changed(most):
+def test_a_search_within_its_limit_is_not_changed(most):
     assert diagnose(Counted(most)).names == ("bend",)
 
 
-def test_what_the_fit_without_effects_costs_is_not_part_of_the_search(monkeypatch):
-    """Every fit of a search is checked against what the case had cost before it: the fit without effects."""
+def test_simulations_of_the_fit_without_effects_do_not_count_for_the_search(monkeypatch):
+    """The simulations before a search, those of the fit without effects, are subtracted in every check."""
     base, n_before = Counted(None), []
     fit_base(Search.of(base))
     monkeypatch.setattr(search, "check_limit", lambda case, n: n_before.append(n))
@@ -70,7 +70,7 @@ def test_what_the_fit_without_effects_costs_is_not_part_of_the_search(monkeypatc
     assert base.count > 0 and set(n_before) == {base.count}
 
 
-def test_a_search_beyond_its_bound_has_no_answer():
+def test_a_search_beyond_its_limit_has_no_answer():
     case = Counted(3)
     found = diagnose(case)
     assert found.verdict.answer == "unknown" and found.verdict.trail[0] == "search_too_long"
@@ -99,7 +99,7 @@ class TwoEffects(Counted):
         return [values["slope"] * self.x + sum(terms) for _ in observations]
 
 
-def test_a_name_stands_where_the_search_for_a_second_effect_is_not_finished():
+def test_a_name_stays_if_the_search_for_a_second_effect_is_not_finished():
     whole = TwoEffects(None)
     assert sorted(diagnose(whole).names) == ["bend", "wave"]
     answers = [diagnose(TwoEffects(most)) for most in range(0, whole.count, 10)]

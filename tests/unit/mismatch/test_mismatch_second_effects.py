@@ -1,4 +1,4 @@
-"""Second effects: an exact effect leaves another effect, an approximate one may leave its own shape."""
+"""Second effects: the residual of an exact effect is another effect, that of an approximate one may be its shape."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -46,7 +46,7 @@ class Shapes(Case):
 
 
 @pytest.mark.parametrize("exact, names", [(True, ("wave", "ramp")), (False, ("wave",))])
-def test_a_second_effect_needs_a_share_of_the_first_only_where_its_shape_may_be_off(exact, names):
+def test_a_second_effect_needs_a_share_of_the_first_only_if_the_shape_of_that_is_uncertain(exact, names):
     """The ramp is worth 200 ln(1 + 2.8^2 / 12) = 100 nats, the wave 200 ln(2000^2 / 3.3) = 2,800: 28 times as many."""
     assert diagnose(Shapes(exact)).names == names
 
@@ -91,22 +91,22 @@ class Spread(Shapes):
         ("1A", "1A", 1.0, 1),
         ("1A", "1B", 0.0, 2),  # another sensor
         ("1A 1B", "2A 2B", 0.0, 2),  # other recordings
-        ("1A", "1A 1B 2A 2B", 0.5, 2),  # what a mounting leaves is left in its own channel
-        ("1A 1B 2A 2B", "2B", 0.5, 2),  # what the track leaves is left in all
+        ("1A", "1A 1B 2A 2B", 0.5, 2),  # the residual of a mounting is in its own channel
+        ("1A 1B 2A 2B", "2B", 0.5, 2),  # the residual of an effect of the track is in all channels
         ("1A 1B 2A", "1A 1B 2A 2B", 0.866, 1),
         ("1A 1B 2A 2B", "1A 1B 2A 2B", 1.0, 1),
     ],
 )
-def test_what_shows_elsewhere_is_not_the_shape_of_the_first(wave, ramp, alike, names):
-    """The ramp is worth a 28th of the wave: within a twentieth of it, beyond 0.71 of a twentieth. Even shares of n and
-    m samples of which k are both's are alike by k over the root of n m."""
+def test_a_residual_in_other_cells_is_not_the_shape_of_the_first_effect(wave, ramp, alike, names):
+    """The ramp has a 28th of the evidence of the wave: below a twentieth, above 0.71 of a twentieth. Equal shares on n
+    and m samples, k of them common, have a similarity of k over the root of n m."""
     case = Spread(wave=wave, ramp=ramp)
     assert len(diagnose(case).names) == names
     fit = fit_jointly(case, case.candidates, [100.0, 0.3])
     assert signature_overlap(case, fit, *case.candidates) == pytest.approx(alike, abs=1e-3)
 
 
-def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():
+def test_a_gain_is_tested_beside_a_lag_of_the_same_channel_and_a_mounting_is_not():
     case = TrackCase(measured_campaign(small_plan((15.0,), hammer_positions=(24.0,), passages=False), (), 7))
     of = {c.family: c for c in case.candidates if c.where.get("sensor") == "S2"}
     assert not is_same_site(of["sensor_gain"], of["time_offset"])
@@ -114,7 +114,8 @@ def test_a_gain_is_sought_beside_a_lag_of_the_same_channel_and_a_mounting_is_not
 
 
 def with_whites(case, base, candidate, size, share):
-    """Fit 90 nats better, with a candidate of this size and the residuals times the ``share`` of their name or kind."""
+    """A fit that is 90 nats better, with a candidate of this size and residuals times the ``share`` of their name or
+    kind."""
     white = [share.get(o.name, share[o.data_type]) * np.asarray(w) for o, w in zip(case.observations, base.white)]
     found = replace(base, candidates=(candidate,), psi=np.array([size]), white=white, evidence=base.evidence + 90.0)
     return replace(found, covariance=np.eye(len(base.values) + 1))
@@ -128,7 +129,7 @@ def passages_and_impacts():
 
 @pytest.mark.parametrize(("kind", "material"), [("hammer", False), ("passage", True)])
 def test_friction_is_identified_by_trains(passages_and_impacts, kind, material):
-    """To impacts it is a damper: a fit in which passages gain nothing gives it no name, whatever impacts gain."""
+    """In impacts it acts as a damper: without a gain in passages it has no name, for any gain in impacts."""
     case, base = passages_and_impacts
     assert {c.naming.required_data_type for c in case.candidates if c.family == "dry_friction"} == {"passage"}
     friction = next(c for c in case.candidates if c.family == "dry_friction")
@@ -137,8 +138,8 @@ def test_friction_is_identified_by_trains(passages_and_impacts, kind, material):
 
 
 class SensorGainCase(Case):
-    """Four impacts and four trains that a sensor reads with gains of its own, noise of 0.1; its gain is known to 2
-    %, and a support, known to 10 %, adds a ramp to impacts."""
+    """Four impacts and four trains that a sensor records with its own gains, noise of 0.1. The gain is known to 2 %,
+    and a support, known to 10 %, adds a ramp to impacts."""
 
     def __init__(self, impacts, trains):
         rng = np.random.default_rng(9)
@@ -179,9 +180,8 @@ class SensorGainCase(Case):
 
 @pytest.mark.parametrize("gain", [0.76, 1.25, -1.0])
 def test_impacts_alone_test_a_gain_against_its_own_estimate(gain):
-    """Trains show none; with a prior of 0.02 the fit to both stands in between, impacts alone stand at their own,
-    but for what the prior of 0.3 takes: a hundredth and more where the fit leaves much, so that noise counts
-    more."""
+    """Trains show no gain. With a prior of 0.02 the fit to both is in between; the estimate by impacts alone is their
+    own value, reduced by the prior of 0.3: by a hundredth, and more if the residual and thus the noise is large."""
     case = SensorGainCase(gain, 1.0)
     fit = fit_jointly(case, iterations=30)
     error = 0.1 / np.sqrt(4 * X.size * 0.5)
@@ -194,9 +194,9 @@ def test_impacts_alone_test_a_gain_against_its_own_estimate(gain):
 @pytest.mark.parametrize(
     ("impacts", "trains", "material"), [(0.76, 0.76, True), (-1.0, -1.0, True), (1.0, 0.76, False)]
 )
-def test_a_gain_that_impacts_contradict_is_none(impacts, trains, material):
-    """Ballast that softens under trains raises the level of a sensor in them alone. A gain that both show
-    has its name, though the fit without it moved the gain to the end of its tolerance, and leaves impacts no worse."""
+def test_a_gain_that_impacts_contradict_has_no_name(impacts, trains, material):
+    """Ballast that softens under trains raises the level of a sensor in trains alone. A gain in both has its name,
+    although the fit without it moved the gain to the end of its tolerance and explains impacts as well."""
     case = SensorGainCase(impacts, trains)
     (gain,), base = case.candidates, fit_jointly(case)
     refit = fit_jointly(case, (gain,), [trains])
@@ -233,12 +233,12 @@ class Passages(Case):
     [
         (((2.3, 0.3), (0.5, 0.4), (1.9, 0.2)), True),
         (((1.9, 0.3), (0.5, 0.4), (1.9, 0.2)), False),  # nothing is above the level
-        (((2.3, 0.3), (2.1, 0.4), (0.5, 0.2), (0.5, 0.2)), False),  # A shows it in two passages: of track or sensor
-        (((2.3, 2.1), (0.5, 0.4), (0.5, 0.2)), False),  # both sensors show it in one: a wheel
+        (((2.3, 0.3), (2.1, 0.4), (0.5, 0.2), (0.5, 0.2)), False),  # A has an excess in two passages: track or sensor
+        (((2.3, 2.1), (0.5, 0.4), (0.5, 0.2)), False),  # both sensors have an excess in one passage: a wheel
         (((2.3, 0.3), (0.5, 0.4)), False),  # one other passage is too few to compare with
     ],
 )
-def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean_squares, is_lone):
+def test_an_excess_of_one_channel_in_one_recording_is_attributed_to_the_recording(mean_squares, is_lone):
     case = Passages(*mean_squares)
     white = [o.data for o in case.observations]
     assert is_lone_excess(case, SimpleNamespace(white=white)) is is_lone
@@ -255,11 +255,11 @@ def test_an_excess_of_one_channel_in_one_recording_belongs_to_the_recording(mean
         (((9.2, 0.3), (0.5, 0.4)), {"sensor": "A"}, 0.0, 0.0),  # one other passage is too few to compare with
     ],
 )
-def test_a_name_of_track_or_sensor_need_not_explain_what_one_recording_has_alone(
+def test_a_name_of_track_or_sensor_need_not_explain_an_excess_of_one_recording(
     mean_squares, where, gained_there, share
 ):
-    """Wheels that leave a nose raise the level of one fast passage. A sensor 13 cm off, with 14 nats, lost its
-    name by that."""
+    """Wheels that lose contact at a nose raise the level of one fast passage. Formerly a sensor with a shift of 13 cm
+    and 14 nats lost its name by that."""
     case = Passages(*mean_squares)
     white = [o.data for o in case.observations]
     rest = [white[0] * np.sqrt(1.0 - 2.0 * gained_there / np.sum(white[0] ** 2)), *white[1:]]
@@ -269,7 +269,7 @@ def test_a_name_of_track_or_sensor_need_not_explain_what_one_recording_has_alone
     assert explained_share(Search(case), fit, refit) == pytest.approx(share, abs=0.01)
 
 
-def test_beside_a_name_such_an_excess_is_no_second_effect():
+def test_beside_a_name_an_excess_of_one_recording_is_no_second_effect():
     case = Passages((2.3, 0.3), (0.5, 0.4), (1.9, 0.2))
     fit = SimpleNamespace(white=[o.data for o in case.observations], level={"passage": 0.3}, candidates=())
     score = SimpleNamespace(family="wave", gain=60.0)

@@ -1,4 +1,4 @@
-"""Corrugation above the band that is simulated: found by its wavelength, sized by the track's receptance."""
+"""Corrugation above the simulated band: found by its wavelength, with a size by the receptance of the track."""
 
 import re
 from dataclasses import replace
@@ -37,7 +37,7 @@ def looked_at(*terms, seed=7, plan=None):
 
 @pytest.mark.parametrize(("size", "wavelength", "seed"), [(3e-5, 0.16, 7), (2e-5, 0.09, 9)])
 def test_short_corrugation_is_found_with_its_wavelength_and_its_size(size, wavelength, seed):
-    """In recordings at 10 kHz with roughness, noise, scattered supports; both within 95 % of what is stated."""
+    """In recordings at 10 kHz with roughness, noise, scattered supports; both are in the stated 95 % intervals."""
     _, (found,) = looked_at(physics.RailCorrugation(20.5, 27.0, size, 0.3 * size, wavelength), seed=seed)
     for p, true in zip(found.parameters, (1.044 * size, wavelength)):  # sine and cosine: hypot(1, 0.3)
         assert p.prior[0] == pytest.approx(true, abs=1.96 * p.prior[1])
@@ -62,7 +62,7 @@ def test_one_train_alone_does_not_distinguish_a_rail_from_wheels():
     ]
 
 
-def hummed(speeds, seed=5):
+def findings_with_hum(speeds, seed=5):
     """Two trains at these speeds [m/s], a hum of 150 Hz in all sensors, as strong as the passage itself."""
     plan = small_plan((15.0,), hammer_positions=())
     trains = [replace(t, speed=v) for t, v in zip(plan.trains, speeds)]
@@ -80,9 +80,9 @@ def hummed(speeds, seed=5):
 
 
 def test_a_hum_is_no_corrugation_and_trains_of_one_speed_are_not_enough():
-    """At one speed the answer states the line, its frequency, what it may be, and what would decide."""
-    assert hummed((28.0, 40.0, 28.4, 39.5)) == ((), None)
-    found, line = hummed((28.0, 28.4, 28.2, 28.3))
+    """At one speed the answer states the line, its frequency, possible causes, and a measurement that would decide."""
+    assert findings_with_hum((28.0, 40.0, 28.4, 39.5)) == ((), None)
+    found, line = findings_with_hum((28.0, 28.4, 28.2, 28.3))
     assert found == () and line.nats > 12.0
     assert (
         re.search("1(49|50) Hz", line.words) and "a vibration of this frequency" in line.words and "0.18" in line.words
@@ -110,7 +110,7 @@ def test_corrugation_in_the_tracks_file_is_not_found_again():
     )
 
 
-POSITIONS = np.array([2.1, 4.2, 6.6, 9.0])  # m, more than 2 m apart: each measures rail of its own
+POSITIONS = np.array([2.1, 4.2, 6.6, 9.0])  # m, more than 2 m apart: each measures different rail
 TRAINS = (("x", 20.0), ("x", 25.0), ("y", 30.0), ("y", 38.0))
 
 
@@ -131,8 +131,8 @@ def expected_nats(z, n_sensors):
     return np.log(np.trapezoid(density * np.exp(-0.5 * ((z - added) / sd) ** 2 + 0.5 * (z / sd) ** 2), added))
 
 
-def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
-    """By the line in each, where an equal wave is in all it holds; sensors beyond the stretch have no part in it."""
+def test_a_line_in_one_half_of_the_passages_alone_is_no_finding():
+    """By the line in each passage, which an equal wave would have in all; sensors beyond the stretch do not count."""
 
     def seen(*levels):
         levels = [np.array([[x], [x], [0.0], [0.0]]) for x in levels]
@@ -145,7 +145,7 @@ def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
 
 
 def test_the_evidence_of_a_stretch_is_that_of_a_level_integrated_out():
-    """The least of the trains and speeds counts, what is quiet does not."""
+    """The lowest level of trains and speeds counts; quiet sensors do not."""
     levels = [np.array([[1.9, 0.4], [1.1, -3.0], [1.5, 0.2]]) + (t == "y") for t, _ in TRAINS]
     nats = stretch_evidence(passages_with(levels, POSITIONS[:3]), POSITIONS[:3])
     for row, (first, last) in zip(nats, sensor_stretches(POSITIONS[:3])):
@@ -156,8 +156,8 @@ def test_the_evidence_of_a_stretch_is_that_of_a_level_integrated_out():
 
 @pytest.mark.parametrize("first", range(4))
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
-def test_corrugation_that_ends_between_sensors_costs_no_more_than_the_number_of_stretches(first, n):
-    """Wherever it begins and ends: that of the right stretch, if known, less ln 10 at most."""
+def test_the_penalty_of_an_unknown_stretch_is_at_most_that_of_the_number_of_stretches(first, n):
+    """For any ends: the evidence of the true stretch less ln 10 at most."""
     if first + n > 4:
         return
     level = np.zeros((4, 1))
@@ -168,7 +168,7 @@ def test_corrugation_that_ends_between_sensors_costs_no_more_than_the_number_of_
 
 
 def test_sensors_beyond_the_corrugation_are_no_evidence_against_it():
-    """A mean over all of them would lose all of it as their number grows."""
+    """A mean over all sensors would lose the evidence as their number grows."""
     many = 2.1 * np.arange(1, 13)
     level = np.where((many > 5.0) & (many < 9.0), 4.0, 0.0)[:, None]  # two of twelve
     nats = corrugation_evidence(passages_with(level, many), many)[0]
@@ -206,15 +206,15 @@ def test_a_line_of_one_train_or_of_one_speed_is_no_evidence_in_any_stretch():
         assert corrugation_evidence(passages_with(levels), POSITIONS)[0] < 0.0
 
 
-def test_a_sensor_without_a_signal_supports_nothing():
-    """Neither its stretch nor any other."""
+def test_a_sensor_without_a_signal_gives_no_evidence():
+    """Neither for its stretch nor for another one."""
     level = np.array([[0.0], [0.0], [4.0]])
     quiet = corrugation_evidence(passages_with(level[:2], POSITIONS[:2]), POSITIONS)[0]
     assert quiet < 0.0 < corrugation_evidence(passages_with(level, POSITIONS[:3]), POSITIONS)[0]
 
 
-def test_any_line_is_nearly_whole_in_one_of_the_bins():
-    """At least three quarters of a bin's width about it, wherever it is."""
+def test_one_of_the_bins_contains_nearly_the_whole_line():
+    """At least three quarters of the width of a bin, for any frequency of the line."""
     train = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=10000.0)))
     bins = bin_wavelengths([train])
     length = np.random.default_rng(2).uniform(0.06, 0.29, 200)
@@ -222,7 +222,7 @@ def test_any_line_is_nearly_whole_in_one_of_the_bins():
     assert distance.max() <= 0.25 * CORRUGATION.bin_width + 1e-9
 
 
-def test_the_centre_of_a_line_decides_whether_it_is_short_not_the_bin_of_the_largest_evidence():
+def test_the_centre_of_a_line_and_not_its_bin_decides_whether_it_is_short():
     """One of 0.292 m, with the bin of 0.3 m or its neighbours chosen; beyond the stretch there are other lines."""
     train = SimpleNamespace(speed=30.0, passage=SimpleNamespace(recording=SimpleNamespace(rate=10000.0)))
     bins = bin_wavelengths([train])

@@ -1,4 +1,4 @@
-"""Polygonal wheels with waves too short to simulate: the wheel, the size and the null, by the library's own march."""
+"""Polygonal wheels with waves too short for the band: the wheel, the size and intact wheels, by full simulations."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -25,7 +25,7 @@ def turned(wheel, size, order):
 
 @pytest.mark.parametrize(("wheel", "size", "order", "seed"), [(1, 6e-5, 13, 7), (3, 2.5e-5, 18, 9)])
 def test_a_short_polygon_is_found_on_its_wheel_with_its_size(wheel, size, order, seed):
-    """In recordings with roughness of every wheel; the march and its contact know nothing of the closed form."""
+    """In recordings with roughness of every wheel; the simulation and its contact do not use the closed form."""
     (found,) = found_in(turned(wheel, size, order), seed=seed)
     assert found.where == {"train": "heavy", "axle": wheel + 1}
     mean, error = found.parameters[0].prior
@@ -47,7 +47,7 @@ def test_round_wheels_corrugation_and_hum_are_no_polygons():
     assert found_in(seed=5, changed=hummed) == ()
 
 
-def test_what_one_half_of_the_passages_does_not_show_is_no_finding():
+def test_a_line_in_one_half_of_the_passages_alone_is_no_finding():
     """The wheel is polygonal in one passage and round in the other; whether that one is held out does not matter."""
     sound, worn = (
         measured_campaign(small_plan((15.0,), hammer_positions=()), terms, 7) for terms in ((), (turned(1, 6e-5, 13),))

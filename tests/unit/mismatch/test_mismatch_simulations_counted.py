@@ -1,4 +1,4 @@
-"""How often derivatives of passages simulate: nothing is computed twice."""
+"""Number of simulations for derivatives of passages: no result is computed twice."""
 
 import numpy as np
 import pytest
@@ -38,8 +38,8 @@ def start_values(case):
 
 
 def test_derivatives_of_passages_simulate_once_by_each_value_without_a_closed_form(case, simulated):
-    """By wheels, load, stiffness of pads and of ballast, ballast damping. Motion at supports comes from the
-    prediction itself, however many passages are in between."""
+    """By wheels, load, stiffness of pads and of ballast, ballast damping. The motion at supports is that of the
+    prediction, for any number of passages in between."""
     values, passages = start_values(case), rolled(case)
     predicted = case.predict(values, (), passages)
     simulated.clear()
@@ -59,7 +59,7 @@ def test_derivatives_by_an_effect_leave_the_motion_at_its_supports_in_the_cache(
 
 
 def test_passages_on_one_track_share_its_responses_and_on_another_do_not(case, monkeypatch):
-    """Same column as with nothing kept; a changed pad asks again, a changed speed does not."""
+    """The same column as without stored results; a changed pad needs new responses, a changed speed does not."""
     solved, responses = [], track_under_wheels.responses
 
     def counted(*arguments, **options):

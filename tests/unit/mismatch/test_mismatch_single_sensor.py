@@ -1,4 +1,4 @@
-"""What one sensor alone shows, though others would have to show it, is no effect of the track."""
+"""A gain in one sensor alone is no effect of the track if other sensors would have to show it."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ SENSORS = np.repeat(["A1", "A2"], BUMP.size)
 
 
 class TwoSensors(Case):
-    """Two recordings of two sensors, with the share of a bump that each has in truth and by the model."""
+    """Two recordings of two sensors, with the true share of a bump in each and that of the model."""
 
     def __init__(self, true, model, impossible_without=False):
         self.model, self.impossible_without = self.both(model), impossible_without
@@ -60,7 +60,7 @@ class TwoSensors(Case):
         ((1.0, 0.0), (1.0, 1.0), "the sensor A1"),  # A2 would show as much, and loses
         ((0.0, 1.0), (1.0, 1.0), "the sensor A2"),
         ((1.0, 0.0), (1.0, 0.72), "the sensor A1"),  # 0.52 of the energy
-        ((1.0, 0.0), (1.0, 0.68), ""),  # 0.46: too little to be missed
+        ((1.0, 0.0), (1.0, 0.68), ""),  # 0.46: too small to contradict
         ((0.02, 0.0), (1.0, 1.0), ""),  # too little gain to be a name of one sensor
         ((1.0, 0.5), (1.0, 0.72), ""),  # A2 has the effect, though smaller
     ],
@@ -69,18 +69,18 @@ def test_an_effect_gains_where_its_change_has_energy(true, model, source):
     assert TwoSensors(true, model).source() == source
 
 
-def test_a_gain_that_is_the_penalty_of_nuisances_has_no_sensor():
-    """Half of the bump fits best: A1 gains about 3,800 nats and A2 loses 1,300, together less than half of 6,000."""
+def test_a_gain_in_the_penalty_of_nuisances_belongs_to_no_sensor():
+    """Half of the bump fits best: A1 gains about 3,800 nats and A2 loses 1,300, in total less than half of 6,000."""
     case = TwoSensors((1.0, 0.0), (1.0, 1.0))
     assert case.source(gain=15.0) == "the sensor A1" and case.source(gain=6000.0) == ""
 
 
-def test_without_a_simulation_there_is_nothing_to_compare():
+def test_without_a_simulation_sensors_are_not_compared():
     assert TwoSensors((1.0, 0.0), (1.0, 1.0), impossible_without=True).source() == ""
 
 
 @pytest.mark.parametrize("true, source", [((1.0, 1.0), ""), ((1.0, 0.0), "the sensor A1")])
-def test_the_leader_of_a_search_is_tested_for_it(true, source):
+def test_the_leader_of_a_search_is_tested_for_a_single_sensor(true, source):
     case = TwoSensors(true, (1.0, 1.0))
     case.is_large = True
     without, fit = case.fits()
@@ -88,7 +88,7 @@ def test_the_leader_of_a_search_is_tested_for_it(true, source):
     assert leader.single_source == source
 
 
-def test_what_a_sensor_does_itself_needs_no_other():
+def test_an_effect_of_a_sensor_needs_no_other_sensor():
     case = TwoSensors((1.0, 0.0), (1.0, 1.0))
     of_a_sensor = replace(case.candidates[0], site=EffectSite({"sensor": "A1"}))
     assert case.source() == "the sensor A1" and case.source(of_a_sensor) == ""

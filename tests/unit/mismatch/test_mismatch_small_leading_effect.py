@@ -1,4 +1,4 @@
-"""What leads and is too small to act on: the next name has to gain something beside it."""
+"""A leader that is too small to report: the next effect has to have a gain beside it."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ class Shapes(Case):
     def __init__(self, **true):
         noise = 0.1 * np.random.default_rng(6).normal(size=X.size)
         basis = np.linalg.qr(np.column_stack(list(SHAPES.values())))[0]
-        noise -= basis @ (basis.T @ noise)  # no shape is favoured
+        noise -= basis @ (basis.T @ noise)  # the noise favours no shape
         data = sum(a * SHAPES[n] for n, a in true.items()) + noise
         self.observations = (Observation("all", "all", data, np.full(X.size, 0.1)),)
         self.candidates = tuple(
@@ -56,16 +56,17 @@ class Shapes(Case):
 
 
 @pytest.mark.parametrize("true, kept", [({"wave": 1.0}, False), ({"wave": 1.0, "ramp": 0.8}, True)])
-def test_a_name_that_lives_on_what_leads_is_dropped_and_another_effect_is_not(true, kept):
-    """A wave of nearly the right length gains hundreds of nats of the wave alone, and next to nothing beside it."""
+def test_a_name_without_a_gain_beside_the_leader_is_rejected_and_another_effect_is_not(true, kept):
+    """A wave of nearly the same length gains hundreds of nats from the leading wave, and hardly any beside it."""
     settings = MismatchSettings()
     ranked = Shapes(**true).ranked()
     best = next(s for s in ranked if s.is_reportable)
     assert (best.gain > settings.threshold) == kept
 
 
-def test_a_name_as_good_as_what_leads_is_kept():
-    """Both explain as much of what lies half way: an effect too small to act on takes nothing from one that matters."""
+def test_a_name_with_the_evidence_of_the_leader_is_accepted():
+    """Both explain equally much of a wave in between: an effect that is too small to report does not replace the
+    other."""
     settings = MismatchSettings()
     case = Shapes(**{n: size / np.linalg.norm(SHAPES[n]) for n, size in (("wave", 6.05), ("near", 6.0))})
     ranked = case.ranked()

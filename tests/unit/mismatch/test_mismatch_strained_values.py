@@ -1,4 +1,4 @@
-"""A model that absorbs what it lacks by a value no tolerance allows for is not intact."""
+"""A model that absorbs an effect by a value beyond all tolerances is not intact."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -53,7 +53,7 @@ def strained(case):
 
 
 @pytest.mark.parametrize("sds", [5.7, -5.7])
-def test_a_value_that_has_paid_more_than_a_name_costs_is_strained(sds):
+def test_a_value_with_a_prior_cost_above_the_threshold_of_a_name_is_strained(sds):
     """5.7 standard deviations cost 16.2 nats, of which the choice among two takes 0.7."""
     value = strained(Beam(sds * TOLERANCE))
     assert value.nuisance.name == "bending" and "5." in str(value)
@@ -61,13 +61,13 @@ def test_a_value_that_has_paid_more_than_a_name_costs_is_strained(sds):
 
 
 @pytest.mark.parametrize("sds", [0.0, 3.0, -4.8])
-def test_a_value_within_what_chance_and_files_allow_is_not(sds):
+def test_a_value_within_its_tolerance_is_not_strained(sds):
     """4.8 standard deviations cost 11.5 nats: less than a name."""
     assert strained(Beam(sds * TOLERANCE)) is None
 
 
 def test_the_number_of_values_among_which_the_farthest_was_chosen_counts():
-    """5.2 standard deviations cost 13.5 nats; the largest of a hundred values needs 4.6 more than a name."""
+    """5.2 standard deviations cost 13.5 nats; the largest of a hundred values needs 4.6 more than the threshold."""
     case = Beam(5.2 * TOLERANCE)
     assert strained(case)
     case.nuisances += tuple(Nuisance(f"v{k}", "-", 0.0, 1.0) for k in range(98))
@@ -75,8 +75,8 @@ def test_the_number_of_values_among_which_the_farthest_was_chosen_counts():
 
 
 @pytest.mark.parametrize("error", [0.01, 0.1, 0.3])
-def test_a_prior_that_holds_a_value_back_hides_no_conflict(error):
-    """Data alone give x with the standard error e; the chance of x is N(0, sd² + e²), however far the fit goes."""
+def test_a_value_that_its_prior_reduces_still_shows_the_conflict(error):
+    """Data alone give x with the standard error e; its density is N(0, sd² + e²), for any value of the fit."""
     case, at = Beam(0.0, at=("sensor", "S1")), 0.8
     weight = TOLERANCE**2 / (TOLERANCE**2 + error**2)
     fit = SimpleNamespace(
@@ -98,27 +98,28 @@ def test_values_of_one_recording_one_of_many_and_of_a_surface_do_not_count(more)
     assert strained(Beam(0.57, **more)) is None
 
 
-def test_a_gain_that_masks_nothing_counts_where_it_is_known_what_it_is_fixed_to():
+def test_a_gain_that_masks_no_effect_counts_if_its_channel_is_known():
     assert strained(Beam(0.57, can_mask=False, at=("sensor", "S1"))).nuisance.at == ("sensor", "S1")
 
 
-def test_a_value_that_an_effect_describes_is_judged_as_that_effect():
+def test_a_value_that_masks_an_effect_is_not_strained():
     case = Beam(0.57)
     site = replace(case.candidates[0].site, masking_parameter="bending")
     case.candidates = (replace(case.candidates[0], site=site),)
     assert strained(case) is None
 
 
-def test_the_answer_is_unknown_with_its_reason_though_the_residual_is_that_of_intact_recordings():
-    """Before, such a model was called as good as an intact one: its residual is noise."""
+def test_a_strained_value_gives_the_answer_unknown_although_the_residual_is_small():
+    """Formerly the answer was that such a model agrees like an intact one, since its residual is noise."""
     strained_case, intact = (diagnose(Beam(sds * TOLERANCE)) for sds in (5.7, 0.5))
     assert max(strained_case.base.level.values()) < 1.2
     assert strained_case.verdict.answer == "unknown" and "bending" in strained_case.verdict.reason
     assert intact.verdict.answer == "none"
 
 
-def test_a_name_beside_which_such_a_value_remains_is_withdrawn_and_the_value_gives_the_position():
-    """Wheelsets beyond their tolerance leave a little to other names, such as another contact stiffness."""
+def test_a_name_beside_a_strained_value_is_withdrawn_and_the_value_is_the_location():
+    """Wheelsets beyond their tolerance leave a small residual that another effect may explain, such as contact
+    stiffness."""
     at = ("train", "railcar")
     named, withdrawn = (diagnose(Beam(sds * TOLERANCE, bump=0.1, at=at)) for sds in (0.5, 5.7))
     assert named.verdict.names == ("bump",)

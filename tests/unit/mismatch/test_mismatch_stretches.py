@@ -1,4 +1,4 @@
-"""A cause without a name at several supports, and one that is not linear, are localized by hammer tests."""
+"""Hammer tests localize a cause without a name at several supports, and a nonlinear one."""
 
 from copy import copy
 from dataclasses import replace
@@ -38,10 +38,10 @@ def share_outside(change, columns):
     return np.linalg.norm(change - columns @ solution) / np.linalg.norm(change)
 
 
-def test_what_two_pads_change_is_a_force_at_each_of_them(case):
+def test_the_effect_of_two_pads_is_that_of_a_force_at_each_of_them(case):
     """Woodbury: the change of a receptance by two links is that of two forces, whatever the size of the change.
 
-    No sensor is on one of these sleepers: there it would also feel the link itself.
+    No sensor is on one of these sleepers, where it would also record the link itself.
     """
     sizes = {21.6: 0.4, 24.0: -0.7, 26.7: -1.2}
     changes = dict(zip((o.name for o in case.observations), changes_of(case, (24.0, 24.6), sizes)))
@@ -64,7 +64,7 @@ def test_what_two_pads_change_is_a_force_at_each_of_them(case):
     ],
 )
 def test_pads_whose_stiffness_depends_on_the_impact_are_located(case, positions, sizes):
-    """No linear change of the track does this, as with fastenings that lift."""
+    """No linear change of the track does this; fastenings that lift do."""
     changed = copy(case)
     pairs = zip(case.observations, changes_of(case, positions, sizes))
     changed.observations = tuple(replace(o, data=o.data + change) for o, change in pairs)
@@ -78,7 +78,7 @@ def test_pads_whose_stiffness_depends_on_the_impact_are_located(case, positions,
 
 
 def test_a_late_channel_is_no_cause_at_the_supports_beside_it(case):
-    """Every impact shows the same delay. Forces at two supports, others for each impact, imitate it less well."""
+    """Every impact shows the same delay. Forces at two supports, different for each impact, explain it less well."""
     late, observations = copy(case), []
     for o in case.observations:
         pair, (real, imaginary) = case.frf_pairs[o.name], np.split(o.data, 2)
@@ -100,8 +100,8 @@ def changes_within(case, name, size, low, high):
 
 
 @pytest.mark.parametrize("name", ["pad_stiffness", "ballast_stiffness", "rail_bending", "rail_shear"])
-def test_a_small_change_of_the_whole_track_is_in_the_space_of_its_value(case, name):
-    """First order: the change is the derivative, whatever its size at each frequency."""
+def test_a_small_change_of_the_whole_track_is_proportional_to_the_derivative_by_its_value(case, name):
+    """To first order the change is the derivative, with any factor at each frequency."""
     fit = replace(fit_jointly(case, iterations=0), values={n.name: n.mean for n in case.nuisances})
     (space,) = (s for s in source_spaces(case, fit) if s.law == name and ("frequency", "track") in s.combinations)
     changes = dict(zip((o.name for o in case.observations), changes_within(case, name, 1e-3, 300.0, 500.0)))
@@ -109,8 +109,8 @@ def test_a_small_change_of_the_whole_track_is_in_the_space_of_its_value(case, na
 
 
 @pytest.mark.parametrize("name, size", [("rail_shear", -0.6), ("pad_stiffness", 0.4)])
-def test_an_effect_of_the_whole_track_that_holds_in_one_band_is_at_no_position(case, name, size):
-    """No value of the base model does this, as with pads of several parameters or a rail soft in shear."""
+def test_an_effect_of_the_whole_track_in_one_band_has_no_position(case, name, size):
+    """No value of the base model does this; pads with several parameters or a rail soft in shear do."""
     changed = copy(case)
     changes = changes_within(case, name, size, 400.0, 600.0)
     changed.observations = tuple(replace(o, data=o.data + c) for o, c in zip(case.observations, changes))

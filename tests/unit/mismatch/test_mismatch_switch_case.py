@@ -1,4 +1,4 @@
-"""A case in a switch panel is not proven, and its fits use derivatives again; one on plain track is neither."""
+"""A case in a switch panel is not proven, and its fits reuse derivatives; a case on plain track is proven."""
 
 from dataclasses import replace
 

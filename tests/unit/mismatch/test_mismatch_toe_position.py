@@ -1,4 +1,4 @@
-"""The toe of a blade may lie a few centimetres beside that of the file: hammer tests find it."""
+"""The toe of a blade may be a few centimetres from its position in the file: hammer tests determine it."""
 
 from copy import copy
 from dataclasses import replace
@@ -78,8 +78,8 @@ def test_a_fit_finds_the_shift_in_receptances_that_have_no_other_error(case):
     assert fit.values[TOE] == pytest.approx(SHIFT, abs=2e-3)
 
 
-def test_errors_of_chairs_leave_it_open_within_the_stated_uncertainty():
-    """Recordings, simulated in time, of a blade that begins 4 cm nearer to its first chair than the file says."""
+def test_the_error_by_chairs_is_within_the_stated_uncertainty_of_the_toe():
+    """Recordings, simulated in time, of a blade that begins 4 cm nearer to its first chair than in the file."""
     recorded = measured_campaign(plan_with_toe(TOE_OF_FILE + SHIFT), (), 3)
     case = TrackCase(replace(recorded, turnout=plan_with_toe(TOE_OF_FILE).turnout))
     fit = fit_jointly(case)

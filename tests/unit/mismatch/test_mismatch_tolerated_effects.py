@@ -1,4 +1,4 @@
-"""What a wide tolerance of the base model hides is a finding if its size is certain: a worn nose."""
+"""An effect within a wide tolerance of the base model is a finding if its size is certain: a worn nose."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -33,7 +33,7 @@ class Nose(Case):
 
     def __init__(self, depth, width=1.0):
         noise = 0.05 * np.random.default_rng(5).normal(size=(3, X.size))
-        self.width = width  # of the dip that stands for the wear
+        self.width = width  # of the dip that describes the wear
         self.observations = tuple(
             Observation(f"o{k}", f"day {k}", depth * self.dip(1.0) + n, np.full(X.size, 0.05))
             for k, n in enumerate(noise)
@@ -67,7 +67,7 @@ def test_a_worn_nose_is_no_candidate_of_a_library_without_dips(monkeypatch):
 
 @pytest.mark.parametrize(("depth", "answer"), [(1.0, "none"), (1.8, "none"), (4.0, "named")])
 def test_a_depth_that_the_tolerance_allows_for_has_a_name_if_it_is_certain(depth, answer):
-    """Of 4 the file has 1. Dip and nose share the rest as their variances do, 9 and a hundredth of 4."""
+    """The true depth is 4, that of the file 1. Dip and nose share the difference by their variances, 9 and 0.04."""
     found = diagnose(Nose(depth))
     assert found.verdict.answer == answer
     if answer == "named":
@@ -76,12 +76,12 @@ def test_a_depth_that_the_tolerance_allows_for_has_a_name_if_it_is_certain(depth
         assert found.fit.psi[0] + found.fit.values["depth"] == pytest.approx(4.0, rel=0.02)
 
 
-def test_what_does_not_explain_the_recordings_has_no_name():
-    """A dip of a tenth of the width is not what the nose lacks."""
+def test_a_dip_that_does_not_explain_the_recordings_has_no_name():
+    """A dip of a tenth of the width does not explain the wear of the nose."""
     assert diagnose(Nose(4.0, width=0.1)).verdict.answer == "none"
 
 
-def test_a_nose_certainly_twice_as_deep_as_its_file_is_a_dip_beside_it():
+def test_a_nose_clearly_twice_as_deep_as_in_the_file_is_reported_as_a_dip():
     plan = replace(PLAN.turnout, routes={"main": ((NOSE,),)}, spreads={NOSE: {"place": 0.02, "depth": 0.4}})
     surface = RunningSurface(plan, Waves([s.place for s in PLAN.sensors], 0.0), ("main",))
     fit = SimpleNamespace(values={"surface_0_place": 0.1, "surface_0_depth": 1.2, "surface_0_power": 0.0})

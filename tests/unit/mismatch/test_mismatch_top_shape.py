@@ -71,7 +71,7 @@ def test_the_scale_is_the_tolerance_of_the_file_where_both_tops_are_level():
     assert top_shapes(PLAN.turnout, "main", {STOCK: 0.1}) == []  # no blade
 
 
-def test_an_error_changes_its_own_top_about_the_change_and_is_common_to_all_wheels():
+def test_an_error_acts_on_its_own_top_near_the_change_and_on_all_wheels():
     surface = RunningSurface(FILED, WAVES, ("main",))
     assert set(surface.shape_names) <= set(surface.names) and len(surface.shape_names) >= 4
     known = {n.name: n for n in surface.nuisances()}
@@ -108,7 +108,7 @@ class Bumps(Case):
 
 
 @pytest.mark.parametrize("trains", [1, 4])
-def test_a_hump_has_to_exceed_the_error_however_many_trains_meet_it(trains):
+def test_a_hump_has_to_exceed_the_error_for_any_number_of_trains(trains):
     """Evidence of the joint fit, against that of one Gaussian with the covariance of the process in closed form."""
     distance = np.linspace(-TOP_SHAPE.reach, TOP_SHAPE.reach, 21)
     modes = principal_modes(top_covariance(distance, 1.0), TOP_SHAPE.kept_variance)
@@ -125,4 +125,4 @@ def test_a_hump_has_to_exceed_the_error_however_many_trains_meet_it(trains):
     with_error = modes.T @ modes
     expected = log_density(with_error + 9.0 * np.outer(modes[0], modes[0])) - log_density(with_error)
     assert gain == pytest.approx(expected, abs=0.02)
-    assert gain < 1.0  # it would be 100 nats and more against an exact top
+    assert gain < 1.0  # against an exact top it would be 100 nats and more

@@ -1,4 +1,4 @@
-"""Two effects at once: rejected one by one, named together; and effects that explain the same with fewer numbers."""
+"""Two effects together: each alone is rejected, both are named; and effects with fewer numbers are preferred."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -48,8 +48,8 @@ class Shapes(Case):
         return [sum((a * SHAPES[n] for n, a in terms), np.zeros(X.size)) for _ in observations]
 
 
-def test_two_effects_of_which_either_leaves_too_much_are_both_named():
-    """Alone the larger leaves twenty times the control level; its size and the other's are those put in."""
+def test_two_effects_that_are_insufficient_alone_are_both_named():
+    """The larger one alone leaves twenty times the control level. Both sizes are the true ones."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), wave=1.2, ripple=0.0, ramp=2.5))
     assert found.names == ("ramp", "wave") or found.names == ("wave", "ramp")
     for candidate, size in zip(found.fit.candidates, found.fit.psi):
@@ -58,20 +58,20 @@ def test_two_effects_of_which_either_leaves_too_much_are_both_named():
 
 
 def test_two_effects_of_one_part_do_not_confirm_one_another():
-    """The same, of effects on one part: two of them fit nearly any shape, so what is missing stays unknown."""
+    """The same with effects on one part: two of them fit nearly any shape, so the answer is unknown."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), component="spring", wave=1.2, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
 
 
-def test_an_effect_that_no_name_fits_keeps_the_first_one_rejected_too():
-    """What is left beside the best shape is a ripple, which no candidate has."""
+def test_with_an_effect_outside_the_library_the_first_name_is_rejected_as_well():
+    """The residual beside the best shape is a ripple, which no candidate describes."""
     found = diagnose(Shapes(("wave", "ramp", "bowl"), ripple=1.5, ramp=2.5))
     assert found.verdict.answer == "unknown" and not found.names
     assert found.fit is found.base
 
 
 def test_a_second_effect_without_a_name_is_reported_beside_the_first():
-    """A ripple that no candidate has takes nothing from the ramp, but with the ramp not all is said."""
+    """A ripple that no candidate describes does not affect the ramp, but the ramp does not explain everything."""
     found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
     assert found.names == ("ramp",) and found.verdict.grade == "B"
     assert found.verdict.reason.startswith("a second effect without a name remains: ")
@@ -87,20 +87,20 @@ class LocatedShapes(Shapes):
         return [ResidualSpace((o.name,), columns, levels) for o in self.observations]
 
 
-def test_the_sentence_on_a_second_effect_without_a_name_states_where_it_is():
+def test_the_sentence_on_a_second_effect_without_a_name_states_its_location():
     found = diagnose(LocatedShapes(("wave", "ramp"), ramp=2.5, ripple=0.12))
     assert found.names == ("ramp",)
     assert found.verdict.reason.startswith("a second effect without a name remains in channel A8: ")
 
 
-def test_a_name_is_graded_by_what_the_last_fit_leaves():
-    """Alone the ramp leaves twice the control level; with the wave no more than they do."""
+def test_the_grade_of_a_name_follows_from_the_residual_of_the_last_fit():
+    """The ramp alone leaves twice the control level; with the wave the residual is at the control level."""
     found = diagnose(Shapes(("wave", "ramp"), ramp=2.5, wave=0.2))
     assert [(v.names, v.grade) for v in found.verdicts] == [(("ramp",), "A"), (("wave",), "A")]
     assert found.probability == min(v.probability for v in found.verdicts)
 
 
-def test_two_effects_that_gain_alike_are_both_there_and_no_choice():
+def test_two_effects_with_equal_gains_are_both_named_and_no_choice():
     """A wave and a ripple of one size gain 80 nats each, within the margin of one another, and explain
     different things."""
     found = diagnose(Shapes(("wave", "ripple"), wave=0.06, ripple=0.06))
@@ -109,8 +109,8 @@ def test_two_effects_that_gain_alike_are_both_there_and_no_choice():
     assert gains[0] > 50.0 and len(gains) == 1  # the other is no rival of it
 
 
-def test_two_shapes_of_one_effect_stay_a_choice(monkeypatch):
-    """Beside the wave the same wave, 0.01 further along, has nothing left to explain."""
+def test_two_shapes_of_one_effect_are_a_choice(monkeypatch):
+    """Beside the wave the same wave with a shift of 0.01 has no residual to explain."""
     monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
     found = diagnose(Shapes(("wave", "twin"), wave=0.08))
     assert (
@@ -120,8 +120,8 @@ def test_two_shapes_of_one_effect_stay_a_choice(monkeypatch):
 
 @pytest.mark.parametrize("wave, ramp", [(1.2, 0.8), (0.12, 2.5)])
 def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp):
-    """No data distinguish a wave from the same wave 0.01 further along, two effects of one spring. The ramp is neither,
-    and has its name whether it is found after or before that choice."""
+    """No data distinguish a wave from the same wave with a shift of 0.01, two effects of one spring. The ramp is
+    another effect and is named, whether it is found after or before that choice."""
     monkeypatch.setitem(SHAPES, "twin", np.sin(9.0 * X + 0.01))
     case = Shapes(("wave", "twin"), component="spring", wave=wave, ramp=ramp)
     case.candidates += Shapes(("ramp",)).candidates
@@ -133,7 +133,7 @@ def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp)
 
 
 class Trains(Shapes):
-    """Two trains with a wave each, seen twenty times over the noise; ``told`` whether candidates say of which train."""
+    """Two trains with a wave each, of twenty times the noise; ``told``: whether candidates name their train."""
 
     def __init__(self, told):
         super().__init__(())
@@ -153,7 +153,7 @@ class Trains(Shapes):
 
 @pytest.mark.parametrize("told, names", [(True, ("wave", "wave")), (False, ())])
 def test_wheels_of_two_trains_confirm_one_another(told, names):
-    """No recording shows both. Two of one kind that may act on the same recordings do not."""
+    """No recording shows both. Two of one kind that may act on the same recordings do not confirm each other."""
     found = diagnose(Trains(told))
     assert found.names == names
     if told:
@@ -177,24 +177,28 @@ GAP = (
     "seated, nats, said",
     [
         (0.33, 93.9, ("local_ballast",)),
-        (0.33, 94.1, ("local_ballast", "hanging_sleeper")),  # of which the lead is the price of the gap's own parameter
+        (
+            0.33,
+            94.1,
+            ("local_ballast", "hanging_sleeper"),
+        ),  # the lead is the penalty of the further parameter of the gap
         (0.33, 102.0, ("hanging_sleeper", "local_ballast")),
-        (0.75, 94.1, ("local_ballast", "hanging_sleeper")),  # seated on more than the ballast carries: another thing
+        (0.75, 94.1, ("local_ballast", "hanging_sleeper")),  # seated on more than the ballast carries: another effect
         (0.33, 107.0, ("hanging_sleeper",)),
     ],
 )
-def test_a_gap_and_softer_ballast_that_are_as_likely_are_a_choice(seated, nats, said):
-    """A third of the bed bears, and no train closes the gap: that is ballast of a third; nothing tells more."""
+def test_a_gap_and_softer_ballast_of_equal_probability_are_a_choice(seated, nats, said):
+    """A third of the ballast bears, and no train closes the gap: the same response as ballast of a third."""
     here = {"sleeper": 7, "place": 4.2}
     ballast = Candidate.of("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
     gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
     scores = [own(gap, [3e-3, seated], [1e-3, 0.03], nats), own(ballast, [0.35], [0.04])]
     verdict = judge(scores, 2.0, MismatchSettings())
     assert verdict.names == said
-    assert verdict.scores[0].family == said[0]  # whose fit and place are shown
+    assert verdict.scores[0].family == said[0]  # whose fit and position are stated
 
 
-def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
+def test_the_size_of_an_effect_with_two_amplitudes_is_that_of_both():
     """0.3 and 0.4 are half a metre per second squared."""
     pair = (AMOUNT[0], Parameter("cosine", "-", 0.0, (-9.0, 9.0), "the other part", "made up 2026"))
     hum = Candidate.of(
@@ -205,8 +209,8 @@ def test_the_size_of_what_has_two_amplitudes_is_that_of_both():
 
 
 @pytest.mark.parametrize("error, told", [(1.0, True), (4.0, False)])
-def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
-    """8 kg, of which 5 matter: sure by three standard errors, or open."""
+def test_a_mass_that_may_be_negligible_is_not_named(error, told):
+    """8 kg, with a smallest reported mass of 5 kg: certain by three standard errors, or uncertain."""
     mass = (Parameter("mass", "kg", 0.0, (0.0, 200.0), "what hangs there", "made up 2026"),)
     hung = Candidate.of(
         "attached_resonator",
@@ -221,8 +225,8 @@ def test_a_mass_that_may_as_well_be_nothing_is_not_named(error, told):
 
 
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
-def test_a_start_that_turns_has_the_predicted_gain_of_its_direction(whole, share):
-    """The data want a third of the start; half the cost falls by 2 s q - s² q with q its size and s the share."""
+def test_the_predicted_gain_of_a_start_is_that_along_its_direction(whole, share):
+    """The data need a third of the start; half of the cost falls by 2 s q - s² q with q its size and s the share."""
     case = Shapes(("wave",), wave=1.0)
     projector = Projector(case, fit_jointly(case))
     candidate = Candidate.of("wave", AMOUNT, lambda p: p, ((3.0,),), nonlinear_in_size=whole)
@@ -232,8 +236,8 @@ def test_a_start_that_turns_has_the_predicted_gain_of_its_direction(whole, share
 
 
 def test_columns_are_scored_together_as_alone():
-    """More than fit into one block; nothing, a column already whitened, and none at all among them. The gain is that of
-    the whole problem solved at once, nuisances and size."""
+    """More columns than one block holds, among them a zero, a whitened and a missing column. The gain is that of the
+    joint problem of nuisances and size."""
     case = Shapes(("wave",), wave=1.0)
     fit = fit_jointly(case)
     projector = Projector(case, fit)
@@ -257,8 +261,8 @@ def test_columns_are_scored_together_as_alone():
     assert together[0] == pytest.approx((right @ size - right[:-1] @ without, size[-1]), rel=1e-6)
 
 
-def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
-    """Of seat_A2 nothing is learnt either, and nothing is said."""
+def test_a_masking_parameter_is_reset_with_its_effect_also_without_information_on_it():
+    """There is no information on seat_A2 either, and it has no entry."""
     case = SimpleNamespace(nuisances=[Nuisance(n, "-", 0.0, 0.1) for n in ("seat_A1", "gain_A1", "seat_A2")])
     values = {"seat_A1": 0.0, "gain_A1": 0.03, "seat_A2": 0.0}
     fit = SimpleNamespace(covariance=np.diag([1e-2, 1e-4, 1e-2]), values=values)
@@ -267,8 +271,8 @@ def test_a_twin_goes_back_with_its_effect_even_where_nothing_is_learnt_of_it():
 
 
 @pytest.mark.parametrize("error, names", [(3e-3, ("hanging_sleeper", "local_ballast")), (1e-4, ("hanging_sleeper",))])
-def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
-    """2.5 ± 3 mm has no upper end: what lies beneath was never touched, and nobody can say whether it is there."""
+def test_a_gap_that_no_train_closes_may_be_missing_ballast(error, names):
+    """2.5 ± 3 mm has no upper bound: the sleeper never touched the ballast, which may be missing."""
     here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
     gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
     alone = judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings)
@@ -278,8 +282,8 @@ def test_a_gap_that_no_train_closes_may_be_no_ballast_at_all(error, names):
 
 
 @pytest.mark.parametrize("error, answer", [(3e-3, "a_or_b"), (1e-4, "named")])
-def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answer):
-    """Sure of its size when it was named, not in the fit with both."""
+def test_a_second_gap_that_no_train_closes_may_be_missing_ballast_too(error, answer):
+    """Its size is certain when it is named, and uncertain in the fit with both."""
     settings = MismatchSettings()
     gap = Candidate.of(
         "hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, unbounded_form="local_ballast"
@@ -296,7 +300,7 @@ def test_a_second_gap_that_no_train_closes_may_be_no_ballast_either(error, answe
     assert (stated.answer, stated.grade) == (answer, "B" if answer == "named" else "")
 
 
-def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
+def test_a_second_effect_of_a_kind_two_bays_away_is_an_error_of_shape_of_the_first():
     def at(family, place):
         return Candidate.of(family, FACTOR, lambda p: p, ((0.4,),), {"place": place})
 
@@ -309,9 +313,9 @@ def test_a_second_of_a_kind_two_bays_on_is_the_shape_of_the_first():
     ({"train": "a"}, {"train": "a", "axle": 2}, False),  # heavy wheels, and a wheel flat
     ({"train": "a", "axle": 1}, {"train": "a", "axle": 2}, True),  # two flats
 ])  # fmt: skip
-def test_a_wheel_known_by_its_impacts_is_no_shape_of_heavy_wheels(known, offered, same):
-    """A wheel has a flat and all wheels of its train are heavy: two parts. A wheel out of round has no
-    impacts that identify it, and may be what heavy wheels leave."""
+def test_a_wheel_flat_with_impacts_is_no_error_of_shape_of_heavy_wheels(known, offered, same):
+    """A wheel has a flat and all wheels of its train are heavy: two effects. An out-of-round wheel has no impacts that
+    identify it, and may be an error of the shape of heavy wheels."""
 
     def of(where, sounding):
         return Candidate.of(
@@ -324,9 +328,9 @@ def test_a_wheel_known_by_its_impacts_is_no_shape_of_heavy_wheels(known, offered
 
 
 @pytest.mark.parametrize("left, answer", [(50.0, "named"), (5.0, "a_or_b")])
-def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
-    """Wave and ripple are both there. The ramp gains as much as either: beside the wave still 50 nats, so it is a rival
-    of the ripple alone, or nothing, so it is one of the wave's."""
+def test_an_effect_that_keeps_its_gain_beside_the_leader_is_no_rival(left, answer):
+    """Wave and ripple are both in the data. The ramp alone gains as much as each. Beside the wave it gains 50 nats, and
+    is a rival of the ripple alone, or nothing, and is a rival of the wave."""
     case = Shapes(("wave", "ripple", "ramp"), wave=0.06, ripple=0.06)
     fits = [fit_jointly(case, (c,), [0.06], iterations=20) for c in case.candidates]
     scores = tuple(Score(c, g, 0.0, 1.0, f) for c, g, f in zip(case.candidates, (60.0, 59.0, 58.0), fits))
@@ -342,9 +346,9 @@ def test_a_rival_that_keeps_its_gain_on_top_of_the_leader_is_none(left, answer):
 
 
 @pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
-def test_a_second_effect_of_which_impacts_alone_predict_half_is_refitted(promised, scouted, asked):
-    """What trains say of it comes on top: a soft rail of 12 nats in impacts had 20 in all. What a column promises is of
-    all recordings together, and has to be a name; a first effect is asked from 2 nats on."""
+def test_a_second_effect_with_half_of_the_threshold_in_impacts_alone_is_refitted(promised, scouted, asked):
+    """Trains add evidence: a soft rail of 12 nats in impacts had 20 in total. The predicted gain of a column is that of
+    all recordings and has to reach the threshold; a first effect is refitted from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate.of("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = Entry(promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
     assert required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
@@ -362,9 +366,9 @@ def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
     assert [(e["term"], e["probability"], e["reason"]) for e in said["beside"]] == [("b", 0.7, "y")]
 
 
-def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
-    """A ramp alone is in the recordings; a bowl that was named before it, which is half a ramp, is worth nothing beside
-    it. Where both are there both stay."""
+def test_a_first_name_without_a_gain_beside_the_second_is_withdrawn():
+    """Only a ramp is in the recordings. A bowl that was named before it, and is half a ramp, has no gain beside it. If
+    both are in the recordings, both stay."""
     for true, left in (({"ramp": 2.5}, ("ramp",)), ({"ramp": 2.5, "bowl": 2.5}, ("bowl", "ramp"))):
         case = Shapes(("ramp", "bowl"), **true)
         pair = case.candidates[::-1]
@@ -376,8 +380,9 @@ def test_a_first_name_that_the_second_leaves_nothing_to_is_dropped():
 
 
 @pytest.mark.parametrize("ripple, said", [(0.0, "named"), (3.0, "unknown")])
-def test_a_second_name_that_is_left_alone_has_to_explain_what_is_there(ripple, said):
-    """Beside a bowl that was named first it needed not: the ripple could have been the bowl's shape."""
+def test_a_second_name_that_remains_alone_has_to_explain_the_residual(ripple, said):
+    """Beside a bowl that was named first it had not to: the ripple could have been an error of the shape of the
+    bowl."""
     case = Shapes(("ramp", "bowl"), ramp=2.5, ripple=ripple)
     pair = case.candidates[::-1]
     fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
@@ -391,9 +396,9 @@ def test_a_second_name_that_is_left_alone_has_to_explain_what_is_there(ripple, s
 
 
 @pytest.mark.parametrize("reserved, left", [(0.0, ("ramp",)), (0.55, ("ramp", "bowl")), (1.0, ("ramp", "bowl"))])
-def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left):
-    """A bowl of 1.0 shows in all that is fitted. Where none of it is in the recording kept aside, the pair misses that
-    by as much as it gains elsewhere; with a share of 0.55 it gains a little there, and stays."""
+def test_a_second_name_that_reserved_recordings_contradict_is_withdrawn(reserved, left):
+    """A bowl of 1.0 is in all fitted recordings. If it is not in the reserved recording, the pair loses there as much
+    as it gains elsewhere; with a share of 0.55 it gains a little there, and stays."""
     case = Shapes(("ramp", "bowl"), ramp=2.5, bowl=1.0)
     kept = 2.5 * SHAPES["ramp"] + reserved * SHAPES["bowl"] + 0.1 * np.random.default_rng(6).normal(size=X.size)
     case.reserved = (Observation("kept", "day 9", kept, np.full(X.size, 0.1)),)
@@ -407,8 +412,8 @@ def test_a_second_name_that_recordings_never_used_deny_is_dropped(reserved, left
 
 
 @pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
-def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade, said):
-    """A drifting clock bends what its channel shows into much else: first or second, it has to explain all."""
+def test_an_effect_that_has_to_explain_everything_has_no_name_if_an_excess_remains(last, grade, said):
+    """A drifting clock can imitate many other effects in its channel: as first or second name it has to explain all."""
     rules = {name: NamingRules(must_reach_control_level=name == last) for name in ("bowl", "ramp")}
     pair = [replace(c, naming=rules[c.family]) for c in Shapes(("bowl", "ramp")).candidates]
     posterior = {"bowl": 0.9, "ramp": 0.05, "unknown": 0.05}
@@ -428,8 +433,9 @@ def test_what_would_leave_nothing_is_no_name_where_something_is_left(last, grade
 
 
 @pytest.mark.parametrize("ripple, answer", [(0.0, "named"), (0.12, "unknown")])
-def test_a_diagnosis_withdraws_what_would_leave_nothing(ripple, answer):
-    """The ramp is there; with a ripple that no candidate has it is of grade B, which a drifting clock may not be."""
+def test_a_diagnosis_withdraws_an_effect_that_has_to_explain_everything_and_does_not(ripple, answer):
+    """The ramp is in the data. With a ripple that no candidate describes its grade is B, which this effect must not
+    have."""
     case = Shapes(("wave", "ramp"), ramp=2.5, ripple=ripple)
     rules = NamingRules(must_reach_control_level=True)
     case.candidates = tuple(replace(c, naming=rules) for c in case.candidates)

@@ -1,4 +1,4 @@
-"""A name whose shape stays unresolved and that predicts held-out recordings worse is no name."""
+"""A name with an unresolved shape that predicts held-out recordings worse is withdrawn."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -26,12 +26,12 @@ WORSE = Verification(1, 27.6, 26.0, error=0.9)
     ("after", "error", "fell"),
     [(26.0, 0.9, True), (26.0, 1.7, False), (28.0, 0.1, False), (26.0, None, False)],
 )
-def test_a_fall_is_one_beyond_its_standard_error(after, error, fell):
+def test_a_fall_of_the_fit_counts_beyond_its_standard_error(after, error, fell):
     assert Verification(1, 27.6, after, error=error).is_worse is fell
 
 
-def test_a_model_that_predicts_nothing_is_left_to_the_earlier_rules():
-    """Without a prediction there is no error either: such a name was rejected when it was judged."""
+def test_a_model_without_a_prediction_is_decided_by_the_earlier_rules():
+    """Without a prediction there is no error either: earlier rules reject such a name."""
     assert not Verification(1, 27.6).is_worse
 
 
@@ -46,7 +46,7 @@ def test_a_name_of_grade_b_becomes_unknown_with_the_probability_of_that():
 
 
 @pytest.mark.parametrize("verdict", [Verdict("named", ("dip",), "A", 0.97), Verdict("none"), Verdict("a_or_b")])
-def test_other_answers_stay(verdict):
+def test_other_answers_are_not_changed(verdict):
     (found,) = confirm((verdict,), WORSE, MismatchSettings())
     assert found == replace(verdict, trail=("not_contradicted",))
 
@@ -61,7 +61,7 @@ def named(family, grade, gain):
 def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade_if_its_evidence_contradicts(
     grade, after, withdrawn
 ):
-    """59.4 to 57.8 % with a standard error of 0.7 was once kept with grade A."""
+    """59.4 to 57.8 % with a standard error of 0.7 was formerly accepted with grade A."""
     check = Verification(1, 59.4, after, error=0.7, lost_evidence=13.0)
     (result,) = confirm((named("pad_preload", grade, 60.0),), check, MismatchSettings())
     is_unknown = withdrawn or (grade == "B" and after < 59.4 - 0.7)
@@ -75,19 +75,20 @@ def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade_if_its_evid
     ("gain", "lost", "answer"),
     [(20.0, 5.0, "named"), (20.0, 7.0, "unknown"), (300.0, 50.0, "named"), (300.0, 61.0, "unknown")],
 )
-def test_the_same_fall_counts_by_the_evidence_that_it_costs(gain, lost, answer):
-    """Half a threshold (6 nats) and a fifth of the evidence: as for any condition that is left out. No grade A."""
+def test_an_equal_fall_of_the_fit_counts_by_its_loss_of_evidence(gain, lost, answer):
+    """Half a threshold (6 nats) and a fifth of the evidence, as for any condition that is left out. No grade A."""
     check = Verification(1, 59.4, 56.0, error=0.7, lost_evidence=lost)
     (found,) = confirm((named("zener_pad", "A", gain),), check, MismatchSettings())
     assert (found.answer, found.grade) == (answer, "B" if answer == "named" else "")
     assert (f"{lost:.{int(lost < 10.0)}f} nats" in found.reason) == (
         answer == "unknown"
-    )  # what is allowed needs no number
+    )  # an allowed fall is not stated
 
 
 @pytest.mark.parametrize(("allowed", "answer"), [(1.0, "named"), (0.5, "unknown")])
 def test_a_fall_within_the_allowed_points_withdraws_no_name(allowed, answer):
-    """Frequency-dependent pads show in impacts. Trains fell from 37.25 to 36.61 %, four standard errors."""
+    """Frequency-dependent pads are found in impacts. The fit of trains fell from 37.25 to 36.61 %, four standard
+    errors."""
     check = Verification(2, 37.25, 36.61, error=0.15, lost_evidence=20.0)
     (found,) = confirm((named("zener_pad", "A", 40.0),), check, MismatchSettings(fall=allowed))
     assert (found.answer, found.grade) == (answer, "A" if answer == "named" else "")
@@ -119,7 +120,7 @@ def test_the_answer_none_is_withdrawn_where_held_out_recordings_are_not_predicte
     assert confirm((none,), Verification(1, 27.6, reserved_excess=1.9), settings)[0].answer == "none"
 
 
-def test_what_is_left_of_reserved_recordings_is_held_against_the_level_of_controls():
+def test_the_residual_of_reserved_recordings_is_compared_with_the_control_level():
     """Two recordings of one kind, errors of 3 and 1 sigma: a mean square of 5 over a level of 0.5; of the other 1."""
     rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]
     case = with_reserved(rows, {"a": 0.5, "b": 1.0})
@@ -153,7 +154,7 @@ class Line(Case):
 
 
 @pytest.mark.parametrize(("slope", "answer"), [(2.0, "none"), (2.03, "unknown")])
-def test_a_diagnosis_states_it(slope, answer):
+def test_a_diagnosis_states_that_held_out_recordings_are_not_predicted(slope, answer):
     found = diagnose(Line(slope))
     assert found.verdict.answer == answer
     assert ("held-out" in sentence(found)) is (answer == "unknown")

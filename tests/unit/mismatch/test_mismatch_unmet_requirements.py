@@ -1,4 +1,4 @@
-"""What recordings cannot show: every effect states its requirements, and an answer lists those that are not met."""
+"""Every effect states its requirements of recordings, and an answer lists those that are not met."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ def is_silent_without_passages(effect):
 
 
 @pytest.mark.parametrize("effect", [e for e in physics.TERMS if e.asked], ids=lambda e: e.name)
-def test_an_effect_requires_passages_if_it_is_tested_in_them_alone(effect):
+def test_an_effect_requires_passages_if_it_has_candidates_only_with_passages(effect):
     if effect.name in ("clipping", "rail_shear"):  # a saturated channel shows in impacts; the rail has to be a real one
         return
     assert (PASSAGES in effect.requirements) == is_silent_without_passages(effect)
@@ -45,18 +45,20 @@ def unexamined(plan, **changes):
     return case, {u.effect: u for u in case.unmet_requirements}
 
 
-def test_passages_alone_do_not_show_what_needs_impacts_or_temperatures():
+def test_passages_alone_do_not_show_effects_that_need_impacts_or_temperatures():
     case, lacking = unexamined(small_plan((15.0,), hammer_positions=()))
     assert {"local_pad", "mount_resonance", "pad_temperature"} <= set(lacking)
     assert not {"surface_dip", "wheel_flat", "slide_chair_gap", "rail_corrugation"} & set(lacking)
     families = {c.family for c in case.candidates}
-    assert "local_pad" in families and "pad_temperature" not in families  # little evidence is no reason not to test
+    assert (
+        "local_pad" in families and "pad_temperature" not in families
+    )  # an effect with little evidence is tested nevertheless
     words = requirements_in_words(case.unmet_requirements)
     assert words.startswith("These recordings cannot show") and "more (needs hammer tests)" in words
     assert "pads that soften when warm (needs recordings at a rail temperature 15 K away)" in words
 
 
-def test_impacts_alone_do_not_show_what_needs_trains():
+def test_impacts_alone_do_not_show_effects_that_need_trains():
     _, lacking = unexamined(small_plan((5.0, 30.0)), passages=(), reserved=())
     assert {"surface_dip", "wheel_flat", "unsprung_mass", "hum", "rail_corrugation"} <= set(lacking)
     assert "pad_temperature" not in lacking and "local_pad" not in lacking
@@ -65,7 +67,7 @@ def test_impacts_alone_do_not_show_what_needs_trains():
 
 
 @pytest.mark.parametrize(("nats", "answer"), [(12.5, "unknown"), (11.5, "none")])
-def test_an_effect_that_recordings_show_and_cannot_identify_is_unknown_from_the_evidence_of_a_name_on(nats, answer):
+def test_an_effect_that_recordings_show_and_do_not_identify_is_unknown_above_the_threshold(nats, answer):
     line = Ambiguity(nats, "the level is high", "passages at another speed", "wavelength", "0.15 m", 2.0, 6.0)
     verdict = judge([], 0.5, MismatchSettings(), ambiguity=line)
     assert verdict.answer == answer and verdict.is_ambiguous == (answer == "unknown")

@@ -1,4 +1,4 @@
-"""Where a kind of diagnosis is not proven, its names are withheld unless the settings ask for them."""
+"""If a kind of diagnosis is not proven, its names are withheld unless the settings request them."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ class Bent(Case):
     ("reservation", "asked", "answer"),
     [("", False, "named"), (RESERVATION, False, "unknown"), (RESERVATION, True, "named")],
 )
-def test_a_name_is_withheld_where_the_diagnosis_is_not_proven(reservation, asked, answer):
+def test_a_name_is_withheld_if_the_diagnosis_is_not_proven(reservation, asked, answer):
     found = diagnose(Bent(1.0, reservation), MismatchSettings(unproven_names=asked))
     assert found.verdict.answer == answer
     assert found.names == (("bend",) if answer == "named" else ())
@@ -49,5 +49,5 @@ def test_a_name_is_withheld_where_the_diagnosis_is_not_proven(reservation, asked
         assert "panel_not_proven" in found.verdict.trail
 
 
-def test_no_difference_stays_none():
+def test_the_answer_none_is_not_withheld():
     assert diagnose(Bent(0.0, RESERVATION)).verdict.answer == "none"

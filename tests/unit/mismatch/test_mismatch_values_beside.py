@@ -1,4 +1,4 @@
-"""Nuisances fitted again beside some that are held at other values: minimum of the quadratic cost about a fit."""
+"""Nuisances fitted again beside some that are fixed at other values: minimum of the quadratic cost about a fit."""
 
 import numpy as np
 import pytest
@@ -17,20 +17,20 @@ def fit():
                evaluations=0, **parts)  # fmt: skip
 
 
-def test_the_gradient_of_the_cost_vanishes_in_all_that_is_free(fit):
+def test_the_gradient_of_the_cost_is_0_for_all_free_values(fit):
     beside = fit.values_beside({"a": 1.4, "c": -0.3})
     moved = np.array([beside[name] - fit.values[name] for name in fit.values])
     hessian = np.linalg.inv(np.linalg.inv(HESSIAN)[:3, :3])  # of the nuisances, the effect at its best
     assert (beside["a"], beside["c"]) == (1.4, -0.3)
     assert (hessian @ moved)[1] == pytest.approx(0.0, abs=1e-12)
-    assert abs(moved[1]) > 0.05  # b follows: a and c alone would leave a gradient
+    assert abs(moved[1]) > 0.05  # b changes as well: with a and c alone the gradient would not be 0
 
 
-def test_nothing_moves_if_nothing_is_held_elsewhere(fit):
+def test_no_value_changes_if_none_is_fixed_elsewhere(fit):
     assert fit.values_beside({}) == fit.values
     assert fit.values_beside({"b": -2.0}) == pytest.approx(fit.values, abs=1e-15)
 
 
-def test_a_name_that_is_no_nuisance_is_stated(fit):
+def test_an_error_states_a_name_that_is_no_nuisance(fit):
     with pytest.raises(KeyError, match="z"):
         fit.values_beside({"z": 1.0})

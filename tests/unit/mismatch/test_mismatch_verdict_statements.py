@@ -1,4 +1,4 @@
-"""Small cases in which a statement would be wrong although every part of it looks right."""
+"""Small cases that led to wrong statements, although every part of the statement seemed right."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -36,7 +36,7 @@ from turnout.stages.finding_row import finding_row
 
 
 class Alike(Case):
-    """Two shapes of which one is 0.62 like the other; only that other is there."""
+    """Two shapes with a similarity of 0.62; only one of them is in the data."""
 
     def __init__(self):
         rng = np.random.default_rng(3)
@@ -64,8 +64,9 @@ class Alike(Case):
         return [values["offset"] + sum((a * self.shape[n] for n, a in terms), np.zeros(300)) for _ in observations]
 
 
-def test_a_first_effect_is_not_credited_with_what_the_second_explains():
-    """Alone it leaves most and is rejected. Beside the second it is 0.0: what the pair gains is the second's."""
+def test_a_first_effect_is_not_named_for_the_evidence_of_the_second():
+    """Alone it leaves most of the residual and is rejected. Beside the second its size is 0: the gain is the
+    second's."""
     case = Alike()
     search = Search(case)
     like, there = case.candidates
@@ -81,7 +82,7 @@ def test_a_first_effect_is_not_credited_with_what_the_second_explains():
 
 
 class OneChannelAbove(Case):
-    """A channel at twice what it is in controls in one recording, all else at their level."""
+    """A channel at twice its control level in one recording, all others at their control level."""
 
     def __init__(self):
         labels = {"sensor": np.array(["S1"], dtype=object)}
@@ -99,8 +100,8 @@ def with_squares(square, hammer):
 
 
 @pytest.mark.parametrize(("after", "answer", "grade"), [(4.0, "unknown", ""), (2.2, "named", "B"), (1.9, "named", "A")])
-def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade):
-    """A name of 13 nats that leaves the level of the channel as it was explains nothing of the excess."""
+def test_a_name_has_to_lower_the_channel_with_the_excess(after, answer, grade):
+    """A name of 13 nats that does not lower the level of the channel does not explain the excess."""
     search = Search(OneChannelAbove())
     factor = Parameter("factor", "-", 1.0, (0.05, 20.0), "", "made up 2026")
     pad = Candidate.of("local_pad", (factor,), lambda p: p, ((0.4,),), {"place": 3.0})
@@ -113,15 +114,15 @@ def test_a_channel_that_raises_the_alarm_is_asked_for_again(after, answer, grade
     assert assess(search, base, [])[0].answer == "unknown"
 
 
-def test_what_a_name_leaves_in_a_channel_is_not_asked_of_a_second_effect():
-    """A mounting not quite of its shape leaves an excess in its channel; a flat beside it has no part in that."""
+def test_a_second_effect_need_not_explain_the_residual_of_a_name_in_its_channel():
+    """A mounting with an error of shape leaves an excess in its channel; a flat beside it does not explain that."""
     first, both = (SimpleNamespace(**{**vars(with_squares(4.0, 0.5)), "candidates": c}) for c in ("m", "mf"))
     assert explained_share(Search(OneChannelAbove()), first, both) == 1.0
 
 
 @pytest.mark.parametrize("place", [12.0, 12.07, 12.2])
-def test_the_receptance_under_the_hammer_is_no_other_a_micrometre_beside_it(place):
-    """The rail between two nodes gives under its own impact, wherever the sensor sits between them."""
+def test_the_receptance_is_continuous_at_the_position_of_the_hammer(place):
+    """The local compliance between two nodes counts for any position of the sensor between them."""
     model = ReceptanceModel(uniform_track(24.0), ())
     here, beside = (model.receptance(place, place + way) for way in (0.0, 1e-6))
     assert np.max(np.abs(beside / here - 1.0)) < 1e-5
@@ -137,11 +138,12 @@ def test_the_seat_of_a_sensor_beside_the_impact_has_the_derivative_of_its_recept
     assert np.allclose(on_rail, difference, atol=0.0, rtol=1e-9)
     assert np.all(on_sleeper == 0.0)
     nodes_alone = (model.nodal_motion(12.2, 12.26 + way) - model.nodal_motion(12.2, 12.26 - way)) / (2.0 * way)
-    assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # what would be left out
+    assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # the part that would be missing
 
 
 def shown(reference, term):
-    """What a channel with ``term`` shows of a train that comes ``reference`` seconds after its recorder starts."""
+    """Signal of a channel with ``term`` for a train that comes ``reference`` seconds after the start of the
+    recorder."""
     time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
     sensor = SimpleNamespace(name="A", place=20.0)
     made = AlignedPassage("p", SimpleNamespace(), (sensor,), time, reference, 30.0)
@@ -152,7 +154,7 @@ def shown(reference, term):
 
 
 @pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
-def test_a_hum_keeps_its_phase_on_the_recorders_clock_whenever_the_train_comes(reference):
+def test_the_phase_of_hum_refers_to_the_clock_of_the_recorder_and_not_to_the_train(reference):
     time, with_hum, _ = shown(reference, physics.Hum("A", 0.8, 0.6))
     _, without, _ = shown(reference, physics.Hum("A", 0.0, 0.0))
     hum = 0.8 * np.sin(2.0 * np.pi * 50.0 * time) + 0.6 * np.cos(2.0 * np.pi * 50.0 * time)
@@ -160,8 +162,8 @@ def test_a_hum_keeps_its_phase_on_the_recorders_clock_whenever_the_train_comes(r
     assert np.allclose((with_hum - without)[20:-20], hum[20:-20], atol=0.05)
 
 
-def test_a_clock_that_drifts_is_late_by_the_time_since_the_record_began():
-    """A share of 1e-3 five seconds into the record: the train is seen 5 ms early, and little more at its end."""
+def test_the_error_of_a_drifting_clock_grows_from_the_start_of_the_record():
+    """A share of 1e-3, five seconds after the start: the train appears 5 ms early, and little more at its end."""
     time, drifted, _ = shown(5.0, physics.ClockDrift("A", 1e-3))
     _, sound, _ = shown(5.0, physics.ClockDrift("A", 0.0))
     lags = np.arange(-8e-3, 8.1e-3, 2.5e-4)
@@ -190,7 +192,7 @@ class Topped(Case):
 
 
 def _limits_of(sensor, peak, whole=None):
-    """The candidate limits of one channel that shows no more than ``peak`` in the band, and ``whole`` at all."""
+    """The candidate limits of one channel with a peak of ``peak`` in the band and ``whole`` in total."""
     recording = SimpleNamespace(
         channels=(SimpleNamespace(name="B"), sensor), index=["B", "A"].index,
         samples=np.array([[0.0, 99.0, 1.0], [0.1, -0.3, -1.0]]) * np.array([[1.0], [whole or peak]]),
@@ -204,8 +206,8 @@ def _limits_of(sensor, peak, whole=None):
     return [candidate_of(physics.Clipping, limit) for limit in physics.Clipping.hypotheses(site)]
 
 
-def test_a_limit_is_found_from_any_start_of_the_library():
-    """1 m/s² of limit moves the cut tops, a fifth of the samples, by ten of their errors."""
+def test_a_limit_of_a_channel_is_found_from_any_start_of_the_library():
+    """A change of the limit by 1 m/s² changes the clipped peaks, a fifth of the samples, by ten standard errors."""
     case = Topped()
     (candidate,) = case.candidates
     base = fit_jointly(case)
@@ -218,15 +220,15 @@ def test_a_limit_is_found_from_any_start_of_the_library():
 
 
 @pytest.mark.parametrize("whole, asked", [(6.2, True), (13.0, True), (14.0, False), (586.6, False)])
-def test_a_channel_is_not_cut_off_below_what_it_has_shown(whole, asked):
-    """12.4 in the band are never reached; 0.9 of 13 lie below that, of 14 not."""
+def test_no_candidate_limit_of_a_channel_is_below_its_peaks(whole, asked):
+    """12.4 in the band are not exceeded; 0.9 of 13 is below that, 0.9 of 14 is not."""
     found = _limits_of(SimpleNamespace(name="A", place=3.0), 6.2, whole)
     assert bool(found) == asked
     assert all(0.9 * whole <= start[0] <= 12.4 for c in found for start in c.starts)
 
 
-def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
-    """Passages two samples late are fixed by two taps; impacts that fit already must not stand in their way."""
+def test_the_decoy_is_fitted_to_recordings_like_those_that_it_predicts():
+    """Two taps correct passages that are two samples late; impacts that fit already must not prevent that."""
     rng = np.random.default_rng(0)
 
     def late(k):
@@ -246,7 +248,7 @@ def test_the_decoy_learns_from_recordings_like_those_it_has_to_predict():
 
 
 def dip(place, shift):
-    """A diagnosis that names a dip at ``place`` of the grid, ``shift`` beyond it, and a misplaced sensor."""
+    """A diagnosis that names a dip with a ``shift`` from ``place`` on the grid, and a misplaced sensor."""
     parameters = physics.SurfaceDip.parameters
     candidate = Candidate.of(
         "surface_dip", parameters, lambda p: physics.SurfaceDip(place, **p), (), {"place": place}, "place"
@@ -267,7 +269,7 @@ def dip(place, shift):
     )  # fmt: skip
 
 
-def test_a_dip_is_reported_where_it_was_fitted_and_not_where_it_was_looked_for():
+def test_a_dip_is_reported_at_its_fitted_position_and_not_at_that_of_the_grid():
     row = finding_row(dip(23.0, 0.25), {})
     assert (row["position_m"], row["position_se_m"]) == (23.25, 0.03)
 
@@ -288,8 +290,8 @@ def rolled():
 
 
 def test_noise_is_not_measured_while_the_train_comes(rolled):
-    """The same passage with its start cut off, to a twentieth of a second before the first wheel: what the sensors
-    show then is the train, and a channel is no noisier for it."""
+    """The same passage without its start, up to a twentieth of a second before the first wheel: the sensors then record
+    the train, and this must not count as noise of a channel."""
     made = next(iter(rolled.aligned_passages.values()))
     passage, sigma = made.passage, []
     for cut in (0.0, made.reference - 0.05):
@@ -315,8 +317,8 @@ def test_one_sensor_does_not_distinguish_a_position_from_its_own_channel(rolled)
     assert kinds == {"clock", "sensor"}
 
 
-def test_passages_that_are_all_reserved_suggest_nothing_and_stop_nothing():
-    """Waves of the rail that no fitted recording depends on have no size."""
+def test_reserved_passages_alone_give_no_candidates_and_no_error():
+    """Waves of the rail have no size if no fitted recording depends on them."""
     campaign = intact_campaign((24.0,), 7)
     case = TrackCase(replace(campaign, reserved=tuple(p.name for p in campaign.passages)))
     assert case.aligned_passages and not any(o.name in case.aligned_passages for o in case.observations)

@@ -1,4 +1,4 @@
-"""Each wheel meets a nose otherwise than the file has it: an error of the passage's own, as a simulation has it."""
+"""Each wheel meets a nose differently from the file: an error of each passage, which agrees with simulations."""
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -27,9 +27,9 @@ NOSE = Kink(25.2, 0.3e-3, 0.9, 0.55)
 FILED = replace(PLAN.turnout, routes={"main": ((NOSE,),)}, spreads={NOSE: {"depth": 0.5}})
 
 
-def test_ways_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation():
-    """A tenth of each, by difference, to the curvature's share; the sharper one is gone at both ends and where the nose
-    is deepest."""
+def test_deviations_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation():
+    """Against the difference by a tenth of each, with an error by curvature. The deviation of the sharper nose is 0 at
+    both ends and at the deepest point."""
     way = np.linspace(24.0, 26.5, 25001)
     deeper, further, longer, sharper = _deviations(NOSE, way)
     others = (
@@ -45,13 +45,13 @@ def test_ways_of_wheels_are_those_of_noses_that_differ_by_a_standard_deviation()
     assert sharper.max() == pytest.approx(0.5 * NOSE.depth * (0.75**3 - 0.75**4), rel=1e-3)  # where s = 0.75^4
 
 
-def test_a_level_rail_is_met_alike_by_all():
+def test_on_level_rail_wheels_do_not_differ():
     assert _deviations(replace(NOSE, depth=1e-8), np.linspace(24.0, 26.5, 500)) == []
 
 
-def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_alike_to_all():
-    """Level beyond its ends, which are no wheel's: the ways of wheels are 0 there, and 0.4 m deep in the middle by the
-    fifth part of what lies below the line between the ends. Waves of the rail are no nose."""
+def test_deviations_at_a_measured_surface_have_no_step_and_corrugation_has_none():
+    """Level beyond its ends, where deviations of wheels are 0; in the middle they are a fifth of the depth of 0.4 m
+    below the line between the ends. Waves of the rail are no nose."""
     profile = Sections((24.6, 25.2, 25.8), (0.0, 2.0e-3, 1.6e-3))
     way = np.linspace(22.0, 28.0, 6001)
     deeper, further, longer, sharper = _deviations(profile, way)
@@ -66,7 +66,7 @@ def test_a_measured_surface_that_ends_lower_makes_no_step_and_a_corrugation_is_a
 
 @dataclass(frozen=True)
 class OneWheel(PhysicsTerm):
-    """The second wheel alone falls deeper by ``DEPTH``."""
+    """Only the second wheel falls deeper, by ``DEPTH``."""
 
     name, kind = "one_wheel", "path"
 
@@ -77,9 +77,10 @@ class OneWheel(PhysicsTerm):
 
 
 @pytest.mark.slow
-def test_the_signal_of_a_wheel_that_falls_deeper_is_that_of_a_simulation():
-    """First mode of the second wheel against the march with that wheel's own path. As a wave's column it is that of a
-    free track: 0.99 and 5 % are met, 15 cm between the positions tested would raise it by half."""
+def test_the_signal_of_a_wheel_with_a_deeper_path_is_that_of_a_simulation():
+    """First mode of the second wheel against the simulation with the path of that wheel. Like the column of a wave it
+    is that of a linear track: 0.99 and 5 % are met. A spacing of 15 cm between positions would raise the error by
+    half."""
     case = TrackCase(replace(measured_campaign(replace(PLAN, turnout=FILED), (), 7), turnout=FILED))
     fit = fit_jointly(case, iterations=6)
     o, before = next((o, p) for o, p in zip(case.observations, fit.predictions) if o.name in case.aligned_passages)
@@ -99,7 +100,7 @@ DEEP = replace(NOSE, depth=1.6e-3)
 
 
 @pytest.mark.slow
-def test_errors_of_wheels_that_leave_the_rail_are_those_of_simulations_with_each_wheel_on_its_own_path():
+def test_errors_of_wheels_that_leave_the_rail_are_those_of_simulations_with_single_paths():
     """A deep nose at 44 m/s: every wheel leaves the rail and lands behind it.
 
     The linear response has a cosine below 0.6 with the simulated one there.
@@ -128,7 +129,7 @@ def test_errors_of_wheels_that_leave_the_rail_are_those_of_simulations_with_each
 
 
 class OfOneWheel(Deviation):
-    """The second wheel alone deviates."""
+    """Only the second wheel deviates."""
 
     wheel = 1
 
@@ -185,7 +186,7 @@ def test_products_with_a_residual_are_those_of_the_columns():
 
 
 def test_principal_directions_are_those_of_the_whole_matrix():
-    """Of 60 waves that are combinations of 15, and of 5 more, half of which are too faint."""
+    """60 waves that are combinations of 15, and 5 more, half of which are too weak."""
     rng = np.random.default_rng(2)
     strong = rng.normal(size=(80, 15)) @ rng.normal(size=(15, 60))
     faint = np.linalg.qr(rng.normal(size=(80, 5)))[0] * np.sqrt([0.2, 0.1, 1e-3, 1e-3, 1e-3])

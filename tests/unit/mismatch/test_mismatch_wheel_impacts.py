@@ -1,4 +1,4 @@
-"""Impacts at one position: found above the rolling of wheels, by the wheels that pass there, whatever their cause."""
+"""Impacts at one position, of any cause: found above the rolling noise by the wheels that pass there."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -64,7 +64,7 @@ def at(position, wheels=slice(None), level=5.0):
 
 
 def test_impacts_of_one_train_alone_belong_to_the_train():
-    """A part may rattle under one train only, and a flat is heard while other wheels of its train are there."""
+    """A part may rattle under one train only, and a flat causes impacts while other wheels of its train are there."""
     levels = impact_levels(visit(2, lambda t, k: at(5.3) if k == 2 else None))
     assert levels.evidence() > 12.0 and levels.train() == "a" and abs(levels.position() - 5.3) < 0.5
     both = impact_levels(visit(2, lambda t, k: at(5.3) if k in (2, 3) else None))
@@ -72,16 +72,16 @@ def test_impacts_of_one_train_alone_belong_to_the_train():
 
 
 @pytest.mark.parametrize("level", [2.0, 3.0])
-def test_a_train_that_is_louder_than_the_others_hides_nothing(monkeypatch, level):
-    """Others cause faint impacts there, too: all count as evidence, wherever the impacts belong."""
+def test_a_train_with_stronger_impacts_does_not_hide_those_of_the_others(monkeypatch, level):
+    """Others also cause weak impacts there: all count as evidence, for track or train."""
     levels = impact_levels(visit(2, lambda t, k: at(5.3, level=6.0 if t == "a" else level)))
     monkeypatch.setattr(module, "impact_signals", lambda case: [])
     monkeypatch.setattr(module, "impact_levels", lambda signals: levels)
     assert wheel_impacts(None).nats == levels.evidence() > 12.0 > module._evidence(levels.common)
 
 
-def test_a_few_wheels_of_each_of_several_trains_belong_to_no_train():
-    """Without any one of three trains fewer wheels are left than must agree, and none has as many of its own."""
+def test_impacts_of_a_few_wheels_of_several_trains_belong_to_no_train():
+    """Without one of three trains fewer wheels than the minimum remain, and no train alone has the minimum."""
     rng = np.random.default_rng(3)
     passages = [signal(t, v, 8, rng, at(5.3, slice(0, 2))) for t, v in (("a", 25.0), ("b", 31.0), ("c", 38.0))]
     levels = impact_levels(passages)
@@ -119,13 +119,13 @@ def test_bins_near_a_known_irregularity_do_not_count_at_any_position():
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_impacts_are_located_where_their_wheels_were_a_lag_before(direction):
+def test_impacts_are_located_at_the_wheels_one_lag_before(direction):
     passages = [replace(s, lag=direction * 1.5) for s in visit(1, lambda t, k: (5.3, slice(None)), direction=direction)]
     assert abs(impact_levels(passages).position() - (5.3 - direction * 1.5)) < 0.5
 
 
 @pytest.mark.parametrize(("direction", "sign"), [("facing", 1.0), ("trailing", -1.0)])
-def test_a_known_irregularity_is_left_out_from_1_m_before_to_2_m_behind_it_as_the_train_runs(direction, sign):
+def test_a_known_irregularity_is_left_out_from_1_m_before_to_2_m_behind_it_in_travel_direction(direction, sign):
     case = TrackCase(intact_campaign((), 7))
     aligned = case.fitted_passages()[0]
     aligned = replace(aligned, passage=replace(aligned.passage, direction=direction))
@@ -153,7 +153,7 @@ def with_recording(aligned, **changes):
 
 
 def test_a_case_reports_impacts_and_intact_track_has_none():
-    """Recordings of our own simulator, with its roughness; the band of a slower recorder ends too low."""
+    """Simulated recordings with roughness; the band of a slower recorder ends too low."""
     case = TrackCase(intact_campaign((), 7))
     assert wheel_impacts(case) is None and case.ambiguity() is None
     passages = case.fitted_passages()

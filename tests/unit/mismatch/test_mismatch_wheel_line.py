@@ -1,4 +1,4 @@
-"""Linear responses in a switch: of the rail that wheels press, over the surface that carries them."""
+"""Linear responses in a switch: the rail and the surface that carry each wheel."""
 
 from collections import OrderedDict
 from types import SimpleNamespace
@@ -35,7 +35,7 @@ def change():
     return load_transfer(assemble(TRACK.with_(blade=BLADE)), BLADE, SURFACES, lone_wheels(MASS))
 
 
-def test_a_slow_wheel_changes_where_and_as_gradually_as_stated(change, monkeypatch):
+def test_a_slow_wheel_changes_to_the_blade_over_the_stated_distance(change, monkeypatch):
     """At walking pace, over chairs that do not open, with the nonlinear contact and the deflection of both rails."""
     monkeypatch.setattr(Blade, "ports", lambda *_: [])
     prepared = prepare(TRACK.with_(blade=BLADE), 5e-4)
@@ -68,7 +68,7 @@ def test_the_weight_of_the_blade_rises_over_the_change(change):
     assert 0.6 * (averaged.sum() - 0.5 * averaged[-1]) == pytest.approx(integral, abs=0.015)
 
 
-def test_a_wave_before_the_change_acts_on_the_stock_rail_and_behind_it_on_the_blade(change):
+def test_a_wave_acts_on_the_stock_rail_before_the_change_and_on_the_blade_behind_it(change):
     matrices = assemble(TRACK.with_(blade=BLADE))
     near = np.flatnonzero((matrices.node > 8.0) & (matrices.node < 16.0))
     near = near[near[0] % 2 :: 2]
@@ -92,7 +92,7 @@ def test_all_wheels_are_on_the_rail_without_a_top_of_the_blade():
 
 
 def quotient(predictor, moved, terms=(), load=1.0, step=0.1):
-    """A quotient by a load at a ballast stiffness that has ``moved``; whether it was simulated."""
+    """Whether a quotient by a load is simulated at a ballast stiffness that has ``moved``."""
     aligned = SimpleNamespace(name="a passage", train="a train", passage=SimpleNamespace(load_sd=0.05, route="main"))
     before = len(predictor.values_seen)
     values = {"load": 1.0, "ballast_stiffness": moved, "load@a passage": load}
@@ -118,19 +118,20 @@ def quotients(surfaces=()):
 
 
 @pytest.mark.parametrize(("surfaces", "simulated"), [(SURFACES, [True, False]), (SURFACES[:1], [True, True])])
-def test_in_a_switch_only_common_values_count(surfaces, simulated):
-    """Its own load has moved by four prior standard deviations. There steps are larger: contacts open and close."""
+def test_in_a_switch_a_quotient_is_reused_until_common_values_have_changed(surfaces, simulated):
+    """The load of the passage has changed by four prior sd. Steps are larger in a switch, where contacts open and
+    close."""
     predictor, step = quotients(surfaces), 0.1 if all(simulated) else 0.1 * SIMULATION.switch_step_factor
     assert [quotient(predictor, 0.0, load=load, step=step) for load in (1.0, 1.2)] == simulated
 
 
-def test_a_quotient_is_used_again_until_a_value_has_moved():
+def test_a_quotient_is_reused_until_a_value_has_changed():
     """By 0, 0.4, 0.8 and 0.6 of its prior standard deviation: the last is near the one before."""
     predictor = quotients()
     assert [quotient(predictor, moved) for moved in (0.0, 0.1, 0.2, 0.15)] == [True, False, True, False]
 
 
-def test_a_quotient_with_an_effect_is_used_again_until_its_size_has_moved_by_a_fifth():
+def test_a_quotient_with_an_effect_is_reused_until_its_size_has_changed_by_a_fifth():
     predictor, gaps = quotients(), (3e-4, 3.5e-4, 4e-4)
     assert quotient(predictor, 0.0)
     assert [quotient(predictor, 0.0, (HangingSleeper(5, gap),)) for gap in gaps] == [True, False, True]
@@ -147,7 +148,7 @@ def test_a_quotient_with_an_effect_is_used_again_until_its_size_has_moved_by_a_f
         ("wheels_a train", "cos_wave_9", 4.9e-6, 5.1e-6),  # half of 10 um, for the mass of a wheel alone
     ],
 )
-def test_a_quotient_is_used_again_until_a_support_the_clock_or_a_wave_has_moved(name, value, small, large):
+def test_a_quotient_is_reused_until_a_support_the_clock_or_a_wave_has_changed(name, value, small, large):
     aligned = SimpleNamespace(name="a passage", train="a train", passage=SimpleNamespace(load_sd=0.05, route="main"))
     for moved, is_simulated in ((small, False), (large, True)):
         predictor = quotients()
@@ -157,8 +158,8 @@ def test_a_quotient_is_used_again_until_a_support_the_clock_or_a_wave_has_moved(
         assert (len(predictor.values_seen) == 2) is is_simulated
 
 
-def test_a_sample_in_a_switch_errs_by_a_tenth_of_its_channel():
-    """Also where nothing moves, since the blade chatters after a wheel."""
+def test_a_sample_in_a_switch_has_an_error_of_a_tenth_of_its_channel():
+    """Also for samples of 0, since the blade vibrates after a wheel."""
     rows = np.array([[0.0, 3.0, 4.0, 0.0], [0.0, 0.3, 0.4, 0.0]])
     plain = Observation("a", "a", rows.ravel(), 0.2, rows=2)
     rms = np.array([2.5, 2.5, 2.5, 2.5, 0.25, 0.25, 0.25, 0.25])

@@ -36,7 +36,7 @@ def test_a_deviation_is_the_stated_share_of_a_top_or_its_slope():
     assert further(x)[20:44] == pytest.approx(moved[20:44], rel=0.02, abs=1e-6)
 
 
-def test_a_change_of_the_stock_rail_leaves_the_blade_as_it_is():
+def test_a_change_of_the_stock_rail_does_not_change_the_blade():
     x = np.linspace(20.0, 26.0, 61)
     for change, on_blade in ((TopChange(STOCK, False, False), False), (TopChange(TOP, False, True), True)):
         both = sum((p(x) for p in change.paths(None, None) if not p.on_blade), 0.0 * x)
@@ -48,7 +48,7 @@ def test_a_change_of_the_stock_rail_leaves_the_blade_as_it_is():
 
 @dataclass(frozen=True)
 class OneWheel(TopChange):
-    """One wheel alone has the deviation."""
+    """Only one wheel has the deviation."""
 
     wheel: int = 1
 

@@ -84,7 +84,9 @@ def pair_evidence(first_error, second_error, change):
     [((0.10, 0.10), 0.05, True), ((0.30, 0.10), 0.0, False), ((0.10, 0.101), 0.0, False)],
     ids=["a fall", "an improvement", "an effect that these recordings do not show"],
 )
-def test_a_second_name_must_improve_what_held_out_recordings_show_of_it(monkeypatch, errors, change, improves_nothing):
+def test_a_second_name_must_improve_held_out_recordings_in_which_it_shows(
+    monkeypatch, errors, change, improves_nothing
+):
     from turnout.mismatch.engine import two_effects
 
     evidence = pair_evidence(*errors, change)
@@ -100,7 +102,7 @@ def _fit_of(case, fit):
     return predictions, fit_percent(case.reserved, predictions)
 
 
-def test_the_rule_of_a_second_name_without_improvement_keeps_the_first():
+def test_a_second_name_without_improvement_is_withdrawn_and_the_first_stays():
     facts = dict.fromkeys(
         ("is_choice", "both_stand", "first_is_unknown", "first_is_redundant", "second_predicts_worse"), False
     )

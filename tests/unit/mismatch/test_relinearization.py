@@ -1,4 +1,4 @@
-"""Visits whose fits end in another valley than earlier ones: linearized again they agree, unless something changed."""
+"""Visits whose fits end in another minimum than earlier ones agree after a new linearization, unless changed."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -77,7 +77,7 @@ def test_steps_that_cost_more_are_damped():
 
 
 def test_the_excess_of_an_unchanged_visit_is_chi_squared_with_the_directions_that_the_data_inform():
-    """Both valleys are equally probable alone. Two directions: 200 visits have a mean of 2 ± 0.14, 95 % below 6.0."""
+    """Both minima are equally probable alone. Two directions: 200 visits have a mean of 2 ± 0.14, 95 % below 6.0."""
     excess = []
     rng = np.random.default_rng(1)
     for seed in range(200):
@@ -106,7 +106,7 @@ def visit_of(day, case, fit, sections="S1", route="main"):
 
 @pytest.fixture
 def history(monkeypatch):
-    """Visits from lengths and the valleys in which their fits end -> (visits, call of ``agreeing_visits``)."""
+    """Visits from lengths and the minima in which their fits end -> (visits, call of ``agreeing_visits``)."""
     monkeypatch.setattr(agreeing, "visit_groups", lambda case, fit, *where: visit_of("2000", case, fit, *where).groups)
 
     def of(lengths, valleys, store=None):
@@ -126,7 +126,7 @@ def history(monkeypatch):
     return of
 
 
-def test_a_visit_in_the_other_valley_agrees_once_it_is_linearized_where_the_earlier_ones_are(history):
+def test_a_visit_in_the_other_minimum_agrees_if_linearized_at_the_earlier_values(history):
     result = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0])
     assert result.asked == ["2021-01-01"]
     assert [a is b for a, b in zip(result.before, result.after)] == [True, False, True]
@@ -135,8 +135,8 @@ def test_a_visit_in_the_other_valley_agrees_once_it_is_linearized_where_the_earl
 
 
 @pytest.mark.parametrize("valley", [1.0, -1.0])
-def test_a_change_stays_and_ends_the_search(history, valley):
-    """A length of 1.6 after 1.0: no fit from the earlier values explains it, whichever valley its own fit is in."""
+def test_a_change_stays_and_ends_the_new_linearizations(history, valley):
+    """A length of 1.6 after 1.0: no fit from the earlier values explains it, whichever minimum its own fit is in."""
     result = history([1.0, 1.0, 1.6, 1.6], [1.0, 1.0, valley, -1.0])
     assert result.asked == ["2022-01-01"]
     assert all(a is b for a, b in zip(result.before, result.after))
@@ -164,8 +164,8 @@ def test_a_linear_model_has_the_excess_that_its_derivatives_predict(monkeypatch)
     assert (given.excess, given.linear_excess) == pytest.approx((expected, expected), abs=0.01)
 
 
-def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_its_excess(monkeypatch):
-    """A signal that rises from -1 to 1 about a length of 1.3: at 1.0 its derivative is 0, and a fit stays there."""
+def test_a_change_without_a_derivative_at_the_earlier_values_keeps_its_excess(monkeypatch):
+    """A signal that rises from -1 to 1 about a length of 1.3: at 1.0 its derivative is 0, and a fit does not move."""
 
     def predict(self, values, terms, observations):
         return [np.repeat([np.tanh((values["length"] - 1.3) / 0.02), values["depth"] + values["load"]], 12)]
@@ -177,7 +177,7 @@ def test_a_change_that_no_derivative_shows_where_the_earlier_visits_are_leaves_i
     assert given.excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
 
 
-def test_a_fit_that_agrees_but_leaves_much_more_of_the_data_does_not_count(history, monkeypatch):
+def test_a_fit_that_agrees_but_has_a_much_larger_residual_does_not_count(history, monkeypatch):
     monkeypatch.setattr(agreeing, "fit_given_belief", lambda *a: replace(fit_given_belief(*a), excess=30.0))
     result = history([1.0, 1.0], [1.0, -1.0])
     assert result.asked == ["2021-01-01"]
@@ -185,7 +185,7 @@ def test_a_fit_that_agrees_but_leaves_much_more_of_the_data_does_not_count(histo
 
 
 @pytest.mark.parametrize(("overstated", "stays"), [(23.9, True), (24.1, False)])
-def test_a_visit_stays_as_it_is_where_its_own_linear_model_overstates_less_than_a_name_needs(
+def test_a_visit_is_not_linearized_again_if_its_linear_model_errs_by_less_than_a_threshold(
     history, monkeypatch, overstated, stays
 ):
     def given(*a):
@@ -197,7 +197,7 @@ def test_a_visit_stays_as_it_is_where_its_own_linear_model_overstates_less_than_
     assert result.asked == ["2021-01-01"] and (result.after[1] is result.before[1]) is stays
 
 
-def test_what_was_computed_is_read_again_until_the_earlier_visits_differ(history, tmp_path):
+def test_stored_linearizations_are_used_until_earlier_visits_or_the_code_change(history, tmp_path):
     versions = {f"{2020 + k}-01-01": {"code": "a"} for k in range(3)}
     store = AgreeingInformation(tmp_path, versions)
     first = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], store)

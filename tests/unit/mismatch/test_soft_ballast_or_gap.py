@@ -27,10 +27,10 @@ SOFT, GAP, EITHER = ("local_ballast",), ("hanging_sleeper",), ("local_ballast", 
 def names_of(
     question, damper_share, trains_feel=1.0, damper_weight=1.0, size=-1.8, seed=0, sd=SD, repeats=False, unsure=1.0
 ):
-    """Names after four visits, of which two have the change, or all of them against the file.
+    """Names after four visits; two visits have the change, or all of them differ from the file.
 
     Data are mixtures of neighbouring springs and dampers, dampers by ``damper_weight``. With ``repeats`` their error is
-    the same at all visits. The file is unsure of the changed support: ``unsure`` times its standard deviations.
+    the same at all visits. The changed support has ``unsure`` times its standard deviations in the file.
     """
     rng = np.random.default_rng(seed)
     near = [[0.6 ** abs(i - j) for j in range(N_SUPPORT)] for i in range(N_SUPPORT)]
@@ -56,7 +56,7 @@ def names_of(
 @pytest.mark.parametrize("question", ["change", "file"])
 @pytest.mark.parametrize(("damper_share", "names"), [(0.0, SOFT), (0.5, SOFT), (1.0, EITHER)])
 def test_a_damper_that_loses_less_than_the_spring_is_no_gap(question, damper_share, names):
-    """Beside a gap that no train closes the bed loses as much damping as stiffness; so may a softer bed."""
+    """At a gap that no train closes the ballast loses as much damping as stiffness; so may softer ballast."""
     assert [names_of(question, damper_share, seed=s) for s in range(5)] == [names] * 5
 
 
@@ -70,19 +70,20 @@ def test_trains_that_close_a_gap_name_it_beside_a_damper_that_fits_it(question):
     assert [names_of(question, 1.0, trains_feel=0.25, seed=s) for s in range(5)] == [GAP] * 5
 
 
-def test_an_error_that_repeats_at_all_visits_decides_no_more_than_once():
+def test_an_error_that_repeats_at_all_visits_counts_once():
     """Of 40 seeded sites 14 have a name; 26 if each of the four visits had an error of its own."""
     names = [names_of("file", 0.5, seed=s, sd=0.2, repeats=True) for s in range(40)]
     assert 5 <= names.count(SOFT) <= 20 and GAP not in names
 
 
-def test_a_file_that_is_unsure_of_the_support_does_not_explain_what_trains_feel_otherwise():
-    """Between two sections the file is unsure. With its standard deviation for the offset, this gap was "a or b"."""
+def test_an_uncertain_support_in_the_file_does_not_explain_a_difference_between_trains_and_impacts():
+    """Between two sections the file is uncertain. With that standard deviation for the offset, the answer was "a or
+    b"."""
     assert [names_of("file", 1.0, trains_feel=0.75, seed=s, unsure=2.0) for s in range(5)] == [GAP] * 5
 
 
 @pytest.mark.parametrize(("damper_share", "trains_feel", "name"), [(0.0, 1.0, SOFT), (1.0, 0.5, GAP)])
 def test_trains_and_the_damper_name_a_deviation_without_the_evidence_of_an_effect(damper_share, trains_feel, name):
-    """Where the file is so unsure, the support is told as a deviation. That was "a or b", whatever trains feel."""
+    """In an uncertain file the support is a deviation. Formerly the answer was "a or b" for any response of trains."""
     names = [names_of("file", damper_share, trains_feel, seed=s, unsure=3.0) for s in range(5)]
     assert names.count(name) >= 4 and set(names) <= {name, EITHER}

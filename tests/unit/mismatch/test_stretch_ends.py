@@ -1,4 +1,4 @@
-"""How far a change reaches: closed form of the intervals, open ends, and coverage on seeded linear histories."""
+"""Ends of a change along the track: closed form of the intervals, open ends, and coverage on linear histories."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def evidence(first, last, gain, size=-0.3):
     return OnsetEvidence(effect(first, last), ("a", "b"), np.array([0.0, 1.0]), gain * one, size * one, 0.1 * one)
 
 
-def test_an_interval_holds_the_ends_whose_likelihoods_together_reach_its_probability():
+def test_an_interval_contains_the_ends_whose_likelihoods_sum_to_its_probability():
     alike = [evidence(3, 5, np.log(90.0)), evidence(3, 6, np.log(6.0)), evidence(2, 5, np.log(4.0))]
     assert stretch_ends(alike, BY_NAME).first == pytest.approx((1.8, 1.8))  # 96 of 100 begin there
     assert stretch_ends(alike, BY_NAME).last == pytest.approx((3.0, 3.6))  # 94 of 100 end at 3.0 m
@@ -62,15 +62,15 @@ def test_a_change_as_long_as_the_longest_stretch_is_open_at_both_ends():
     assert ends.first == (None, pytest.approx(1.2)) and ends.last[1] is None
 
 
-def test_supports_that_may_not_change_are_no_edge_and_other_parameters_have_no_ends():
+def test_supports_that_cannot_change_are_no_edge_and_other_parameters_have_no_ends():
     beyond = StateParameter("ballast@7.20", 0.0, 0.1, 0.0, "ballast", N_SUPPORT, 7.2, may_change=False)
     ends = stretch_ends([evidence(10, 11, 20.0)], BY_NAME | {beyond.name: beyond})
-    assert ends.last[1] is None  # 6.6 m is the last support that can be told
+    assert ends.last[1] is None  # 6.6 m is the last support that can be identified
     gain = OnsetEvidence(ChangeEffect("gain@1.00", {"gain@1.00": 1.0}, 0.1), ("a", "b"), *np.ones((4, 1)))
     assert stretch_ends([gain], BY_NAME) is None
 
 
-def test_changes_alike_have_the_name_and_the_sign():
+def test_similar_changes_have_the_same_name_and_sign():
     softer, stiffer, stretch = evidence(3, 3, 9.0), evidence(4, 4, 8.0, size=0.3), evidence(3, 5, 2.0)
     gain = OnsetEvidence(ChangeEffect("gain@1.00", {"gain@1.00": -1.0}, 0.1), ("a", "b"), *-np.ones((4, 1)))
     assert changes_alike([softer, stiffer, stretch, gain], softer, BY_NAME) == [softer, stretch]
@@ -103,4 +103,4 @@ def test_true_ends_lie_inside_their_intervals():
             inside += low - 1e-9 <= at <= high + 1e-9
             n_certain += high - low < 1e-9
     assert inside >= 273  # of 300: 95 % less 2.5 standard deviations of that count, so that chance fails it once in 160
-    assert n_certain >= 150  # and not because they are wide
+    assert n_certain >= 150  # and not because the intervals are wide
