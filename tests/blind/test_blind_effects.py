@@ -18,7 +18,7 @@ EFFECTS = load_effects()
 MAY = {"turnout", "turnout.errors", "turnout.records", "turnout.readers", "turnout.readers.writing"}
 
 
-def test_the_generator_imports_nothing_of_what_it_tests(repository):
+def test_the_generator_does_not_import_the_package_that_it_tests(repository):
     """Only records, errors and the writers of raw files, in every file, at the top and inside functions."""
     files = sorted((repository / "src" / "turnout_blind").rglob("*.py"))
     assert len(files) > 30
@@ -33,7 +33,7 @@ def test_the_generator_imports_nothing_of_what_it_tests(repository):
                     assert name in MAY, f"{path} imports {name}"
 
 
-def test_the_tool_imports_nothing_of_the_generator(repository):
+def test_the_tool_does_not_import_the_generator(repository):
     """But for the command that starts it, and the table of former module names."""
     for path in (repository / "src" / "turnout").rglob("*.py"):
         if path.name not in ("blind.py", "former_names.py"):
@@ -46,7 +46,7 @@ def contents(world):
 
 
 @pytest.mark.parametrize("kind", sorted(EFFECTS))
-def test_an_effect_changes_its_copy_of_the_world_and_nothing_else(kind):
+def test_an_effect_changes_only_its_copy_of_the_world(kind):
     effect = EFFECTS[kind]
     assert len(effect.ladder) == (7 if effect.stratum in ("single", "history", "switch") else 4)
     for rung in range(len(effect.ladder)):

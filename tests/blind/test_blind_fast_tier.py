@@ -23,7 +23,7 @@ SMALL = 120e3  # bytes of the kept set
 
 
 @pytest.fixture(scope="module")
-def held(repository):
+def stored_set(repository):
     folder = repository / "tests" / "blind" / "fast"
     if not folder.is_dir():
         pytest.skip("no kept set: turnout blind make --fast --seed 20261121, then turnout blind keep")
@@ -32,9 +32,9 @@ def held(repository):
 
 
 @pytest.fixture(scope="module")
-def truths(held):
+def truths(stored_set):
     """Truths by case, each verified against its hash."""
-    return verify_archive(held)
+    return verify_archive(stored_set)
 
 
 def test_all_forty_cases_match_their_hashes_and_all_effects_follow_from_the_seed(truths):
@@ -64,30 +64,30 @@ def archives_as_sealed():
 
 
 @pytest.fixture(scope="module")
-def again(held, tmp_path_factory):
+def control_case(stored_set, tmp_path_factory):
     """(id, folder of cases, truth) of the first control, generated again from its seed."""
-    case = min(c for c, text in held["truths"].items() if json.loads(text)["stratum"] == "control")
+    case = min(c for c, text in stored_set["truths"].items() if json.loads(text)["stratum"] == "control")
     folder = tmp_path_factory.mktemp("again")
-    return case, folder, make_case(folder, case, plan_of(held, case), load_effects())
+    return case, folder, make_case(folder, case, plan_of(stored_set, case), load_effects())
 
 
 @pytest.mark.slow
-def test_a_case_that_is_generated_again_equals_the_sealed_case(held, again):
+def test_a_case_that_is_generated_again_equals_the_sealed_case(stored_set, control_case):
     """Bit for bit, on a processor with the same arithmetic; others skip the test."""
-    made_on = json.loads(held["set"]).get("made_on")
+    made_on = json.loads(stored_set["set"]).get("made_on")
     if made_on not in (None, platform.machine()):
         pytest.skip(f"sealed on {made_on}: another processor rounds otherwise")
     if not archives_as_sealed():
         pytest.skip(
             "this Python writes the heads of archives otherwise: bytes cannot be compared (sealed: 3.11.4 or later)"
         )
-    case, folder, truth = again
-    verify_recordings(held, case, folder)
-    assert truth["visible"] == json.loads(held["truths"][case])["visible"]
+    case, folder, truth = control_case
+    verify_recordings(stored_set, case, folder)
+    assert truth["visible"] == json.loads(stored_set["truths"][case])["visible"]
 
 
-def test_a_case_has_the_hammer_tests_and_the_trains_of_a_campaign(again):
-    case, folder, _ = again
+def test_a_case_has_the_hammer_tests_and_the_trains_of_a_campaign(control_case):
+    case, folder, _ = control_case
     raw = folder / case / "raw" / case
     assert len(list(raw.glob("hammer/*/*.npz"))) == 6 and len(list(raw.glob("passages/*.npz"))) == 8
     turnout = with_raw(load_configuration(folder / case / "config").turnout(case), folder / case / "raw")
@@ -95,18 +95,20 @@ def test_a_case_has_the_hammer_tests_and_the_trains_of_a_campaign(again):
 
 
 @pytest.mark.slow
-def test_the_diagnosis_names_nothing_in_the_impacts_of_a_control(again):
+def test_the_diagnosis_names_no_effect_in_the_impacts_of_a_control(control_case):
     """Hammer tests alone, which take seconds. A release tests the whole campaign."""
-    case, folder, _ = again
+    case, folder, _ = control_case
     answers = answers_of(finding_rows(folder / case, case, "hammer_only"))
     assert answers and not [a.names for a in answers if a.verdict == "named"]
 
 
-def test_stored_answers_are_scored_with_their_truths(held, truths):
+def test_stored_answers_are_scored_with_their_truths(stored_set, truths):
     """If there are answers, all figures follow from the stored set alone, and no row is lost."""
-    if held["diagnosis"] is None:
+    if stored_set["diagnosis"] is None:
         pytest.skip("no tool has spoken about the kept set yet: turnout blind diagnose, reveal, keep")
-    judged = [judge(truths[c], answers_of(held["rows"][c])) for c in truths if c in held["diagnosis"]["cases"]]
+    judged = [
+        judge(truths[c], answers_of(stored_set["rows"][c])) for c in truths if c in stored_set["diagnosis"]["cases"]
+    ]
     found = {f.name: f for f in figures(judged)}
     assert sum(isinstance(f, Share) for f in found.values()) >= 15
-    assert len(judged) == len(held["diagnosis"]["cases"])
+    assert len(judged) == len(stored_set["diagnosis"]["cases"])

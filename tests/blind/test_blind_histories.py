@@ -135,12 +135,12 @@ def test_parameters_of_a_growing_effect_end_at_their_full_size():
 
 
 def test_a_set_of_histories_is_sealed_like_any_other(tmp_path, monkeypatch):
-    def light(folder, case, plan, effects):
+    def make_small_case(folder, case, plan, effects):
         (folder / case).mkdir(parents=True)
         (folder / case / "raw.txt").write_text(f"{plan.seed}")
         return {"case": case, "pattern": plan.pattern, "effects": []}
 
-    monkeypatch.setattr("turnout_blind.make.make_history", light)
+    monkeypatch.setattr("turnout_blind.make.make_history", make_small_case)
     monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
     sha = [make_set(tmp_path / f"s{k}", tmp_path / f"t{k}", 7, histories=(4, 2)) for k in range(2)]
     assert sha[0] == sha[1]
@@ -264,7 +264,7 @@ def test_times_of_campaigns_and_passages_of_single_cases_do_not_change(tmp_path)
         ("pad", {"factor": 0.24}, 1.0, {"size": None, "size_se": None}, None),
     ],
 )
-def test_the_size_at_the_last_answer_is_compared_with_what_the_effect_has_reached(
+def test_the_size_at_the_last_answer_is_compared_with_the_size_of_the_effect_at_that_time(
     kind, parameters, share, row, covered
 ):
     where = {"sensor": "A1", "position": 1.8, "sleeper": 42}

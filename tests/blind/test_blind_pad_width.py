@@ -28,7 +28,7 @@ def world(coupling=0.0):
     return replace(made, shear=coupling * float(made.ballast[0]), shear_damping=2e3 if coupling else 0.0)
 
 
-def marched(true):
+def simulated_receptances(true):
     columns = []
     for x in IMPACTS:
         force, acceleration, _ = simulate_impacts(true, SENSORS, x, [0.01], [0.95], 0.3)
@@ -37,7 +37,7 @@ def marched(true):
     return np.array(columns)
 
 
-def modelled(true, pad_width, changes):
+def model_receptances(true, pad_width, changes):
     factor = {name: np.exp(changes.get(name, 0.0)) for name in PRIORS}
     r = true.rail
     rail = Rail(
@@ -58,29 +58,29 @@ def modelled(true, pad_width, changes):
     return found
 
 
-def estimated(true, pad_width, relative_error=0.1):
+def estimate(true, pad_width, relative_error=0.1):
     """Logarithmic errors of all values in a linear fit with these priors, errors of the model of a tenth."""
-    base = modelled(true, pad_width, {})
-    columns = [np.log(modelled(true, pad_width, {name: 0.02}) / base).ravel() / 0.02 for name in PRIORS]
+    base = model_receptances(true, pad_width, {})
+    columns = [np.log(model_receptances(true, pad_width, {name: 0.02}) / base).ravel() / 0.02 for name in PRIORS]
     rows = np.array(columns).T / relative_error
-    target = np.log(marched(true) / base).ravel() / relative_error
+    target = np.log(simulated_receptances(true) / base).ravel() / relative_error
     stacked = np.vstack([rows.real, rows.imag, np.diag(1.0 / np.array(list(PRIORS.values())))])
     right = np.concatenate([target.real, target.imag, np.zeros(len(PRIORS))])
     return dict(zip(PRIORS, np.linalg.lstsq(stacked, right, rcond=None)[0]))
 
 
 @pytest.fixture(scope="module")
-def free():
+def uncoupled_world():
     return world()
 
 
-def test_pads_without_width_give_too_light_sleepers_and_pads_of_the_true_width_do_not(free):
+def test_pads_without_width_give_too_light_sleepers_and_pads_of_the_true_width_do_not(uncoupled_world):
     """The spline that carries a pad is as wide as a uniform pad of 0.2 m (3 times 0.6556 steps of 0.1 m)."""
-    point, wide = (estimated(free, width)["sleeper_mass"] for width in (0.0, 0.2))
+    point, wide = (estimate(uncoupled_world, width)["sleeper_mass"] for width in (0.0, 0.2))
     assert -0.04 < point < -0.015
     assert abs(wide) < 0.012
 
 
-def test_ballast_that_couples_sleepers_reduces_their_estimated_mass(free):
+def test_ballast_that_couples_sleepers_reduces_their_estimated_mass(uncoupled_world):
     """The coupling of 4 % of the ballast stiffness is unknown to the library."""
-    assert -0.04 < estimated(world(0.04), 0.2)["sleeper_mass"] - estimated(free, 0.2)["sleeper_mass"] < -0.012
+    assert -0.04 < estimate(world(0.04), 0.2)["sleeper_mass"] - estimate(uncoupled_world, 0.2)["sleeper_mass"] < -0.012

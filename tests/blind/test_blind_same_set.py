@@ -12,15 +12,15 @@ from turnout_blind.seal import BlindError, digest, verify
 
 
 @pytest.fixture
-def light(monkeypatch):
+def small_cases(monkeypatch):
     """Cases of one file without a simulation."""
 
-    def made(folder, case, plan, effects):
+    def make_small_case(folder, case, plan, effects):
         (folder / case).mkdir(parents=True)
         (folder / case / "raw.txt").write_text(f"{plan.seed}")
         return {"case": case, "stratum": plan.stratum, "effects": []}
 
-    monkeypatch.setattr("turnout_blind.make.make_case", made)
+    monkeypatch.setattr("turnout_blind.make.make_case", make_small_case)
     monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
 
 
@@ -29,14 +29,14 @@ def tool_is(monkeypatch, sha):
         monkeypatch.setattr(f"turnout_blind.{module}.digest_of_folder", lambda folder, pattern="*": sha)
 
 
-def test_a_lost_set_is_generated_again_from_its_seed_with_the_same_hashes(light, tmp_path):
+def test_a_lost_set_is_generated_again_from_its_seed_with_the_same_hashes(small_cases, tmp_path):
     shas = [make_set(tmp_path / str(k), tmp_path / f"truth{k}", seed, limit=5) for k, seed in enumerate((7, 7, 8))]
     assert shas[0] == shas[1] != shas[2]
     shutil.copytree(tmp_path / "truth1", tmp_path / "instead")
     assert verify(tmp_path / "0", tmp_path / "instead").keys() == verify(tmp_path / "0", tmp_path / "truth0").keys()
 
 
-def test_the_seed_of_a_set_for_a_tool_follows_from_the_sources_of_the_tool(light, tmp_path, monkeypatch):
+def test_the_seed_of_a_set_for_a_tool_follows_from_the_sources_of_the_tool(small_cases, tmp_path, monkeypatch):
     seeds = []
     for k, sha in enumerate(("a" * 64, "a" * 64, "b" * 64)):
         tool_is(monkeypatch, sha)
@@ -47,7 +47,7 @@ def test_the_seed_of_a_set_for_a_tool_follows_from_the_sources_of_the_tool(light
 
 
 @pytest.mark.parametrize(("tool", "is_rejected"), [("a" * 64, False), ("b" * 64, True)])
-def test_a_set_for_one_tool_rejects_another_tool(light, tmp_path, monkeypatch, tool, is_rejected):
+def test_a_set_for_one_tool_rejects_another_tool(small_cases, tmp_path, monkeypatch, tool, is_rejected):
     tool_is(monkeypatch, "a" * 64)
     make_set(tmp_path / "set", tmp_path / "truth", "tool", limit=1)
     tool_is(monkeypatch, tool)

@@ -90,7 +90,7 @@ def test_a_perfect_tool_meets_every_bar():
 
 
 def test_bars_also_apply_to_effects_whose_oracle_gains_over_3_points():
-    """The true effects gain 2 or 4 points. Only the latter count, whatever fit the tool states."""
+    """The true effects gain 2 or 4 points. Only the latter count, for any fit that the tool states."""
     oracle = {f"s{i}": (20.0, 22.0 if i % 2 else 24.0) for i in range(40)}
     silent = table(lambda t: [{"verdict": "none", "probability": 0.9}], oracle=oracle)[1]
     found = table(lambda t: perfect(t) if t["case"] != "s0" else [{"verdict": "none"}], oracle=oracle)[1]
@@ -146,7 +146,7 @@ def test_a_confidently_wrong_tool_fails_the_bars_of_names_and_probabilities():
 
 
 def test_a_wrong_position_axle_train_or_sensor_is_detected():
-    def off(t):
+    def wrong_positions(t):
         rows = perfect(t)
         for r in rows:
             if r.get("position_m") is not None:
@@ -156,7 +156,7 @@ def test_a_wrong_position_axle_train_or_sensor_is_detected():
                 r["sentence"] = "axle 4 of railcar"
         return rows
 
-    _, found = table(off)
+    _, found = table(wrong_positions)
     assert found["what: top-1 (clear singles)"].share == 100.0
     for what in ("place", "axle", "sensor"):
         assert found[f"where: {what} right (clear singles)"].k == 0
@@ -173,7 +173,7 @@ def test_one_right_and_one_wrong_name_in_a_double_do_not_meet_the_bars():
     assert found["two effects: both right"].k == 0
 
 
-def test_parameters_are_compared_with_what_was_concealed():
+def test_parameters_are_compared_with_the_concealed_ones():
     t = truth("s", "single", "void")
     inside, outside = row(t["effects"][0], "hanging_sleeper"), row(t["effects"][0], "hanging_sleeper")
     inside["parameters_json"] = '[{"name": "gap", "value": 0.0011, "se": 0.0001}]'

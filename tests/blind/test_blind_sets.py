@@ -39,7 +39,7 @@ def with_two_passages(plan, effects):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def small_set(tmp_path_factory):
     """(out, truth) of a control and a single, generated once. test_blind_fast_tier has a whole case."""
     folder = tmp_path_factory.mktemp("blind")
     out, truth = folder / "set", folder / "truth"
@@ -52,12 +52,12 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture
-def copy(made, tmp_path, monkeypatch):
+def copy(small_set, tmp_path, monkeypatch):
     """A copy of the set that a test may change; the tool counts as unchanged while its files are edited."""
     monkeypatch.setattr("turnout_blind.diagnose.digest_of_folder", lambda folder: "frozen")
     out, truth = tmp_path / "set", tmp_path / "truth"
-    shutil.copytree(made[0], out)
-    shutil.copytree(made[1], truth)
+    shutil.copytree(small_set[0], out)
+    shutil.copytree(small_set[1], truth)
     return out, truth
 
 
@@ -65,8 +65,8 @@ def cases(out):
     return sorted((out / "cases").iterdir())
 
 
-def test_a_user_of_the_project_can_read_the_case(made):
-    for case in cases(made[0]):
+def test_a_user_of_the_project_can_read_the_case(small_set):
+    for case in cases(small_set[0]):
         turnout = with_raw(load_configuration(case / "config").turnout(case.name), case / "raw")
         assert len(turnout.campaigns) == 2
         assert len(turnout.trains) == 2
@@ -89,16 +89,16 @@ def test_a_user_of_the_project_can_read_the_case(made):
             assert all(3e3 < r.signal("force").max() < 22.3e3 for r in result.recordings)
 
 
-def test_names_sizes_and_times_of_files_do_not_reveal_the_stratum(made):
+def test_names_sizes_and_times_of_files_do_not_reveal_the_stratum(small_set):
     """Listings of two cases differ only in the id and in the middle section that has no impacts."""
     listings = []
-    for case in cases(made[0]):
+    for case in cases(small_set[0]):
         files = [p for p in sorted(case.rglob("*.npz"))]
         listings.append(sorted((p.parent.name, p.stat().st_size, p.stat().st_mtime) for p in files))
     # the size of a passage depends on the length of the train's name, which trains.csv states
     assert listings[0] == listings[1]
     words = {k for k in load_effects() if k not in ("pad", "ballast", "position", "gain")}
-    for path in (p for case in cases(made[0]) for p in case.rglob("*") if p.is_file() and p.suffix != ".npz"):
+    for path in (p for case in cases(small_set[0]) for p in case.rglob("*") if p.is_file() and p.suffix != ".npz"):
         text = f"{path.name}\n{path.read_text()}"
         assert not [w for w in words if re.search(rf"(?<![a-z]){w}(?![a-z])", text)], path  # "heel" is part of "wheel"
 
@@ -135,15 +135,15 @@ def test_verification_rejects_a_truth_that_was_changed_after_sealing(copy):
         verify(out, truth)
 
 
-def test_a_nonce_prevents_a_guess_of_the_truth_from_its_hash(made):
+def test_a_nonce_prevents_a_guess_of_the_truth_from_its_hash(small_set):
     """The hash of a control differs from that of the same text without its nonce, and each truth has its own nonce."""
-    truths = verify(*made)
+    truths = verify(*small_set)
     control = next(t for t in truths.values() if t["stratum"] == "control")
     nonces = {t["nonce"] for t in truths.values()}
     assert len(nonces) == len(truths)
     assert all(len(bytes.fromhex(n)) == 16 for n in nonces)
     bare = {k: v for k, v in control.items() if k != "nonce"}
-    sealed = json.loads((made[0] / "commit.json").read_text())["cases"][control["case"]]["truth_sha256"]
+    sealed = json.loads((small_set[0] / "commit.json").read_text())["cases"][control["case"]]["truth_sha256"]
     assert digest(json.dumps(bare, indent=1, sort_keys=True).encode() + b"\n") != sealed
 
 
@@ -197,7 +197,7 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_rows_are_taken_from_what_the_tool_prints(copy, tmp_path):
+def test_rows_are_read_from_the_output_of_the_tool(copy, tmp_path):
     """It prints notes and then its row in the folder of the case. Other output is a failure and is stored."""
     out, truth = copy
     one, other = (c.name for c in cases(out))
@@ -260,11 +260,11 @@ def test_files_that_the_tool_writes_beside_the_case_do_not_change_its_hash(copy)
     assert not list((out / "copies").iterdir())
 
 
-def test_an_interrupted_generation_of_a_set_continues(made, tmp_path, monkeypatch):
+def test_an_interrupted_generation_of_a_set_continues(small_set, tmp_path, monkeypatch):
     """The complete case stays, the incomplete one is generated again. Another seed or other sources are rejected."""
     out, truth = tmp_path / "set", tmp_path / "truth"
-    shutil.copytree(made[0], out)
-    shutil.copytree(made[1], truth)
+    shutil.copytree(small_set[0], out)
+    shutil.copytree(small_set[1], truth)
     sealed = (out / "commit.json").read_bytes()
     (out / "commit.json").unlink()
     kept, lost = cases(out)
@@ -326,7 +326,7 @@ def answer(**more):
 
 
 @pytest.fixture
-def scored(copy, tmp_path):
+def scored_set(copy, tmp_path):
     """An opened set with one tool that gave both cases the same answer and another one without an answer."""
     out, truth = copy
     for label, row in ((None, answer()), ("mute", {"verdict": "none"})):
@@ -338,12 +338,12 @@ def scored(copy, tmp_path):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_a_page_shows_figures_diagrams_cases_failures_and_ablations(scored, tmp_path, monkeypatch):
+def test_a_page_shows_figures_diagrams_cases_failures_and_ablations(scored_set, tmp_path, monkeypatch):
     monkeypatch.setattr(case_reports, "stage", with_two_passages)
     page = tmp_path / "page.md"
     page.write_text(f"# Before\n\n{BEGIN}\nold\n{END}\n\nAfter\n")
-    single = next(t["case"] for t in verify(scored, scored / "revealed").values() if t["effects"])
-    write_page(page, scored, cases=[single])
+    single = next(t["case"] for t in verify(scored_set, scored_set / "revealed").values() if t["effects"])
+    write_page(page, scored_set, cases=[single])
     text = page.read_text()
     assert text.startswith("# Before") and text.endswith("After\n") and "\nold\n" not in text
     assert "| controls: false alarms | 100.0 % (1)" in text  # the page lists the failure
@@ -354,16 +354,16 @@ def test_a_page_shows_figures_diagrams_cases_failures_and_ablations(scored, tmp_
         assert (tmp_path / name).read_text().startswith("<?xml")
     page.write_text("no marks")
     with pytest.raises(BlindError, match="not there once each"):
-        write_page(page, scored)
+        write_page(page, scored_set)
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_sets_are_pooled_and_none_counts_twice(scored, tmp_path):
+def test_sets_are_pooled_and_none_counts_twice(scored_set, tmp_path):
     """One false alarm of one control in each of two sets: 2 of 2. The second set differs only in its seals."""
     other = tmp_path / "other"
-    shutil.copytree(scored, other)
-    with pytest.raises(BlindError, match=f"is also in {scored}"):
-        report_text([scored, other])
+    shutil.copytree(scored_set, other)
+    with pytest.raises(BlindError, match=f"is also in {scored_set}"):
+        report_text([scored_set, other])
     for path in (other / "revealed").glob("T*.json"):
         text = path.read_text()
         path.write_text(text + " ")
@@ -372,21 +372,21 @@ def test_sets_are_pooled_and_none_counts_twice(scored, tmp_path):
     for record in other.rglob("diagnosis.json"):
         held = json.loads(record.read_text()) | {"commit_sha256": digest((other / "commit.json").read_bytes())}
         record.write_text(json.dumps(held))
-    pooled = report_text([scored, other])
+    pooled = report_text([scored_set, other])
     assert "| controls: false alarms | 100.0 % (2)" in pooled
     assert "| controls: false alarms | 2 of 2 | 0 of 2 |" in pooled
     assert "| one name | 4 | 0.80 |" in pooled
-    assert sorted(set(re.findall(rf"({scored.name}|other)/T", pooled))) == sorted([scored.name, "other"])
+    assert sorted(set(re.findall(rf"({scored_set.name}|other)/T", pooled))) == sorted([scored_set.name, "other"])
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_an_archived_set_is_small_and_complete(scored, tmp_path):
-    path = write_archive(scored, tmp_path / "kept")
+def test_an_archived_set_is_small_and_complete(scored_set, tmp_path):
+    path = write_archive(scored_set, tmp_path / "kept")
     assert path.stat().st_size < 20e3
     held = read_archive(tmp_path / "kept")
-    assert set(verify_archive(held)) == set(held["rows"]) == {c.name for c in cases(scored)}
+    assert set(verify_archive(held)) == set(held["rows"]) == {c.name for c in cases(scored_set)}
     for case in held["truths"]:
-        verify_recordings(held, case, scored / "cases")
+        verify_recordings(held, case, scored_set / "cases")
         spoilt = json.loads(held["truths"][case])
         spoilt["stratum"] = "double"
         with pytest.raises(BlindError, match="not what was sealed"):

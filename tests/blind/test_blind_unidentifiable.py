@@ -22,7 +22,7 @@ EFFECTS = load_effects()
 HIDDEN = 5.0  # % of the response, below the 6 % that two owners' models differ by
 
 
-def concealed(kind, rung=-1, seed=3):
+def site_with_effect(kind, rung=-1, seed=3):
     """Site, world with the effect at the top of its ladder, and what was drawn."""
     effect = EFFECTS[kind]
     rng = np.random.default_rng([seed, 9])
@@ -53,7 +53,7 @@ def test_every_unidentifiable_kind_has_a_test_here():
 
 
 def test_at_constant_temperature_warm_pads_give_the_recordings_of_soft_pads():
-    site, world, drawn = concealed("one_temperature")
+    site, world, drawn = site_with_effect("one_temperature")
     rival = site.world.copy()
     warm = np.mean(site.temperatures) - rival.reference
     rival.pad = rival.pad * np.exp(-drawn.parameters["coefficient"] * warm)
@@ -63,7 +63,7 @@ def test_at_constant_temperature_warm_pads_give_the_recordings_of_soft_pads():
 
 
 def test_a_gap_that_never_closes_gives_the_recordings_of_missing_ballast():
-    site, world, drawn = concealed("bottomless_void", rung=0)
+    site, world, drawn = site_with_effect("bottomless_void", rung=0)
     rival = site.world.copy()
     rival.ballast[drawn.where["sleeper"]] = rival.ballast_damping[drawn.where["sleeper"]] = 0.0
     loaded = next(k for k, p in enumerate(site.passages) if p.train == "loaded")
@@ -72,7 +72,7 @@ def test_a_gap_that_never_closes_gives_the_recordings_of_missing_ballast():
 
 
 def test_a_common_gain_of_all_channels_gives_the_recordings_of_heavier_trains_on_rougher_rails():
-    site, world, drawn = concealed("common_gain")
+    site, world, drawn = site_with_effect("common_gain")
     gain = drawn.parameters["gain"]
 
     def heavier(car):  # the wheels keep their mass, the body takes the rest
@@ -87,6 +87,6 @@ def test_a_common_gain_of_all_channels_gives_the_recordings_of_heavier_trains_on
 
 
 def test_a_pad_beyond_the_reach_of_all_sensors_is_not_observable():
-    site, world, _ = concealed("beyond_reach")
+    site, world, _ = site_with_effect("beyond_reach")
     assert impact_difference(site, world, site.world) < HIDDEN
     assert passage_difference(site, world, site, site.world) < HIDDEN

@@ -23,7 +23,7 @@ ROWS = modes(FLEET, 1).astype({"turnout_id": object, "section_id": object, "band
 CHARTS = evaluate(ROWS, None, TrendSettings())
 
 
-def same(other, a=slice(None)):
+def assert_same_charts(other, a=slice(None)):
     assert np.allclose(other.z[a], CHARTS.z, atol=1e-7, equal_nan=True)
     assert np.array_equal(other.down_open[a], CHARTS.down_open)
 
@@ -32,13 +32,13 @@ def same(other, a=slice(None)):
 @given(st.floats(0.01, 100.0))
 def test_the_unit_of_frequency_does_not_matter(factor):
     rows = ROWS.assign(frequency_hz=ROWS["frequency_hz"] * factor, frequency_se_hz=ROWS["frequency_se_hz"] * factor)
-    same(evaluate(rows, None, TrendSettings()))
+    assert_same_charts(evaluate(rows, None, TrendSettings()))
 
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**31))
 def test_the_order_of_rows_does_not_matter(seed):
-    same(evaluate(ROWS.sample(frac=1.0, random_state=seed), None, TrendSettings()))
+    assert_same_charts(evaluate(ROWS.sample(frac=1.0, random_state=seed), None, TrendSettings()))
 
 
 @settings(max_examples=10, deadline=None)
@@ -46,7 +46,7 @@ def test_the_order_of_rows_does_not_matter(seed):
 def test_origin_of_temperature_and_time_do_not_matter(shift, weeks):
     moved = ROWS["measured_at_utc"] + pd.Timedelta(days=7 * weeks)
     rows = ROWS.assign(rail_temperature_c=ROWS["rail_temperature_c"] + shift, measured_at_utc=moved)
-    same(evaluate(rows, None, TrendSettings()))
+    assert_same_charts(evaluate(rows, None, TrendSettings()))
 
 
 @settings(max_examples=10, deadline=None)

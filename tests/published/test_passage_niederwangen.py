@@ -49,7 +49,7 @@ def test_type_and_speed_follow_from_the_axle_times(trains, patterns, train, plac
 
 @pytest.mark.parametrize("train, place", [("3", "Q1"), ("13", "Q4"), ("0", "Q1")])
 def test_axles_are_counted_in_noise_bursts_at_the_published_times(trains, patterns, train, place):
-    """No raw signals are public: bursts of noise at the measured times stand in for them; one sensor, unknown speed."""
+    """No raw signals are public: bursts of noise at the measured times replace them; one sensor, unknown speed."""
     recording = bursts(trains[train][place], np.random.default_rng(int(train)))
     sensor = [PassageSensor("rail", "S", 0.0)]
     passage = analyse(recording, sensor, patterns, PassageSettings())

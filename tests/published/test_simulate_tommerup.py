@@ -20,7 +20,7 @@ TABLE_3 = {
     "ASD": ((131.3086, 25.3344, 0.1633), (692.6417, 5.9791, 0.1033)),
 }
 # The paper gives no error of a damping ratio. Propagated from its matrices it is 4 % (OT) to 88 % (CLP) for the
-# ballast modes; 12 % is asked for here.
+# ballast modes; 12 % is required here.
 DAMPING = 0.12
 EXCEPTIONS = {
     ("A7", "ballast"): "twice the file's damping would bring it to 24 to 28 %, and the railpad 2 to 6 Hz too high"

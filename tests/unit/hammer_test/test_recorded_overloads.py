@@ -32,7 +32,7 @@ def folder(shared_recordings, tmp_path_factory):
     return path
 
 
-def judged(folder, name):
+def impacts_of_file(folder, name):
     return find_track_impacts(read(name, folder, LAYOUT).recordings, "force", "rail", ReceptanceSettings())
 
 
@@ -45,7 +45,7 @@ def judged(folder, name):
     ],
 )
 def test_a_test_that_cannot_be_used_is_rejected_with_its_reason(folder, name, reason, words):
-    impacts = judged(folder, name)
+    impacts = impacts_of_file(folder, name)
     assert len(impacts) == 10 and all(i.rejections[0].reason == reason for i in impacts)
     assert all(words in i.rejections[0].detail for i in impacts)
 
@@ -60,7 +60,7 @@ def test_a_test_that_cannot_be_used_is_rejected_with_its_reason(folder, name, re
     ],
 )
 def test_the_other_impacts_give_the_true_modes(folder, name, n_accepted, n_overload):
-    impacts, _, model = identify_accepted(judged(folder, name), ReceptanceSettings(), IdentifySettings())
+    impacts, _, model = identify_accepted(impacts_of_file(folder, name), ReceptanceSettings(), IdentifySettings())
     assert sum(i.accepted for i in impacts) == n_accepted
     assert sum(r.reason == "overload" for i in impacts for r in i.rejections) == n_overload
     found = {m.band: (m.frequency, m.damping) for m in model.modes}
@@ -70,6 +70,6 @@ def test_the_other_impacts_give_the_true_modes(folder, name, n_accepted, n_overl
 
 def test_an_exponential_window_adds_its_decay_rate_to_each_mode_as_docs_measuring_states(folder):
     """Decay rate 50 1/s: damping rises by 50/(2π f), to 0.130 and 0.074."""
-    _, _, model = identify_accepted(judged(folder, "exp_window.npz"), ReceptanceSettings(), IdentifySettings())
+    _, _, model = identify_accepted(impacts_of_file(folder, "exp_window.npz"), ReceptanceSettings(), IdentifySettings())
     for mode, (frequency, damping) in zip(model.modes, ((160.0, 0.08), (560.0, 0.06))):
         assert mode.damping == pytest.approx(damping + 50.0 / (2 * np.pi * frequency), abs=2e-3)

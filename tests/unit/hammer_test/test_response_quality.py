@@ -16,7 +16,7 @@ CHANNELS = Channel("force", "force"), Channel("rail", "acceleration")
 
 
 @pytest.fixture(scope="module")
-def hits(shared_recordings):
+def impact_samples(shared_recordings):
     """Ten impacts on modes at 160 and 560 Hz with 250 and 90 kg: (10, 2, 3000) force and acceleration."""
     return np.array(runpy.run_path(str(shared_recordings / "gen.py"))["hits"]())
 
@@ -30,9 +30,9 @@ def reasons_of(samples, settings=None):
     return {r.reason for i in impacts_of(samples, settings) for r in i.rejections}
 
 
-def test_an_intact_test_is_accepted_with_the_mobility_of_its_modes(hits):
+def test_an_intact_test_is_accepted_with_the_mobility_of_its_modes(impact_samples):
     """Two masses on springs are no rail: their additional phase is taken as a delay."""
-    impacts = impacts_of(hits)
+    impacts = impacts_of(impact_samples)
     assert all(i.accepted for i in impacts)
     modes = [(250.0, 2 * np.pi * 160.0, 0.08), (90.0, 2 * np.pi * 560.0, 0.06)]
     low, high = (
@@ -46,48 +46,53 @@ def test_an_intact_test_is_accepted_with_the_mobility_of_its_modes(hits):
 @pytest.mark.parametrize(
     "factor", [9.80665, 1 / 9.80665, 4.4482, 1 / 4.4482, 1000.0, 0.001, 25.4, 1 / 25.4, 0.0353, 0.01]
 )
-def test_factors_of_units_are_found(hits, factor):
-    impacts = impacts_of(hits[:5] * [[1.0], [factor]])
+def test_factors_of_units_are_found(impact_samples, factor):
+    impacts = impacts_of(impact_samples[:5] * [[1.0], [factor]])
     assert {r.reason for i in impacts for r in i.rejections} == {"out_of_scale"}
     detail = impacts[0].rejections[0].detail
     assert "rails 54E1" in detail and "receptance.softest_blow: 0" in detail
 
 
-def test_the_limits_of_a_track_do_not_apply_to_a_small_hammer_on_a_beam(hits):
-    assert not reasons_of(hits[:5] * [[0.01], [1.0]], ReceptanceSettings(softest_blow=0.0))
+def test_the_limits_of_a_track_do_not_apply_to_a_small_hammer_on_a_beam(impact_samples):
+    assert not reasons_of(impact_samples[:5] * [[0.01], [1.0]], ReceptanceSettings(softest_blow=0.0))
 
 
-def test_a_response_that_saturates_before_its_filter_is_found(hits):
+def test_a_response_that_saturates_before_its_filter_is_found(impact_samples):
     sos = signal.butter(6, 0.9, output="sos")
     rng = np.random.default_rng(3)
-    clipped = hits.copy()
-    clipped[:, 1] = signal.sosfiltfilt(sos, np.clip(hits[:, 1], -35, 35)) + rng.standard_normal((10, 3000)) * 0.05
+    clipped = impact_samples.copy()
+    clipped[:, 1] = (
+        signal.sosfiltfilt(sos, np.clip(impact_samples[:, 1], -35, 35)) + rng.standard_normal((10, 3000)) * 0.05
+    )
     impacts = impacts_of(clipped)
     assert {r.reason for i in impacts for r in i.rejections} == {"overload"}
     assert "whatever the force" in impacts[0].rejections[0].detail and impacts[0].rejections[0].channel == "rail"
 
 
 @pytest.mark.parametrize(("shift", "word"), [(-8, "before"), (200, "after")])
-def test_a_response_that_is_not_simultaneous_is_reported_with_its_lag(hits, shift, word):
-    shifted = hits.copy()
-    shifted[:, 1] = np.roll(hits[:, 1], shift, axis=1)
-    undisturbed = np.median([response_lag(i) for i in impacts_of(hits)])
+def test_a_response_that_is_not_simultaneous_is_reported_with_its_lag(impact_samples, shift, word):
+    shifted = impact_samples.copy()
+    shifted[:, 1] = np.roll(impact_samples[:, 1], shift, axis=1)
+    undisturbed = np.median([response_lag(i) for i in impacts_of(impact_samples)])
     (rejection,) = impacts_of(shifted)[0].rejections
     assert rejection.reason == "not_simultaneous"
     assert rejection.value == shift + undisturbed
     assert "rail begins" in rejection.detail and f"{word} the force" in rejection.detail
 
 
-def test_a_lag_by_the_filters_of_two_channels_is_accepted(hits):
-    shifted = hits.copy()
-    shifted[:, 1] = np.roll(hits[:, 1], 3, axis=1)
+def test_a_lag_by_the_filters_of_two_channels_is_accepted(impact_samples):
+    shifted = impact_samples.copy()
+    shifted[:, 1] = np.roll(impact_samples[:, 1], 3, axis=1)
     assert not reasons_of(shifted)
 
 
-def test_stronger_impacts_on_a_linear_track_are_used(hits):
+def test_stronger_impacts_on_a_linear_track_are_used(impact_samples):
     """Three impacts in the ratio 3.9, 3.1 and 14, and four even ones with one of three and a half times their force."""
     for peaks in ([3.9, 3.1, 14.0], [3.9, 3.8, 3.9, 4.0, 14.0]):
-        scaled = hits[: len(peaks)] * (np.array(peaks) * 100.0 / hits[: len(peaks), 0].max(axis=1))[:, None, None]
+        scaled = (
+            impact_samples[: len(peaks)]
+            * (np.array(peaks) * 100.0 / impact_samples[: len(peaks), 0].max(axis=1))[:, None, None]
+        )
         assert not reasons_of(scaled)
     scaled[4, 1] *= 3.9 / 14.0  # the force channel overflowed: its response is that of a usual impact
     assert "overload" in reasons_of(scaled)
@@ -102,10 +107,10 @@ def slew_limited(x, limit):
     return limited
 
 
-def test_a_response_whose_slope_is_limited_in_all_impacts_is_found(hits):
-    slopes = np.abs(np.diff(hits[:, 1], axis=1)).max(axis=1)
-    limited = hits.copy()
-    limited[:, 1] = [slew_limited(x, 0.6 * slopes.min()) for x in hits[:, 1]]
+def test_a_response_whose_slope_is_limited_in_all_impacts_is_found(impact_samples):
+    slopes = np.abs(np.diff(impact_samples[:, 1], axis=1)).max(axis=1)
+    limited = impact_samples.copy()
+    limited[:, 1] = [slew_limited(x, 0.6 * slopes.min()) for x in impact_samples[:, 1]]
     impacts = impacts_of(limited)
     assert all(i.rejections and i.rejections[0].reason == "overload" for i in impacts)
     assert "the steepest slope of rail" in impacts[0].rejections[0].detail

@@ -168,7 +168,7 @@ def test_the_weight_of_a_group_is_that_of_its_random_effect():
 
 @pytest.mark.parametrize("n_passage", [5, 50, 500])
 def test_intervals_cover_with_few_and_many_passages_of_the_same_error(n_passage):
-    """Three train types at two speeds in ten visits, each group with an error of its own in all of its passages."""
+    """Three train types at two speeds in ten visits, each group with its own error in all of its passages."""
     rng = np.random.default_rng(n_passage)
     parameters = tuple(StateParameter(f"x{k}", 0.0, 1.0) for k in range(4))
     n_group, share, n_draw = min(6, n_passage), 0.8, 120

@@ -127,7 +127,7 @@ def test_the_size_at_the_last_visit_is_that_of_exact_data():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_an_answer_states_what_growth_has_reached_with_the_error_of_the_model(seed):
+def test_an_answer_states_the_present_size_of_growth_with_the_error_of_the_model(seed):
     """Growth that has ended: the whole size, although half of the visits with it show less. The constant error of
     the model changes with the value: at least a tenth of the change is uncertain even with exact recordings."""
     times = tuple(0.5 * v for v in range(8))

@@ -16,7 +16,7 @@ STEP = 2e-3
 
 @pytest.fixture(scope="module")
 def case():
-    """Impacts amid the blade and behind its heel."""
+    """Impacts in the middle of the blade and behind its heel."""
     plan = small_plan((15.0,), passages=False, hammer_positions=(23.4, 26.4))
     track = plan.turnout.track
     blade = Blade(20.1, 25.2, 32.0, track.rail, 3e8, 3e4)

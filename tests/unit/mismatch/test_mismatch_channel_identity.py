@@ -76,7 +76,7 @@ def faults_of(campaign):
     return data, {faults.recording_type: faults for faults in data.layout_faults}
 
 
-def relabelled(recording, names):
+def exchange_rows(recording, names):
     """The recording with exchanged rows of the channels ``names``."""
     rows = [recording.index(n) for n in names]
     samples = recording.samples.copy()
@@ -91,9 +91,9 @@ def test_recordings_that_agree_with_the_layout_have_no_fault(campaign):
 def test_exchanged_cables_give_the_same_observations_as_correct_ones(campaign):
     first, second = (s.name for s in campaign.sensors[1:3])
     tests = [
-        replace(t, recordings=tuple(relabelled(r, (first, second)) for r in t.recordings)) for t in campaign.hammer
+        replace(t, recordings=tuple(exchange_rows(r, (first, second)) for r in t.recordings)) for t in campaign.hammer
     ]
-    passages = [replace(p, recording=relabelled(p.recording, (first, second))) for p in campaign.passages]
+    passages = [replace(p, recording=exchange_rows(p.recording, (first, second))) for p in campaign.passages]
     data, faults = faults_of(replace(campaign, hammer=tuple(tests), passages=tuple(passages)))
     exchanged = {first: second, second: first}
     assert {kind: dict(f.sensor_of) for kind, f in faults.items()} == dict.fromkeys(

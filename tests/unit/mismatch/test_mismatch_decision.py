@@ -195,7 +195,7 @@ def test_every_threshold_has_a_reason_and_a_source(repository):
 
 
 def test_no_module_of_the_engine_has_thresholds_of_its_own(repository):
-    """Only whole numbers up to 4, halves and guards against a division by zero or an underflow stand in the code."""
+    """Only whole numbers up to 4, halves and guards against a division by zero or an underflow are in the code."""
     plain = {0, 1, 2, 3, 4, 0.5, 9, 10, 12, 100, 1e7}  # 9, 12: digits; 10, 100: decibels and percent; 1e7: a width
     folder = repository / "src" / "turnout" / "mismatch" / "engine"
     for path in sorted(folder.glob("*.py")):

@@ -10,18 +10,18 @@ from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 FAMILIES = ("pad_temperature", "zener_pad", "local_ballast", "local_pad", "mount_resonance")
 
 
-def of(plan, families=FAMILIES):
+def planned_case(plan, families=FAMILIES):
     return distinguishability(PlannedCase(plan, families=families))
 
 
 @pytest.fixture(scope="module")
 def one_warm_day():
-    return of(small_plan((30.0,), passages=False))
+    return planned_case(small_plan((30.0,), passages=False))
 
 
 def test_at_one_temperature_soft_pads_are_not_distinguished_from_warm_pads(one_warm_day):
     """3 nats at one temperature, thousands at two: at one, the common pad stiffness absorbs the effect."""
-    two = of(small_plan((5.0, 30.0), passages=False))
+    two = planned_case(small_plan((5.0, 30.0), passages=False))
     assert one_warm_day.detectability[one_warm_day.names.index("pad_temperature")] < 5.0
     assert "none" in one_warm_day.confused_with("pad_temperature")
     assert two.detectability[two.names.index("pad_temperature")] > 1000.0 and two.confused_with("pad_temperature") == []
@@ -37,7 +37,7 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
     from dataclasses import replace
 
     plan = small_plan((15.0,), speeds=(40.0,))
-    rolling = of(replace(plan, hammer_points=()), ("zener_pad", "mount_resonance", "surface_dip"))
+    rolling = planned_case(replace(plan, hammer_points=()), ("zener_pad", "mount_resonance", "surface_dip"))
     assert "none" in rolling.confused_with("zener_pad")
     # twenty times what a name needs: the smooth errors of the model, integrated out, absorb a part
     assert one_warm_day.detectability[one_warm_day.names.index("zener_pad")] > 100.0

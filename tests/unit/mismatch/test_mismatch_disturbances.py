@@ -33,7 +33,7 @@ def passage_of(name, rng, speed, roughness=1.0, train="ic3", source=None, floor=
     )
 
 
-def found(passages, unmatched=()):
+def disturbances_of(passages, unmatched=()):
     return disturbances({p.name: p for p in passages}, {p.name: p for p in unmatched})
 
 
@@ -41,13 +41,13 @@ def test_a_slow_train_that_is_never_far_away_is_no_other_source():
     """At 12 m/s the last wheel is 12 to 17 m away when the recording ends, at 40 m/s 60 to 80 m: 13 dB more."""
     rng = np.random.default_rng(1)
     speeds = [12.0, 40.0, 38.0, 36.0, 42.0, 12.5, 12.2]
-    assert found([passage_of(f"p{k}", rng, v) for k, v in enumerate(speeds)]) == []
+    assert disturbances_of([passage_of(f"p{k}", rng, v) for k, v in enumerate(speeds)]) == []
 
 
 def test_a_train_with_rough_wheels_has_a_higher_level_at_every_distance_and_is_no_other_source():
     rng = np.random.default_rng(2)
     passages = [passage_of(f"p{k}", rng, 25.0, roughness=6.0 if k == 3 else 1.0) for k in range(6)]
-    assert found(passages) == []
+    assert disturbances_of(passages) == []
 
 
 @pytest.mark.parametrize("level", [0.3, 3.0])
@@ -61,7 +61,7 @@ def test_another_train_is_detected_in_the_passages_that_it_disturbs(level):
         passage_of(f"p{k}", rng, 20.0 + 2.0 * k, source=source if k in (2, 5) else None, train=f"t{k % 2}")
         for k in range(7)
     ]
-    events = found(passages)
+    events = disturbances_of(passages)
     assert {e.name for e in events} == {"p2", "p5"} and {e.when for e in events} == {"before"}
     assert all(e.excess > 10.0 for e in events)
     assert len(independent_of_trains(events)) == 2
@@ -73,9 +73,9 @@ def test_a_train_that_may_be_longer_by_a_car_is_compared_behind_that_car():
     passages = [passage_of(f"p{k}", rng, 30.0) for k in range(5)]
     longer = passage_of("p9", rng, 30.0)
     longer.reference -= 26.0 / 30.0
-    at_once = {e.name: e for e in found([*passages, longer])}
+    at_once = {e.name: e for e in disturbances_of([*passages, longer])}
     assert at_once["p9"].when == "after"
-    assert all(e.when == "before" for e in found(passages, [longer]))
+    assert all(e.when == "before" for e in disturbances_of(passages, [longer]))
 
 
 def test_one_passage_with_a_higher_level_after_its_train_is_no_other_source():

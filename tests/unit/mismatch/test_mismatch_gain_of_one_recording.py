@@ -39,13 +39,13 @@ class Days(Case):
         return [sum(terms) * self.factors[o.name] * BUMP for o in observations]
 
 
-def fitted(factors):
+def case_and_fit(factors):
     case = Days(factors)
     return case, fit_jointly(case, case.candidates, [0.5], iterations=20)
 
 
 def test_the_visibility_of_an_effect_is_the_energy_of_its_change():
-    case, fit = fitted((1.0, 2.0, 3.0))
+    case, fit = case_and_fit((1.0, 2.0, 3.0))
     size = float(fit.psi[0])
     for name, energy in effect_energy(case, fit, case.candidates[0]).items():
         share = 0.5 if name == "b" else 1.0
@@ -74,7 +74,7 @@ def test_the_visibility_of_an_effect_is_the_energy_of_its_change():
     ],
 )
 def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gains, alone):
-    case, fit = fitted(factors)
+    case, fit = case_and_fit(factors)
     assert single_source(Search(case), fit, case.candidates[0], 25.0, gains) == alone
     of_a_train = replace(case.candidates[0], site=EffectSite({"train": "ic3"}))
     assert single_source(Search(case), fit, of_a_train, 25.0, gains) == ""
@@ -90,7 +90,7 @@ def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gai
     ],
 )
 def test_recordings_without_the_first_effect_show_the_second(factors, nats):
-    case, fit = fitted(factors)
+    case, fit = case_and_fit(factors)
     gains = {"a": 7.0, "b": 2.0, "c": 30.0}
     assert gain_where_unmasked(case, fit, gains) == nats
     assert (
@@ -158,7 +158,7 @@ def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
 
 
 def test_with_two_positions_neither_is_the_single_source():
-    case, fit = fitted((1.0, 1.0, 1.0))
+    case, fit = case_and_fit((1.0, 1.0, 1.0))
     of_two = ImpactCampaigns(2.1, 4.2)
     gains = {"2.1 2025": 0.5, "2.1 2026": -1.0, "4.2 2025": 7.0, "4.2 2026": 6.0, "railcar": 1.0}
     assert single_source(Search(of_two), fit, case.candidates[0], 19.0, gains) == ""

@@ -34,14 +34,14 @@ def plan():
     return replace(small, turnout=turnout, n_impacts=3, sensors=small.sensors[:3])
 
 
-def found_in(plan, *terms, seed=3):
+def diagnosis_of(plan, *terms, seed=3):
     case = TrackCase(measured_campaign(plan, terms, seed))
     return case, diagnose(case)
 
 
 @pytest.mark.slow
 def test_without_a_missing_effect_the_answer_is_none(plan):
-    _, found = found_in(plan)
+    _, found = diagnosis_of(plan)
     assert found.verdict.answer == "none"
     assert found.verdict.probability > 0.5
     assert max(found.base.level.values()) < 1.6
@@ -49,7 +49,7 @@ def test_without_a_missing_effect_the_answer_is_none(plan):
 
 @pytest.mark.slow
 def test_warm_pads_are_named_from_two_temperatures(plan):
-    _, found = found_in(plan, physics.PadTemperature(0.012))
+    _, found = diagnosis_of(plan, physics.PadTemperature(0.012))
     assert found.names[:1] == ("pad_temperature",)
     assert found.fit.psi[0] == pytest.approx(0.012, abs=0.001)
     row = finding_row(found, IDENTITY)
@@ -63,7 +63,7 @@ def test_warm_pads_are_named_from_two_temperatures(plan):
 @pytest.mark.slow
 def test_a_sensor_with_reversed_polarity_is_named(plan):
     """Its signal has the other sign in every band, which no delay causes."""
-    _, found = found_in(plan, physics.SensorGain("S3", -1.0))
+    _, found = diagnosis_of(plan, physics.SensorGain("S3", -1.0))
     assert found.names == ("sensor_gain",)
     assert found.fit.candidates[0].where == {"sensor": "S3"}
     assert abs(found.fit.psi[0] + 1.0) < 2.0 * found.fit.psi_se[0]
@@ -110,7 +110,7 @@ def test_channels_without_impacts_are_left_out_with_a_note(plan):
 def test_the_size_of_a_soft_rail_in_shear_refers_to_the_rail_of_the_file(plan):
     """The fits start from a rail that impacts have calibrated. The named size still refers to the rail of the file,
     4 per GN beside its own 4.1."""
-    case, found = found_in(plan, physics.RailShear(4.0))
+    case, found = diagnosis_of(plan, physics.RailShear(4.0))
     assert case.predictor.rail["rail_shear"] < -0.05
     assert found.names[:1] == ("rail_shear",)
     assert abs(found.fit.psi[0] - 4.0) < 2.0 * found.fit.psi_se[0]

@@ -74,7 +74,7 @@ def test_a_stretch_of_two_periods_is_needed():
 
 
 def hum_campaign(frequency, amplitude=AMPLITUDE):
-    """Passages with hum in S3 that starts at a phase of its own in each."""
+    """Passages with hum in S3 that starts at another phase in each."""
     campaign = intact_campaign((24.0,), 7)
     passages = []
     for passage, phase in zip(campaign.passages, PHASES):

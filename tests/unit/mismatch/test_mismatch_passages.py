@@ -41,7 +41,7 @@ def intact(campaign):
     return case, {n.name: case.start_values.get(n.name, n.mean) for n in case.nuisances}
 
 
-def test_the_column_of_a_linear_channel_is_what_the_case_predicts(intact):
+def test_the_column_of_a_linear_channel_is_the_change_that_the_case_predicts(intact):
     """For every start of every such effect, once beside a gain of the same channel. The error is that of the end of the
     record, where the case cuts the signal between channel and band."""
     case, values = intact

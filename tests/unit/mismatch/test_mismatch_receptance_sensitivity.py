@@ -19,7 +19,7 @@ J = 27
 
 
 @pytest.fixture(scope="module")
-def somewhere():
+def case_and_values():
     """(case, nuisances that differ from their means and between supports); the rail is that of the models."""
     small = small_plan((25.0,), passages=False, hammer_positions=(21.6, 24.0))
     turnout = TurnoutTrack(uniform_track(36.0, start=6.0), {"main": ((),)})
@@ -29,7 +29,7 @@ def somewhere():
     return case, values | {"rail_bending": 0.0, "rail_shear": 0.0}
 
 
-def off(case, values, old, new):
+def relative_error(case, values, old, new):
     """Relative error of the predicted step from ``old`` to ``new``."""
     before = case.predict(values, (old,), case.observations)
     short = np.concatenate(case.predict_near(values, (old,), (new,), case.observations, before))
@@ -50,9 +50,9 @@ def off(case, values, old, new):
         lambda s: physics.BallastInertia(120.0 + s, 1e3),
     ],
 )
-def test_a_step_of_a_parameter_is_right_to_first_order(somewhere, term):
+def test_a_step_of_a_parameter_is_right_to_first_order(case_and_values, term):
     """The error of a tangent is of second order: a quarter of the step has a quarter of the relative error."""
-    whole, quarter = (off(*somewhere, term(0.0), term(s)) for s in (1.0, 0.25))
+    whole, quarter = (relative_error(*case_and_values, term(0.0), term(s)) for s in (1.0, 0.25))
     assert quarter < 0.05
     assert quarter == pytest.approx(whole / 4.0, rel=0.1)
 
@@ -66,13 +66,13 @@ def test_a_step_of_a_parameter_is_right_to_first_order(somewhere, term):
         (physics.DryFriction(J, 0.0), physics.DryFriction(J, 100.0)),
     ],
 )
-def test_a_step_that_is_no_change_of_links_is_predicted_exactly(somewhere, old, new):
+def test_a_step_that_is_no_change_of_links_is_predicted_exactly(case_and_values, old, new):
     """Another rail, a channel, a link that was not there."""
-    assert off(*somewhere, old, new) < 1e-9
+    assert relative_error(*case_and_values, old, new) < 1e-9
 
 
-def test_a_change_to_other_links_is_no_small_step(somewhere):
-    case, values = somewhere
+def test_a_change_to_other_links_is_no_small_step(case_and_values):
+    case, values = case_and_values
     model = case.predictor.pair_sensitivity(
         values, (physics.LocalBallast(J, 0.5),), next(iter(case.frf_pairs.values()))
     ).model
@@ -82,9 +82,9 @@ def test_a_change_to_other_links_is_no_small_step(somewhere):
     assert ends.shape[0] == 0 and impedance.shape == (0, receptance_observation.LINES.size)
 
 
-def test_tests_of_several_days_share_solutions_that_do_not_depend_on_the_day(somewhere):
+def test_tests_of_several_days_share_solutions_that_do_not_depend_on_the_day(case_and_values):
     """The track and the pairs are the same, unless pads are softer on the warmer day, which needs two solutions."""
-    case, values = somewhere
+    case, values = case_and_values
     pairs = {n: replace(p, conditions={"rail_temperature": 5.0}) for n, p in case.frf_pairs.items()}
     pairs |= {f"{n} later": replace(p, conditions={"rail_temperature": 25.0}) for n, p in case.frf_pairs.items()}
     predictor = case.predictor.with_recordings(pairs, {})
@@ -98,9 +98,9 @@ def test_tests_of_several_days_share_solutions_that_do_not_depend_on_the_day(som
         assert (softer == 0.0) == is_shared
 
 
-def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
+def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(case_and_values):
     """A pad, and a mass on a spring, at three supports, at their starts: one link each, so exact."""
-    case, values = somewhere
+    case, values = case_and_values
     chosen = [(c, 0) for c in case.candidates if c.family in ("local_pad", "attached_resonator")][::7]
     added = AddedLinks(case.predictor, values, (), chosen)
     for o in case.observations[:3]:
@@ -110,10 +110,10 @@ def test_an_added_link_changes_a_receptance_as_a_track_that_has_it(somewhere):
             assert np.linalg.norm(found - (after - before)) < 1e-9 * np.linalg.norm(after - before)
 
 
-def test_the_effect_of_a_channel_on_a_receptance_is_that_of_the_case(somewhere):
+def test_the_effect_of_a_channel_on_a_receptance_is_that_of_the_case(case_and_values):
     """A gain, a lag, a corner frequency: exact. Another seat: exact except for the correction of the rail, which is
     that of the old seat. With the rail two hundredths from its grid the error is below that share of the change."""
-    case, values = somewhere
+    case, values = case_and_values
     values = values | {"rail_shear": 0.02}
     predicted = case.predict(values, (), case.observations)
     fit, families = SimpleNamespace(values=values, terms=(), predictions=predicted), set()
@@ -133,9 +133,9 @@ def _compared(case, fit, observation, old, chosen):
     return [c for c, k in chosen if (c.key, k) in found], found.values()
 
 
-def test_pairs_of_different_lines_are_predicted_together_as_each_alone(somewhere):
+def test_pairs_of_different_lines_are_predicted_together_as_each_alone(case_and_values):
     """Predictions and derivatives, beside a soft pad; one pair has a third of its lines, one is given twice."""
-    case, values = somewhere
+    case, values = case_and_values
     term, (first, second, *_) = physics.LocalPad(J, 0.6), case.observations
     pair = case.frf_pairs[first.name]
     fewer = replace(pair, frequency=pair.frequency[::3], size=pair.size[::3])
@@ -161,8 +161,8 @@ def test_pairs_of_different_lines_are_predicted_together_as_each_alone(somewhere
 
 
 @pytest.mark.parametrize("name", ["gain_S3", "rail_shear", f"pad_{J}", "ballast_damping"])
-def test_a_derivative_of_all_pairs_is_the_direction_of_their_predictions(somewhere, name):
-    case, values = somewhere
+def test_a_derivative_of_all_pairs_is_the_direction_of_their_predictions(case_and_values, name):
+    case, values = case_and_values
     k, step = [n.name for n in case.nuisances].index(name), 1e-5
     before = case.predict(values, (), case.observations)
     column = np.concatenate([j[:, k] for j in case.nuisance_jacobian(values, (), case.observations, before)])
@@ -173,10 +173,10 @@ def test_a_derivative_of_all_pairs_is_the_direction_of_their_predictions(somewhe
     assert np.linalg.norm(column - difference) < 1e-3 * np.linalg.norm(difference)
 
 
-def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(somewhere):
+def test_a_sensor_moved_from_the_rail_to_a_sleeper_is_another_seat(case_and_values):
     """The same channel at the same position has another mounting in the second test: each pair is predicted as if
     alone."""
-    case, values = somewhere
+    case, values = case_and_values
     first, second = [o for o in case.observations if ":S1" in o.name][:2]
     sleeper = replace(case.frf_pairs[second.name].sensor, mounting="sleeper")
     pairs = {**case.frf_pairs, second.name: replace(case.frf_pairs[second.name], sensor=sleeper)}

@@ -45,7 +45,7 @@ class Imitated(Case):
         return [made for _ in observations]
 
 
-def ranked(monkeypatch, case, promises=(20.0, 0.0), fit=None):
+def base_and_scores(monkeypatch, case, promises=(20.0, 0.0), fit=None):
     """(base fit, scores by effect) of tasks with these predicted gains."""
     base = fit or fit_jointly(case, values={"stiffness": IMITATION})
     tasks = [RefitTask(c, np.array([0.1]), {}, p) for c, p in zip(case.candidates, promises)]
@@ -60,7 +60,7 @@ def test_a_base_fit_that_imitates_the_effect_does_not_leave_that_minimum():
 
 
 def test_a_predicted_gain_that_no_refit_reaches_causes_a_restart_from_the_priors(monkeypatch):
-    _, scores = ranked(monkeypatch, Imitated())
+    _, scores = base_and_scores(monkeypatch, Imitated())
     wave = scores["wave"]
     assert wave.estimates[0][0] == pytest.approx(1.0, abs=4.0 * wave.estimates[1][0])
     assert wave.fit.values["stiffness"] == pytest.approx(0.0, abs=0.5)
@@ -69,14 +69,14 @@ def test_a_predicted_gain_that_no_refit_reaches_causes_a_restart_from_the_priors
 @pytest.mark.parametrize("promise", [0.0, 11.0])
 def test_a_predicted_gain_below_the_threshold_causes_no_restart(monkeypatch, promise):
     """Restarts need many simulations; without any effect no predicted gain is near the threshold of a name."""
-    _, scores = ranked(monkeypatch, Imitated(), (promise, 0.0))
+    _, scores = base_and_scores(monkeypatch, Imitated(), (promise, 0.0))
     assert scores["wave"].fit.values["stiffness"] == pytest.approx(IMITATION, abs=0.3)
 
 
-def test_a_restart_that_gains_less_changes_nothing(monkeypatch):
+def test_a_restart_with_a_lower_gain_is_not_used(monkeypatch):
     """The absent wave has a large predicted gain: its restart ends with the nuisance at 0 and the wave unexplained."""
-    base, before = ranked(monkeypatch, Imitated(), (0.0, 0.0))
-    _, after = ranked(monkeypatch, Imitated(), (0.0, 20.0), base)
+    base, before = base_and_scores(monkeypatch, Imitated(), (0.0, 0.0))
+    _, after = base_and_scores(monkeypatch, Imitated(), (0.0, 20.0), base)
     assert after["other wave"].gain == before["other wave"].gain
 
 
@@ -107,10 +107,10 @@ def test_there_is_no_restart_if_another_effect_reaches_the_threshold(monkeypatch
     score_task = refit._score_task
     monkeypatch.setattr(refit, "_score_task", lambda *a: replace(score_task(*a), gain=20.0))
     monkeypatch.setattr(refit, "_refine_leaders", lambda search, fit, scores: scores)
-    ranked(monkeypatch, case)
+    base_and_scores(monkeypatch, case)
     assert begun == []
     monkeypatch.setattr(refit, "_score_task", lambda *a: replace(score_task(*a), gain=3.0))
-    ranked(monkeypatch, case)
+    base_and_scores(monkeypatch, case)
     assert [t.candidate.family for t in begun] == ["wave"]
 
 
@@ -120,8 +120,8 @@ def test_there_is_no_restart_beside_an_effect_or_in_a_small_case(monkeypatch):
     monkeypatch.setattr(refit, "start_from_priors", lambda search, fit, task: begun.append(task))
     case = Imitated()
     beside = fit_jointly(case, case.candidates[1:], [0.0], {"stiffness": IMITATION})
-    ranked(monkeypatch, case, fit=beside)
-    ranked(monkeypatch, Imitated(is_large=False))
+    base_and_scores(monkeypatch, case, fit=beside)
+    base_and_scores(monkeypatch, Imitated(is_large=False))
     assert begun == []
 
 
@@ -129,7 +129,7 @@ def test_rivals_are_restarted_together(monkeypatch):
     """Two effects with equal responses: if only one of them were restarted, its name would be wrong."""
     case = Imitated()
     case.candidates = (case.candidates[0], Candidate.of("twin", SIZE, lambda p: p, ((0.1,),), {}))
-    _, scores = ranked(monkeypatch, case, (20.0, 15.0))
+    _, scores = base_and_scores(monkeypatch, case, (20.0, 15.0))
     assert scores["twin"].gain == pytest.approx(scores["wave"].gain, abs=0.5) and scores["twin"].gain > 10.0
 
 
@@ -148,5 +148,5 @@ def test_the_best_restarted_effect_moves_along_the_track(monkeypatch):
     moved = []
     monkeypatch.setattr(refit, "_refine_leaders", lambda search, fit, scores: scores)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: moved.append(s.family) or s)
-    ranked(monkeypatch, Imitated(), (20.0, 20.0))
+    base_and_scores(monkeypatch, Imitated(), (20.0, 20.0))
     assert moved == ["wave"]

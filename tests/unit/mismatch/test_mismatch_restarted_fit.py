@@ -44,7 +44,7 @@ class Turning(Case):
         return [values["ramp"] * X + sum((self.wave(**t) for t in terms), 0.0 * X) for _ in observations]
 
 
-def scored(case, base, start, ramp):
+def score_from(case, base, start, ramp):
     found = fit_jointly(case, case.candidates, start, {"ramp": ramp}, iterations=8)
     return score_of(Search(case), base, found, case.candidates[0])
 
@@ -53,7 +53,7 @@ def test_a_leader_in_a_wrong_minimum_is_restarted_at_a_smaller_size():
     """A fit from 2.0 and 9.0 ends in a minimum that explains hardly anything; half of both leads to 1.1 and 4.6."""
     case = Turning()
     base = fit_jointly(case)
-    stuck = scored(case, base, [2.0, 9.0], 2.0)
+    stuck = score_from(case, base, [2.0, 9.0], 2.0)
     assert stuck.explained < 0.2 and abs(stuck.estimates[0][1] - LENGTH) > 1.0
     again = restart_leader(Search(case), base, stuck)
     assert again.estimates[0] == pytest.approx([DEPTH, LENGTH], abs=0.02) and again.explained > 0.9
@@ -63,7 +63,7 @@ def test_a_leader_in_a_wrong_minimum_is_restarted_at_a_smaller_size():
 def test_a_leader_that_explains_enough_or_has_no_size_is_not_restarted():
     case = Turning()
     base = fit_jointly(case)
-    found = scored(case, base, [1.0, 4.5], 0.0)
+    found = score_from(case, base, [1.0, 4.5], 0.0)
     assert restart_leader(Search(case), base, found) is found
     sizeless = replace(found.candidate, effect=replace(found.candidate.effect, parameters=()))
     plain = replace(found, explained=0.1, candidate=sizeless)

@@ -83,7 +83,7 @@ def test_a_search_beyond_its_limit_has_no_answer():
 
 
 class TwoEffects(Counted):
-    """A parabola and, smaller, a wave; the first effect leaves an excess, so that a second one is sought."""
+    """A parabola and, smaller, a wave; the first effect leaves an excess, so that a second one is tested."""
 
     def __init__(self, most):
         super().__init__(most)

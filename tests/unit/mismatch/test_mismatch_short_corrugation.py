@@ -28,7 +28,7 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.simulate.wheel_path import Corrugation
 
 
-def looked_at(*terms, seed=7, plan=None):
+def corrugation_findings(*terms, seed=7, plan=None):
     case = TrackCase(measured_campaign(plan or small_plan((15.0,), hammer_positions=()), terms, seed))
     return case, short_corrugation_candidates(
         case, SimpleNamespace(candidates=(), values={n.name: n.mean for n in case.nuisances})
@@ -38,7 +38,7 @@ def looked_at(*terms, seed=7, plan=None):
 @pytest.mark.parametrize(("size", "wavelength", "seed"), [(3e-5, 0.16, 7), (2e-5, 0.09, 9)])
 def test_short_corrugation_is_found_with_its_wavelength_and_its_size(size, wavelength, seed):
     """In recordings at 10 kHz with roughness, noise, scattered supports; both are in the stated 95 % intervals."""
-    _, (found,) = looked_at(physics.RailCorrugation(20.5, 27.0, size, 0.3 * size, wavelength), seed=seed)
+    _, (found,) = corrugation_findings(physics.RailCorrugation(20.5, 27.0, size, 0.3 * size, wavelength), seed=seed)
     for p, true in zip(found.parameters, (1.044 * size, wavelength)):  # sine and cosine: hypot(1, 0.3)
         assert p.prior[0] == pytest.approx(true, abs=1.96 * p.prior[1])
     assert found.parameters[0].prior[1] < 0.35 * size and found.parameters[1].prior[1] < 0.04 * wavelength
@@ -46,17 +46,17 @@ def test_short_corrugation_is_found_with_its_wavelength_and_its_size(size, wavel
 
 
 def test_intact_rail_and_the_wheel_of_one_train_are_no_corrugation():
-    assert looked_at(seed=8)[1] == ()
-    assert looked_at(physics.OutOfRound(1, 5e-5, 1.5e-5, 20, train="heavy"))[1] == ()
+    assert corrugation_findings(seed=8)[1] == ()
+    assert corrugation_findings(physics.OutOfRound(1, 5e-5, 1.5e-5, 20, train="heavy"))[1] == ()
 
 
 def test_one_train_alone_does_not_distinguish_a_rail_from_wheels():
     plan = small_plan((15.0,), hammer_positions=())
     plan = SimpleNamespace(**{**vars(plan), "trains": tuple(t for t in plan.trains if t.name == "heavy")})
-    case, found = looked_at(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)
+    case, found = corrugation_findings(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16), plan=plan)
     line = ambiguous_line(case)
     assert found == () and line.nats > 12.0 and "waves of the wheels of this train" in line.words
-    assert ambiguous_line(looked_at(plan=plan)[0]) is None
+    assert ambiguous_line(corrugation_findings(plan=plan)[0]) is None
     assert [u.words for u in case.unmet_requirements if u.effect == "rail_corrugation"] == [
         "corrugation shorter than 0.3 m"
     ]
@@ -134,14 +134,14 @@ def expected_nats(z, n_sensors):
 def test_a_line_in_one_half_of_the_passages_alone_is_no_finding():
     """By the line in each passage, which an equal wave would have in all; sensors beyond the stretch do not count."""
 
-    def seen(*levels):
+    def passages_with_line(*levels):
         levels = [np.array([[x], [x], [0.0], [0.0]]) for x in levels]
         return passages_with(levels)
 
     stretch = (2.1, 4.2)
-    assert is_repeatable(seen(2.0, 1.5, 1.8, 1.2), 0, stretch)
-    assert not is_repeatable(seen(2.0, 0.4, 1.8, 0.5), 0, stretch)
-    assert not is_repeatable(seen(0.4, 2.0, 0.5, 1.8), 0, stretch)
+    assert is_repeatable(passages_with_line(2.0, 1.5, 1.8, 1.2), 0, stretch)
+    assert not is_repeatable(passages_with_line(2.0, 0.4, 1.8, 0.5), 0, stretch)
+    assert not is_repeatable(passages_with_line(0.4, 2.0, 0.5, 1.8), 0, stretch)
 
 
 def test_the_evidence_of_a_stretch_is_that_of_a_level_integrated_out():

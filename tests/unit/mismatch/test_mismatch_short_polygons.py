@@ -13,7 +13,7 @@ from turnout.mismatch.turnout.defect_priors import SHORT_POLYGONS
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
-def found_in(*terms, seed=7, changed=lambda campaign: campaign):
+def polygon_findings(*terms, seed=7, changed=lambda campaign: campaign):
     case = TrackCase(changed(measured_campaign(small_plan((15.0,), hammer_positions=()), terms, seed)))
     values = {n.name: n.mean for n in case.nuisances}
     return short_polygon_candidates(case, SimpleNamespace(candidates=(), values=values, terms=()))
@@ -26,7 +26,7 @@ def turned(wheel, size, order):
 @pytest.mark.parametrize(("wheel", "size", "order", "seed"), [(1, 6e-5, 13, 7), (3, 2.5e-5, 18, 9)])
 def test_a_short_polygon_is_found_on_its_wheel_with_its_size(wheel, size, order, seed):
     """In recordings with roughness of every wheel; the simulation and its contact do not use the closed form."""
-    (found,) = found_in(turned(wheel, size, order), seed=seed)
+    (found,) = polygon_findings(turned(wheel, size, order), seed=seed)
     assert found.where == {"train": "heavy", "axle": wheel + 1}
     mean, error = found.parameters[0].prior
     assert mean == pytest.approx(size, abs=1.96 * error) and error < 0.35 * size
@@ -42,9 +42,9 @@ def test_round_wheels_corrugation_and_hum_are_no_polygons():
 
         return replace(campaign, passages=tuple(map(with_polygon, campaign.passages)))
 
-    assert found_in(seed=8) == ()
-    assert found_in(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16)) == ()
-    assert found_in(seed=5, changed=hummed) == ()
+    assert polygon_findings(seed=8) == ()
+    assert polygon_findings(physics.RailCorrugation(20.5, 27.0, 3e-5, 0.0, 0.16)) == ()
+    assert polygon_findings(seed=5, changed=hummed) == ()
 
 
 def test_a_line_in_one_half_of_the_passages_alone_is_no_finding():
@@ -54,8 +54,8 @@ def test_a_line_in_one_half_of_the_passages_alone_is_no_finding():
     )
     other = next(p.name for p in worn.passages if p.train == "heavy")
     passages = tuple(s if w.name == other else w for s, w in zip(sound.passages, worn.passages))
-    assert found_in(changed=lambda _: replace(worn, passages=passages)) == ()
-    assert found_in(changed=lambda _: replace(worn, passages=passages, reserved=(other,)))
+    assert polygon_findings(changed=lambda _: replace(worn, passages=passages)) == ()
+    assert polygon_findings(changed=lambda _: replace(worn, passages=passages, reserved=(other,)))
 
 
 def test_the_evidence_is_that_of_an_amplitude_integrated_out():

@@ -29,7 +29,7 @@ def simulated(monkeypatch):
     return names
 
 
-def rolled(case):
+def aligned_observations(case):
     return [o for o in case.observations if o.name in case.aligned_passages]
 
 
@@ -40,7 +40,7 @@ def start_values(case):
 def test_derivatives_of_passages_simulate_once_by_each_value_without_a_closed_form(case, simulated):
     """By wheels, load, stiffness of pads and of ballast, ballast damping. The motion at supports is that of the
     prediction, for any number of passages in between."""
-    values, passages = start_values(case), rolled(case)
+    values, passages = start_values(case), aligned_observations(case)
     predicted = case.predict(values, (), passages)
     simulated.clear()
     case.nuisance_jacobian(values, (), passages, predicted)
@@ -48,7 +48,7 @@ def test_derivatives_of_passages_simulate_once_by_each_value_without_a_closed_fo
 
 
 def test_derivatives_by_an_effect_leave_the_motion_at_its_supports_in_the_cache(case, simulated):
-    values, passages = start_values(case), rolled(case)
+    values, passages = start_values(case), aligned_observations(case)
     before, after = (physics.LocalBallast(39, share) for share in (0.5, 0.51))
     predicted = case.predict(values, (before,), passages)
     for _ in range(3):
@@ -68,7 +68,7 @@ def test_passages_on_one_track_share_its_responses_and_on_another_do_not(case, m
 
     for module in (track_under_wheels, pseudo_forces):
         monkeypatch.setattr(module, "responses", counted)
-    values, passages = start_values(case), rolled(case)
+    values, passages = start_values(case), aligned_observations(case)
     predicted = case.predict(values, (), passages)
     case.predictor.differences.clear()
     shared = case.nuisance_jacobian(values, (), passages, predicted)

@@ -48,14 +48,14 @@ class Beam(Case):
         return [self.response(values["bending"], values["mass"]) + bump for _ in observations]
 
 
-def strained(case):
+def strained_value_of(case):
     return strained_value(case, fit_jointly(case, iterations=40), THRESHOLD)
 
 
 @pytest.mark.parametrize("sds", [5.7, -5.7])
 def test_a_value_with_a_prior_cost_above_the_threshold_of_a_name_is_strained(sds):
     """5.7 standard deviations cost 16.2 nats, of which the choice among two takes 0.7."""
-    value = strained(Beam(sds * TOLERANCE))
+    value = strained_value_of(Beam(sds * TOLERANCE))
     assert value.nuisance.name == "bending" and "5." in str(value)
     assert value.nats == pytest.approx(0.5 * value.deviation**2 - np.log(2.0), rel=0.02)
 
@@ -63,15 +63,15 @@ def test_a_value_with_a_prior_cost_above_the_threshold_of_a_name_is_strained(sds
 @pytest.mark.parametrize("sds", [0.0, 3.0, -4.8])
 def test_a_value_within_its_tolerance_is_not_strained(sds):
     """4.8 standard deviations cost 11.5 nats: less than a name."""
-    assert strained(Beam(sds * TOLERANCE)) is None
+    assert strained_value_of(Beam(sds * TOLERANCE)) is None
 
 
 def test_the_number_of_values_among_which_the_farthest_was_chosen_counts():
     """5.2 standard deviations cost 13.5 nats; the largest of a hundred values needs 4.6 more than the threshold."""
     case = Beam(5.2 * TOLERANCE)
-    assert strained(case)
+    assert strained_value_of(case)
     case.nuisances += tuple(Nuisance(f"v{k}", "-", 0.0, 1.0) for k in range(98))
-    assert strained(case) is None
+    assert strained_value_of(case) is None
 
 
 @pytest.mark.parametrize("error", [0.01, 0.1, 0.3])
@@ -95,18 +95,18 @@ def test_a_value_that_the_data_do_not_determine_is_not_strained():
 
 @pytest.mark.parametrize("more", [{"owner": "o0"}, {"index": 4}, {"can_mask": False}])
 def test_values_of_one_recording_one_of_many_and_of_a_surface_do_not_count(more):
-    assert strained(Beam(0.57, **more)) is None
+    assert strained_value_of(Beam(0.57, **more)) is None
 
 
 def test_a_gain_that_masks_no_effect_counts_if_its_channel_is_known():
-    assert strained(Beam(0.57, can_mask=False, at=("sensor", "S1"))).nuisance.at == ("sensor", "S1")
+    assert strained_value_of(Beam(0.57, can_mask=False, at=("sensor", "S1"))).nuisance.at == ("sensor", "S1")
 
 
 def test_a_value_that_masks_an_effect_is_not_strained():
     case = Beam(0.57)
     site = replace(case.candidates[0].site, masking_parameter="bending")
     case.candidates = (replace(case.candidates[0], site=site),)
-    assert strained(case) is None
+    assert strained_value_of(case) is None
 
 
 def test_a_strained_value_gives_the_answer_unknown_although_the_residual_is_small():

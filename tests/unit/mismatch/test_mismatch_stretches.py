@@ -39,7 +39,7 @@ def share_outside(change, columns):
 
 
 def test_the_effect_of_two_pads_is_that_of_a_force_at_each_of_them(case):
-    """Woodbury: the change of a receptance by two links is that of two forces, whatever the size of the change.
+    """Woodbury: the change of a receptance by two links is that of two forces, for any size of the change.
 
     No sensor is on one of these sleepers, where it would also record the link itself.
     """

@@ -160,7 +160,7 @@ def test_wheels_of_two_trains_confirm_one_another(told, names):
         assert {c.where["train"] for c in found.fit.candidates} == {"a", "b"}
 
 
-def own(candidate, values, errors, nats=100.0):
+def score_of_candidate(candidate, values, errors, nats=100.0):
     """Score of so many ``nats`` with these parameters."""
     fit = SimpleNamespace(psi=np.array(values), psi_se=np.array(errors), part=lambda _: slice(0, len(values)))
     return Score(candidate, nats, 0.0, 1.0, fit)
@@ -192,7 +192,7 @@ def test_a_gap_and_softer_ballast_of_equal_probability_are_a_choice(seated, nats
     here = {"sleeper": 7, "place": 4.2}
     ballast = Candidate.of("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
     gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
-    scores = [own(gap, [3e-3, seated], [1e-3, 0.03], nats), own(ballast, [0.35], [0.04])]
+    scores = [score_of_candidate(gap, [3e-3, seated], [1e-3, 0.03], nats), score_of_candidate(ballast, [0.35], [0.04])]
     verdict = judge(scores, 2.0, MismatchSettings())
     assert verdict.names == said
     assert verdict.scores[0].family == said[0]  # whose fit and position are stated
@@ -204,8 +204,8 @@ def test_the_size_of_an_effect_with_two_amplitudes_is_that_of_both():
     hum = Candidate.of(
         "hum", pair, lambda p: p, ((1.0, 0.0),), {"sensor": "A"}, smallest_reportable=0.49, n_size_parameters=2
     )
-    assert own(hum, [0.3, 0.4], [0.01, 0.01]).is_reportable
-    assert not own(hum, [0.3, 0.38], [0.01, 0.01]).is_reportable
+    assert score_of_candidate(hum, [0.3, 0.4], [0.01, 0.01]).is_reportable
+    assert not score_of_candidate(hum, [0.3, 0.38], [0.01, 0.01]).is_reportable
 
 
 @pytest.mark.parametrize("error, told", [(1.0, True), (4.0, False)])
@@ -221,7 +221,7 @@ def test_a_mass_that_may_be_negligible_is_not_named(error, told):
         smallest_reportable=5.0,
         min_significance=1.0,
     )
-    assert own(hung, [8.0], [error]).is_reportable == told
+    assert score_of_candidate(hung, [8.0], [error]).is_reportable == told
 
 
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
@@ -275,7 +275,7 @@ def test_a_gap_that_no_train_closes_may_be_missing_ballast(error, names):
     """2.5 ± 3 mm has no upper bound: the sleeper never touched the ballast, which may be missing."""
     here, settings = {"sleeper": 7, "place": 4.2}, MismatchSettings()
     gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, unbounded_form="local_ballast")
-    alone = judge([own(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings)
+    alone = judge([score_of_candidate(gap, [2.5e-3, 0.04], [error, 0.01])], 2.0, settings)
     verdict, _, _ = grade_name(alone, alone.scores[0].fit, 0.9, settings)
     assert verdict.names == names and verdict.answer == ("named" if len(names) == 1 else "a_or_b")
     assert bool(verdict.grade) == (len(names) == 1) and verdict.probability > 0.9
@@ -288,7 +288,7 @@ def test_a_second_gap_that_no_train_closes_may_be_missing_ballast_too(error, ans
     gap = Candidate.of(
         "hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), {"place": 4.2}, unbounded_form="local_ballast"
     )
-    second = judge([own(gap, [2.5e-3, 0.04], [1e-4, 0.01])], 2.0, settings)
+    second = judge([score_of_candidate(gap, [2.5e-3, 0.04], [1e-4, 0.01])], 2.0, settings)
     both = SimpleNamespace(
         psi=np.array([0.3, 2.5e-3, 0.04]), psi_se=np.array([0.02, error, 0.01]), part=lambda _: slice(1, 3),
         level={"passage": 0.8}, white=[],

@@ -20,7 +20,7 @@ CHANNEL = ChannelSite("A", 2, ("p",), True, 5.0, 4.0, 0.1)
 BLADE = BladeSite(((20, 12.0),), ((24, 14.4),), 3.0, True)
 
 
-def is_silent_without_passages(effect):
+def has_candidates_only_with_passages(effect):
     """Whether it has a hypothesis at some site with passages, and none without them."""
     if not effect.site_types or {ContactSite, TrainSite} & set(effect.site_types):
         return True
@@ -37,16 +37,16 @@ def is_silent_without_passages(effect):
 def test_an_effect_requires_passages_if_it_has_candidates_only_with_passages(effect):
     if effect.name in ("clipping", "rail_shear"):  # a saturated channel shows in impacts; the rail has to be a real one
         return
-    assert (PASSAGES in effect.requirements) == is_silent_without_passages(effect)
+    assert (PASSAGES in effect.requirements) == has_candidates_only_with_passages(effect)
 
 
-def unexamined(plan, **changes):
+def unmet_requirements(plan, **changes):
     case = TrackCase(dataclasses.replace(measured_campaign(plan, (), 3), **changes))
     return case, {u.effect: u for u in case.unmet_requirements}
 
 
 def test_passages_alone_do_not_show_effects_that_need_impacts_or_temperatures():
-    case, lacking = unexamined(small_plan((15.0,), hammer_positions=()))
+    case, lacking = unmet_requirements(small_plan((15.0,), hammer_positions=()))
     assert {"local_pad", "mount_resonance", "pad_temperature"} <= set(lacking)
     assert not {"surface_dip", "wheel_flat", "slide_chair_gap", "rail_corrugation"} & set(lacking)
     families = {c.family for c in case.candidates}
@@ -59,7 +59,7 @@ def test_passages_alone_do_not_show_effects_that_need_impacts_or_temperatures():
 
 
 def test_impacts_alone_do_not_show_effects_that_need_trains():
-    _, lacking = unexamined(small_plan((5.0, 30.0)), passages=(), reserved=())
+    _, lacking = unmet_requirements(small_plan((5.0, 30.0)), passages=(), reserved=())
     assert {"surface_dip", "wheel_flat", "unsprung_mass", "hum", "rail_corrugation"} <= set(lacking)
     assert "pad_temperature" not in lacking and "local_pad" not in lacking
     assert lacking["rail_corrugation"].words == "corrugation on a stretch of rail"

@@ -141,7 +141,7 @@ def test_the_seat_of_a_sensor_beside_the_impact_has_the_derivative_of_its_recept
     assert np.max(np.abs(nodes_alone / difference - 1.0)) > 0.05  # the part that would be missing
 
 
-def shown(reference, term):
+def channel_signal(reference, term):
     """Signal of a channel with ``term`` for a train that comes ``reference`` seconds after the start of the
     recorder."""
     time = np.arange(reference - 0.08, reference + 1.0, 1.0 / 360.0)
@@ -155,8 +155,8 @@ def shown(reference, term):
 
 @pytest.mark.parametrize("reference", [0.45, 0.457, 1.237])
 def test_the_phase_of_hum_refers_to_the_clock_of_the_recorder_and_not_to_the_train(reference):
-    time, with_hum, _ = shown(reference, physics.Hum("A", 0.8, 0.6))
-    _, without, _ = shown(reference, physics.Hum("A", 0.0, 0.0))
+    time, with_hum, _ = channel_signal(reference, physics.Hum("A", 0.8, 0.6))
+    _, without, _ = channel_signal(reference, physics.Hum("A", 0.0, 0.0))
     hum = 0.8 * np.sin(2.0 * np.pi * 50.0 * time) + 0.6 * np.cos(2.0 * np.pi * 50.0 * time)
     # the signal's samples lie at the middle of their steps of 1/7200 s: 1.3 degrees at 50 Hz
     assert np.allclose((with_hum - without)[20:-20], hum[20:-20], atol=0.05)
@@ -164,8 +164,8 @@ def test_the_phase_of_hum_refers_to_the_clock_of_the_recorder_and_not_to_the_tra
 
 def test_the_error_of_a_drifting_clock_grows_from_the_start_of_the_record():
     """A share of 1e-3, five seconds after the start: the train appears 5 ms early, and little more at its end."""
-    time, drifted, _ = shown(5.0, physics.ClockDrift("A", 1e-3))
-    _, sound, _ = shown(5.0, physics.ClockDrift("A", 0.0))
+    time, drifted, _ = channel_signal(5.0, physics.ClockDrift("A", 1e-3))
+    _, sound, _ = channel_signal(5.0, physics.ClockDrift("A", 0.0))
     lags = np.arange(-8e-3, 8.1e-3, 2.5e-4)
     middle = slice(60, -60)
     fits = [np.sum((np.interp(time + lag, time, sound) - drifted)[middle] ** 2) for lag in lags]
@@ -285,14 +285,14 @@ def test_the_position_error_of_a_sensor_is_not_that_of_a_sleeper():
 
 
 @pytest.fixture(scope="module")
-def rolled():
+def case_with_passages():
     return TrackCase(intact_campaign((24.0,), 7))
 
 
-def test_noise_is_not_measured_while_the_train_comes(rolled):
+def test_noise_is_not_measured_while_the_train_comes(case_with_passages):
     """The same passage without its start, up to a twentieth of a second before the first wheel: the sensors then record
     the train, and this must not count as noise of a channel."""
-    made = next(iter(rolled.aligned_passages.values()))
+    made = next(iter(case_with_passages.aligned_passages.values()))
     passage, sigma = made.passage, []
     for cut in (0.0, made.reference - 0.05):
         first = round(cut * passage.recording.rate)
@@ -307,13 +307,15 @@ def test_noise_is_not_measured_while_the_train_comes(rolled):
     assert np.all(sigma[1] < 1.3 * sigma[0])
 
 
-def test_one_sensor_does_not_distinguish_a_position_from_its_own_channel(rolled):
-    fit = fit_jointly(rolled, iterations=0)
-    passages = [s for s in source_spaces(rolled, fit) if any(kind == "sensor" for kind, _ in s.combinations)]
+def test_one_sensor_does_not_distinguish_a_position_from_its_own_channel(case_with_passages):
+    fit = fit_jointly(case_with_passages, iterations=0)
+    passages = [
+        s for s in source_spaces(case_with_passages, fit) if any(kind == "sensor" for kind, _ in s.combinations)
+    ]
     assert any(kind == "place" for s in passages for kind, _ in s.combinations)
-    name, made = next(iter(rolled.aligned_passages.items()))
+    name, made = next(iter(case_with_passages.aligned_passages.items()))
     one = AlignedPassage(name, made.passage, made.sensors[:1], made.time, made.reference, made.speed)
-    kinds = {kind for kind, _ in _force_space(rolled, fit, one).combinations}
+    kinds = {kind for kind, _ in _force_space(case_with_passages, fit, one).combinations}
     assert kinds == {"clock", "sensor"}
 
 

@@ -22,7 +22,8 @@ SHARED = {name: StateParameter(name, 0.0, 2.0, group="surface") for name in ("le
 
 
 class Valleys(Case):
-    """A train measures the square of a length, twelve times, and the sum of depth, length, and a number of its own."""
+    """A train measures the square of a length, twelve times, and the sum of depth, length, and a number of this
+    train."""
 
     nuisances = (
         Nuisance("length", "-", 0.0, 2.0),
@@ -49,7 +50,7 @@ def cost(case, prior, x):
     return float(np.sum(((case.observations[0].data - case.predict(values, (), ())[0]) / ERROR) ** 2)) + prior.cost(x)
 
 
-def fitted(case, start):
+def fit_from(case, start):
     return fit_jointly(case, values={"length": start, "depth": 0.0})
 
 
@@ -62,7 +63,7 @@ def test_steps_end_at_the_maximum_of_a_normal_prior_and_the_data():
     assert np.linalg.inv(prior.precision)[:2, :2] == pytest.approx(
         np.array([[0.05**2, 0.4 * 0.05**2], [0.4 * 0.05**2, 0.05**2 + 0.02**2]])
     )
-    fit, reached = fit_all_recordings(case, fitted(case, 1.0), prior, {"length": 0.9, "depth": 0.5, "load": 0.0})
+    fit, reached = fit_all_recordings(case, fit_from(case, 1.0), prior, {"length": 0.9, "depth": 0.5, "load": 0.0})
     best = optimize.minimize(lambda x: cost(case, prior, x), prior.mean, method="Nelder-Mead", options={"xatol": 1e-7})
     assert [fit.values[n.name] for n in case.nuisances] == pytest.approx(best.x, abs=2e-3)
     assert reached == pytest.approx(best.fun, abs=0.05)
@@ -72,7 +73,7 @@ def test_steps_that_cost_more_are_damped():
     """From a length near 0 the undamped step leads to a length of 10 and more."""
     case = Valleys(1.0, 0.5)
     prior = NormalPrior.of_file(case)
-    fit, _ = fit_all_recordings(case, fitted(case, 1.0), prior, {"length": 0.05, "depth": 0.5, "load": 0.0})
+    fit, _ = fit_all_recordings(case, fit_from(case, 1.0), prior, {"length": 0.05, "depth": 0.5, "load": 0.0})
     assert fit.values["length"] == pytest.approx(1.0, abs=0.1)
 
 
@@ -84,7 +85,7 @@ def test_the_excess_of_an_unchanged_visit_is_chi_squared_with_the_directions_tha
         belief = belief_of(1.0, 0.5)
         depth, length = rng.multivariate_normal(belief.mean, belief.covariance)
         case = Valleys(length, depth, 0.05 * rng.standard_normal(), seed)
-        fit = fitted(case, -1.0)
+        fit = fit_from(case, -1.0)
         assert fit.values["length"] < 0.0
         given = fit_given_belief(case, replace(fit, scale={"response": 1.0}), SHARED, belief)
         assert given.fit.values["length"] > 0.0 and given.linear_excess > 100.0
@@ -111,7 +112,7 @@ def history(monkeypatch):
 
     def of(lengths, valleys, store=None):
         cases = {f"{2020 + k}-01-01": Valleys(length, 0.5, seed=k) for k, length in enumerate(lengths)}
-        fits = {day: fitted(case, valley) for (day, case), valley in zip(cases.items(), valleys)}
+        fits = {day: fit_from(case, valley) for (day, case), valley in zip(cases.items(), valleys)}
         visits = [visit_of(day, cases[day], fits[day]) for day in cases]
         asked = []
 
@@ -147,7 +148,7 @@ def test_a_linear_model_has_the_excess_that_its_derivatives_predict(monkeypatch)
     rows = np.repeat([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]], 8, axis=0)
     monkeypatch.setattr(Valleys, "predict", lambda self, v, *a: [rows @ [v["length"], v["depth"], v["load"]]])
     case, belief = Valleys(1.3, 0.2, load=0.12), belief_of(1.0, 0.5)
-    fit = replace(fitted(case, 1.0), scale={"response": 1.0})
+    fit = replace(fit_from(case, 1.0), scale={"response": 1.0})
     given = fit_given_belief(case, fit, SHARED, belief)
     prior, y = NormalPrior.of_belief(case, SHARED, belief), case.observations[0].data
 
@@ -172,7 +173,7 @@ def test_a_change_without_a_derivative_at_the_earlier_values_keeps_its_excess(mo
 
     monkeypatch.setattr(Valleys, "predict", predict)
     case = Valleys(1.31, 0.5)
-    given = fit_given_belief(case, fitted(case, 1.31), SHARED, belief_of(1.0, 0.5))
+    given = fit_given_belief(case, fit_from(case, 1.31), SHARED, belief_of(1.0, 0.5))
     assert given.fit.values["length"] == pytest.approx(1.0, abs=0.05)
     assert given.excess > 12 * ((1.0 + np.tanh(0.5)) / ERROR) ** 2 * 0.9
 

@@ -71,7 +71,7 @@ def test_trains_that_close_a_gap_name_it_beside_a_damper_that_fits_it(question):
 
 
 def test_an_error_that_repeats_at_all_visits_counts_once():
-    """Of 40 seeded sites 14 have a name; 26 if each of the four visits had an error of its own."""
+    """Of 40 seeded sites 14 have a name; 26 if each of the four visits had another error."""
     names = [names_of("file", 0.5, seed=s, sd=0.2, repeats=True) for s in range(40)]
     assert 5 <= names.count(SOFT) <= 20 and GAP not in names
 

@@ -161,7 +161,7 @@ def test_whitening_does_not_change_the_poles():
     k = np.arange(50)
     z = 0.9 * np.exp(0.6j)
     white = whiten((z**k).real[None], np.array([1.0, -0.5, 0.2]))[0]
-    # A decay of pole z obeys y[k+2] = 2 Re(z) y[k+1] - |z|^2 y[k], whatever its amplitude.
+    # A decay of pole z obeys y[k+2] = 2 Re(z) y[k+1] - |z|^2 y[k], for any amplitude.
     np.testing.assert_allclose(white[2:], 2 * z.real * white[1:-1] - abs(z) ** 2 * white[:-2], atol=1e-12)
 
 
@@ -181,6 +181,6 @@ def test_random_modes_explain_noise_only_by_the_number_of_their_amplitudes():
     """One mode has two free amplitudes: of 600 samples of noise it explains 2/600, a fit of 0.17 %."""
     noise = np.random.default_rng(4).standard_normal((20, 600))
     null = random_mode_fits(noise, 20e3, [(50.0, 300.0)], 40)
-    # Medians of chi-squared: 1.39 for two amplitudes, less 0.45 for the mean that the score takes off; halved, of 600.
+    # Medians of chi-squared: 1.39 for two amplitudes, less 0.45 for the mean that the score subtracts; halved, of 600.
     assert np.median(null) == pytest.approx(100.0 * (1.39 - 0.45) / 1200.0, abs=0.15)
     assert np.all(null < 0.6)

@@ -76,7 +76,8 @@ def test_settings_choose_the_method():
 
 @pytest.mark.parametrize(("rate", "bands"), [(1600.0, 2), (1500.0, 2), (1280.0, 2), (400.0, 1)])
 def test_at_a_low_rate_the_upper_band_ends_below_half_of_it(rate, bands):
-    """Decays of 60 Hz and, where it fits, of 350 Hz: order 2 finds each in its band, whatever the filter's top."""
+    """Decays of 60 Hz and, where it fits, of 350 Hz: order 2 finds each in its band, for any upper limit of the
+    filter."""
     k = np.arange(int(0.5 * rate)) / rate
     wanted = [(60.0, 0.05), (350.0, 0.05)][:bands]
     lead = np.zeros(int(0.05 * rate))

@@ -12,14 +12,14 @@ from turnout.modal import identify
 SETTINGS = IdentifySettings(null_draws=10)
 
 
-def identified(location, seed=0, n=10, settings=SETTINGS, **conditions):
+def hammer_test_and_model(location, seed=0, n=10, settings=SETTINGS, **conditions):
     test = hammer_test(location, n, seed, **conditions)
     return test, identify(test.decays(), test.rate, settings)
 
 
 @pytest.mark.parametrize("location", LOCATIONS)
 def test_at_every_location_the_true_modes_and_no_others_are_reported(location):
-    test, model = identified(location)
+    test, model = hammer_test_and_model(location)
     assert tuple(m.band for m in model.modes) == test.bands
     assert len(model.diagnostics["modes_in_fit"]) == len(test.bands)
     for i, mode in enumerate(model.modes):
@@ -35,7 +35,7 @@ def test_at_every_location_the_true_modes_and_no_others_are_reported(location):
 @pytest.mark.parametrize("snr", [40.0, 26.0])
 def test_unmodelled_modes_and_drift_do_not_affect_the_modes(location, snr):
     """Limits of the rms over many tests, here for single tests at three times their value."""
-    test, model = identified(location, 4, snr_db=snr, nuisance=UNMODELLED, drift=0.05)
+    test, model = hammer_test_and_model(location, 4, snr_db=snr, nuisance=UNMODELLED, drift=0.05)
     ballast, railpad = model.mode("ballast"), model.mode("railpad")
     f_limit, zeta_limit = (0.015, 0.075) if snr == 40.0 else (0.036, 0.21)
     assert ballast.frequency == pytest.approx(test.frequency[0, 0], rel=f_limit)
@@ -49,7 +49,7 @@ def test_unmodelled_modes_and_drift_do_not_affect_the_modes(location, snr):
 
 @pytest.mark.parametrize("location", ["CP A9", "AS main"])
 def test_a_mode_that_scatters_between_impacts_is_not_reported_as_two(location):
-    _, model = identified(location, 1, spread=0.03)
+    _, model = hammer_test_and_model(location, 1, spread=0.03)
     assert len(model.diagnostics["modes_in_fit"]) == 2
     # Ten impacts of 3 %: the spread is known to 1/sqrt(18) = 24 %.
     assert model.mode("railpad").frequency_sd / model.mode("railpad").frequency == pytest.approx(0.03, rel=0.7)
@@ -116,7 +116,7 @@ def test_an_outlying_impact_is_left_out_and_reported(damage):
 def test_a_third_resonance_is_kept_when_its_band_is_configured():
     rail = Nuisance(1050.0, 0.03, 0.4)
     settings = IdentifySettings(null_draws=10, extra_bands=(800.0, 1500.0))
-    _, model = identified("CP A7", 9, settings=settings, nuisance=(rail,))
+    _, model = hammer_test_and_model("CP A7", 9, settings=settings, nuisance=(rail,))
     assert [m.band for m in model.modes] == ["ballast", "railpad", "other1"]
     assert model.order == 6
     assert model.mode("other1").frequency == pytest.approx(1050.0, abs=6.0 * model.mode("other1").frequency_se)
@@ -134,7 +134,7 @@ def test_the_result_does_not_depend_on_the_order_of_impacts_and_is_repeatable():
 
 
 def test_one_impact_gives_modes_with_the_error_of_its_noise():
-    test, model = identified("CP A7", 11, n=1)
+    test, model = hammer_test_and_model("CP A7", 11, n=1)
     for i, mode in enumerate(model.modes):
         assert mode.n == 1
         assert mode.frequency_se == pytest.approx(mode.frequency_crb, rel=0.05)
@@ -143,7 +143,7 @@ def test_one_impact_gives_modes_with_the_error_of_its_noise():
 
 
 def test_the_held_out_fit_exceeds_its_null_and_reaches_its_limit():
-    test, model = identified("CP A7", 12, settings=replace(SETTINGS, null_draws=100))
+    test, model = hammer_test_and_model("CP A7", 12, settings=replace(SETTINGS, null_draws=100))
     decays = np.array(test.decays())
     noise_share = test.noise[:, None] * np.sqrt(600) / np.linalg.norm(decays - decays.mean(1, keepdims=True), axis=1)
     limit = 100.0 * (1.0 - np.median(noise_share.diagonal()))
@@ -169,7 +169,7 @@ def random_fits(decays, rate, bands, draws):
 
 
 def test_stabilisation_lists_the_poles_of_every_order():
-    test, model = identified("CP A7", 13)
+    test, model = hammer_test_and_model("CP A7", 13)
     stable = [row for row in model.stabilisation if row["status"] == "stable"]
     assert {row["order"] for row in model.stabilisation} == set(range(2, 17, 2))
     for f in test.frequency[0]:

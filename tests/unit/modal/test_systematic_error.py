@@ -28,7 +28,7 @@ def decays(rng, left_out, noise=0.01):
     return clean + noise * rng.standard_normal((N_IMPACT, N))
 
 
-def fitted(rng, left_out):
+def fit_of_two_modes(rng, left_out):
     return fit_mixed(START, decays(rng, left_out), RATE, drift_columns(N, -1), iterations=30)
 
 
@@ -42,7 +42,7 @@ def test_an_omitted_mode_raises_the_common_error_of_its_neighbour():
     """The fit absorbs a part of it: the actual error is up to five times the stated one, not fifty times."""
     errors, stated, noise = [], [], []
     for seed in range(30):
-        fit = fitted(np.random.default_rng(seed), (0.1, 700.0, 0.05))
+        fit = fit_of_two_modes(np.random.default_rng(seed), (0.1, 700.0, 0.05))
         errors.append(fit.mean[1] - TRUTH[1])
         stated.append(common_error(fit, RATE)[1])
         noise.append(noise_error(fit)[1])
@@ -55,14 +55,14 @@ def test_noise_of_single_impacts_has_no_common_error():
     """A fit of the right modes: the common part by chance is below the error of the noise."""
     common, bound = [], []
     for seed in range(30):
-        fit = fitted(np.random.default_rng(100 + seed), (0.0, 700.0, 0.15))
+        fit = fit_of_two_modes(np.random.default_rng(100 + seed), (0.0, 700.0, 0.15))
         common.append(common_error(fit, RATE))
         bound.append(noise_error(fit))
     assert np.all(np.median(common, axis=0) < np.mean(bound, axis=0))
 
 
 def test_a_residual_far_from_a_mode_does_not_count_for_it():
-    fit = fitted(np.random.default_rng(3), (0.3, 1500.0, 0.02))
+    fit = fit_of_two_modes(np.random.default_rng(3), (0.3, 1500.0, 0.02))
     assert np.all(common_error(fit, RATE) < 2.0 * noise_error(fit))
 
 
@@ -112,7 +112,7 @@ def test_a_narrow_pole_at_a_broad_resonance_has_the_interval_of_its_rivals(seed,
 
 def test_an_incomplete_model_is_no_rival_of_a_complete_one():
     def explanation(leaves_common):
-        fit = fitted(np.random.default_rng(5), (0.0, 700.0, 0.15))
+        fit = fit_of_two_modes(np.random.default_rng(5), (0.0, 700.0, 0.15))
         return Explanation(fit, [], Background(), leaves_common=leaves_common)
 
     complete, incomplete = explanation(False), explanation(True)

@@ -14,7 +14,7 @@ WAGONS = ((2.0, 3.8, 10.4, 12.2), (2.8, 11.2), (2.8, 11.2))
 FREIGHT = np.concatenate([14.0 * k + np.array(WAGONS[k % 3]) for k in range(22)])
 
 
-def passed(settings, offsets, speed, acceleration, direction):
+def passage_and_speed(settings, offsets, speed, acceleration, direction):
     """The passage, and its true speed halfway between the first and the last axle at the origin. [m/s]"""
     random = np.random.default_rng(3)
     recording = rolling_noise(random, offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
@@ -29,7 +29,7 @@ def passed(settings, offsets, speed, acceleration, direction):
 def test_a_train_that_changes_its_speed_is_recognized_without_faults_of_clocks(
     speed, acceleration, direction, settings
 ):
-    passage, middle = passed(settings, IC3, speed, acceleration, direction)
+    passage, middle = passage_and_speed(settings, IC3, speed, acceleration, direction)
     assert not {f.reason for f in passage.findings} & {"clock_drift", "channels_swapped", "axles_uncertain"}
     assert (passage.n_axle, passage.type.type, len(passage.audible_sensors)) == (8, "IC3", 6)
     assert passage.speed.speed == pytest.approx(middle, abs=5.0 * passage.speed.se)
@@ -40,7 +40,7 @@ def test_a_train_that_changes_its_speed_is_recognized_without_faults_of_clocks(
 @pytest.mark.parametrize(("speed", "acceleration"), [(18.0, -0.3), (10.0, 0.1)])
 def test_a_freight_train_without_a_template_that_changes_its_speed_is_recognized(speed, acceleration, settings):
     """300 m of wagons: the last wagon is two fifths slower or a third faster than the first."""
-    passage, middle = passed(settings, FREIGHT, speed, acceleration, 1)
+    passage, middle = passage_and_speed(settings, FREIGHT, speed, acceleration, 1)
     assert not {f.reason for f in passage.findings} & {"clock_drift", "two_trains", "axles_uncertain"}
     assert (passage.n_axle, passage.type.type, len(passage.audible_sensors)) == (60, "unknown", 6)
     assert passage.speed.speed == pytest.approx(middle, abs=3.0 * passage.speed.se)

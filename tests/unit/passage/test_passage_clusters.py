@@ -50,7 +50,7 @@ def test_the_id_of_a_traffic_that_ended_is_not_used_again(settings):
     """Slow trains end, then all trains of the type, and years later other trains of the type begin."""
     rng = np.random.default_rng(8)
 
-    def fitted(groups, previous=None):
+    def clusters_of(groups, previous=None):
         rows = [
             {"train_type": t, "speed_kmh": v * np.exp(0.01 * rng.standard_normal()), "axle_load_t": p}
             for t, v, p, n in groups
@@ -60,12 +60,12 @@ def test_the_id_of_a_traffic_that_ended_is_not_used_again(settings):
         return Clusters.of(json.loads(json.dumps(found.document())))
 
     fast, slow, other = ("IC3", 160.0, 12.0, 200), ("IC3", 80.0, 12.0, 100), ("IC3", 120.0, 18.0, 100)
-    first = fitted([fast, slow])
+    first = clusters_of([fast, slow])
     assert [c.id for c in first.clusters] == ["IC3/1", "IC3/2"]
-    third = fitted([fast, other], fitted([fast], first))
+    third = clusters_of([fast, other], clusters_of([fast], first))
     assert [c.id for c in third.clusters] == ["IC3/1", "IC3/3"]
-    without = fitted([("freight", 90.0, 20.0, 50)], third)
-    assert [c.id for c in fitted([other], without).clusters] == ["IC3/4"]
+    without = clusters_of([("freight", 90.0, 20.0, 50)], third)
+    assert [c.id for c in clusters_of([other], without).clusters] == ["IC3/4"]
 
 
 def test_ids_stay_when_a_night_is_added_and_the_clusters_are_fitted_again(settings):

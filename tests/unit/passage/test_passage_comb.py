@@ -21,7 +21,7 @@ TOOTH[[9, 10, 11, 15]] = 1.0, 3.0, 1.5, -1.0
 SHORT, LONG = Vehicle("short", 9.0, (1.4, 7.0)), Vehicle("long", 14.0, (1.8, 3.6, 10.4, 12.2))
 
 
-def laid(places, noise=0.0, n=900, seed=0):
+def comb_profiles(places, noise=0.0, n=900, seed=0):
     """Profiles of one sensor and one motion: the tooth at ``places`` [m] behind the start of the profile."""
     row = np.zeros(n)
     for place in places:
@@ -77,7 +77,7 @@ def test_profiles_of_many_motions_are_those_of_each():
 
 def test_the_true_comb_explains_all_and_its_tooth_is_estimated():
     places = offsets((LONG, SHORT, LONG, LONG))
-    profiles, comb = laid(places + 6.0), Comb.of(places)
+    profiles, comb = comb_profiles(places + 6.0), Comb.of(places)
     share, starts = explained_share(profiles, comb, np.arange(1))
     k = int(np.argmax(share[0]))
     # the ridge takes 3 % off the tooth's amplitude
@@ -92,7 +92,7 @@ def test_a_row_may_start_up_to_two_steps_before_or_behind_its_position(steps):
     """Before the axles move, the share is the best of those at the five starts."""
     row = (LONG, SHORT, LONG, LONG)
     places = offsets(row)
-    profiles = laid(places + 6.0, noise=0.5)
+    profiles = comb_profiles(places + 6.0, noise=0.5)
     share, starts = explained_share(profiles, Comb.of(places), np.arange(1))
     best = int(np.argmax(share[0]))
     for further in (0, int(np.sign(steps))):
@@ -105,7 +105,7 @@ def test_a_comb_in_noise_explains_no_more_than_its_free_numbers_do():
     """25 free numbers on n values of white noise: R² = 25 / n in the mean, and the evidence is below 0."""
     share = []
     for seed in range(40):
-        profiles = laid([], 1.0, seed=seed)
+        profiles = comb_profiles([], 1.0, seed=seed)
         share.append(explained_share(profiles, Comb.of(offsets((LONG,) * 8)), np.arange(1))[0][0, 40])
     assert np.mean(share) == pytest.approx(25 / 900, rel=0.25)
     assert evidence(np.max(share), 144.0, 1) < 0
@@ -116,7 +116,7 @@ def test_the_row_of_mixed_vehicles_is_found_with_its_start(seed):
     rng = np.random.default_rng(seed)
     pattern = Pattern("mixed", (Group((LONG,)), Group((SHORT, LONG), 1, 20)))
     row = (LONG, *rng.choice([SHORT, LONG], 7))
-    profiles = laid(offsets(row) + 5.0, 0.5, seed=seed)
+    profiles = comb_profiles(offsets(row) + 5.0, 0.5, seed=seed)
     found, start = likeliest_row(profiles, TOOTH[None], pattern, 5.4)
     assert [v.name for v in found] == [v.name for v in row]
     assert start == pytest.approx(5.0, abs=2 * COMB_STEP)
@@ -125,7 +125,7 @@ def test_the_row_of_mixed_vehicles_is_found_with_its_start(seed):
 def test_an_optional_group_is_left_out_if_it_is_missing():
     pattern = Pattern("t", (Group((SHORT,), 0, 2), Group((LONG,), 1, 9), Group((SHORT,), 0, 1)))
     for row in ((LONG,) * 3, (SHORT, LONG, LONG), (SHORT, SHORT, LONG, LONG, SHORT)):
-        profiles = laid(offsets(row) + 5.0, 0.3)
+        profiles = comb_profiles(offsets(row) + 5.0, 0.3)
         assert [v.name for v in likeliest_row(profiles, TOOTH[None], pattern, 5.0)[0]] == [v.name for v in row]
 
 
@@ -133,7 +133,7 @@ def test_other_wheelbases_are_found_and_correct_ones_stay():
     wide = Vehicle("long", 14.0, (1.6, 3.8, 10.2, 12.4))
     row, true = (LONG,) * 5, offsets((wide,) * 5)
     for places, moved in ((offsets(row), 0.0), (true, 0.2)):
-        profiles = laid(places + 6.0, 0.3)
+        profiles = comb_profiles(places + 6.0, 0.3)
         found, before, after = fit_shape(profiles, row, offsets(row), 6.0)
         base = np.diff(found)[::2]
         assert base == pytest.approx(1.8 + 2 * moved, abs=0.06)

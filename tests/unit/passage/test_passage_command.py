@@ -21,7 +21,7 @@ passages:
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def folder_with_link(tmp_path, monkeypatch):
     (tmp_path / "config/layouts").mkdir(parents=True)
     (tmp_path / "config/layouts/small.yaml").write_text(LAYOUT)
     (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tsmall\n")
@@ -30,11 +30,11 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def command_result(place, samples, capsys):
+def command_result(folder_with_link, samples, capsys):
     """(exit code, what was printed) for a recording that lies behind a link."""
     recording = Recording(samples[None], 5000.0, (Channel("web", "acceleration"),), "passage", datetime(2026, 7, 25, 9))
-    write([recording], place / "share/train.npz", "npz")
-    (place / "here.npz").symlink_to(place / "share/train.npz")
+    write([recording], folder_with_link / "share/train.npz", "npz")
+    (folder_with_link / "here.npz").symlink_to(folder_with_link / "share/train.npz")
     code = main(["passage", "here.npz", "--turnout", "t1", "--no-fit"])
     return code, capsys.readouterr().out
 
@@ -43,9 +43,9 @@ def command_result(place, samples, capsys):
     ("broken", "said"),
     [(None, "no_train: nothing stands out of the noise"), (np.nan, "1 of 20000 samples are missing or not finite")],
 )
-def test_a_file_without_a_train_is_reported_with_exit_code_1(place, capsys, broken, said):
+def test_a_file_without_a_train_is_reported_with_exit_code_1(folder_with_link, capsys, broken, said):
     samples = np.random.default_rng(7).normal(0.0, 0.1, 20000)
     if broken is not None:
         samples[7] = broken
-    code, printed = command_result(place, samples, capsys)
+    code, printed = command_result(folder_with_link, samples, capsys)
     assert code == 1 and said in printed

@@ -28,7 +28,7 @@ def record(starts, speeds, length, seed=1):
 
 
 @pytest.mark.parametrize("block", [0.37, 5.0, 90.0])
-def test_every_train_is_in_one_piece_with_its_margins_whatever_the_blocks(block, settings):
+def test_every_train_is_in_one_piece_with_its_margins_for_any_size_of_blocks(block, settings):
     samples = record((12.0, 31.0, 60.0), (40.0, 20.0, 33.0), 80.0)
     n = int(block * RATE)
     blocks = (samples[:, k : k + n] for k in range(0, samples.shape[1], n))
@@ -99,7 +99,7 @@ def test_memory_does_not_grow_with_the_record(settings):
     assert peaks[1] < peaks[0] + 4e6
 
 
-def logged(folder, format, starts=(12.0, 28.6, 55.0), length=70.0):
+def continuous_file(folder, format, starts=(12.0, 28.6, 55.0), length=70.0):
     """A file of one long record: the second train is at the border of two blocks, at 30 s."""
     channels = (Channel("c0", "acceleration", 0.0), Channel("c1", "acceleration", 4.0))
     recording = Recording(record(starts, (40.0, 20.0, 33.0), length), RATE, channels, "passage")
@@ -115,7 +115,7 @@ DESCRIBED = RawDescription(
 
 @pytest.mark.parametrize("format", ["hdf5", "tdms", "uff", "wav"])
 def test_passages_of_a_file_read_in_stretches_are_those_of_the_file_read_whole(format, settings, tmp_path):
-    name = logged(tmp_path, format)
+    name = continuous_file(tmp_path, format)
     short = replace(settings, longest=20.0, chunk=10.0)
     (whole,) = read(name, tmp_path, DESCRIBED).recordings
     (long,) = read(name, tmp_path, DESCRIBED, short.longest, max_whole_file_size=0).long_recordings
@@ -136,7 +136,7 @@ def test_a_file_is_cut_in_memory_that_does_not_grow_with_it(settings, tmp_path):
     for length in (60.0, 240.0):
         folder = tmp_path / f"{length:g}"
         folder.mkdir()
-        name = logged(folder, "hdf5", (12.0,), length)
+        name = continuous_file(folder, "hdf5", (12.0,), length)
         tracemalloc.start()
         (long,) = read(name, folder, DESCRIBED, short.longest, max_whole_file_size=0).long_recordings
         assert len(list(trains_in(long, short))) == 1

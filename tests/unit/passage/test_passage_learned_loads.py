@@ -85,7 +85,7 @@ def test_trains_of_known_weight_calibrate_the_sensors_that_weigh_the_next_train(
     assert found.mean == pytest.approx(14.5, rel=0.05) and found.se < 0.025 * found.mean
 
 
-def test_too_few_trains_of_known_weight_calibrate_nothing(turnout):
+def test_too_few_trains_of_known_weight_give_no_calibration(turnout):
     config, raw, settings = turnout
     trains = weighed_trains(config, raw, PATTERNS, settings, max_trains=4)
     assert len(trains) == 4

@@ -57,14 +57,14 @@ def rows_of(raw, repository, monkeypatch, names, change):
     return passage_unit(scan(configured, raw).units[0], turnout, raw, PassageContext(models, PATTERNS))
 
 
-def lose(samples, time=LOST_AT):
+def lose_signal(samples, time=LOST_AT):
     samples[int(time * RATE) :] = 0.125
 
 
 @pytest.mark.parametrize("names", SIMILAR_NAMES)
 def test_a_lost_sensor_takes_no_wheels_from_a_sensor_with_a_similar_name(names, tmp_path, repository, monkeypatch):
     intact, lost = names
-    rows = rows_of(tmp_path, repository, monkeypatch, names, lambda signals: lose(signals[lost]))
+    rows = rows_of(tmp_path, repository, monkeypatch, names, lambda signals: lose_signal(signals[lost]))
     n_wheels = {fit["channel"]: fit["n_wheels"] for fit in rows["passage_fits"]}
     assert n_wheels[intact] == len(IC3) and 2 <= n_wheels[lost] < len(IC3)
     assert [(q["reason_code"], q["place"]) for q in rows["quarantine"]] == [("sensor_lost", f"record 1, {lost}")]
@@ -76,7 +76,7 @@ def test_a_clipped_sensor_is_not_fitted_if_one_with_a_similar_name_is_lost(names
 
     def clip_and_lose(signals):
         np.clip(signals[clipped], -1.0, 1.0, out=signals[clipped])
-        lose(signals[lost])
+        lose_signal(signals[lost])
 
     rows = rows_of(tmp_path, repository, monkeypatch, names, clip_and_lose)
     fits = {fit["channel"]: (fit["status"], fit["n_wheels"]) for fit in rows["passage_fits"]}
@@ -102,7 +102,7 @@ def test_every_finding_about_a_channel_names_one_of_the_recording(settings):
     samples = recording.samples.copy()
     np.clip(samples[1], -1.0, 1.0, out=samples[1])
     samples[2] = 0.0
-    lose(samples[3], 1.9)
+    lose_signal(samples[3], 1.9)
     samples[4, 777] = np.nan
     passage = analyse(replace(recording, samples=samples), sensors_for(recording), PATTERNS, settings)
     findings = {f.channel: (f.reason, f.time) for f in passage.findings if f.reason in CHANNEL_REASONS}

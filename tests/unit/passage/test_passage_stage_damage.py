@@ -55,7 +55,7 @@ def rows_of(raw, *recordings, sections=("A7", "SP")):
     return passage_unit(scan(turnout, raw).units[0], turnout, raw, PassageContext(models, PATTERNS))
 
 
-def same(found, expected, but=()):
+def assert_same_rows(found, expected, but=()):
     """Rows agree: numbers to 1e-6, the rest exactly."""
     assert len(found) == len(expected)
     for one, other in zip(found, expected):
@@ -77,7 +77,7 @@ def test_a_file_whose_time_contradicts_its_name_is_rejected(late, used, tmp_path
 
 
 @pytest.mark.parametrize("channels", [["A7"], list(PLACES)])
-def test_a_zero_offset_changes_nothing(channels, tmp_path):
+def test_a_zero_offset_does_not_change_the_rows(channels, tmp_path):
     """9.81 m/s² is what a sensor that also measures the standing weight leaves on a channel."""
     sound = on_main()
     offset = np.array([9.81 if name in channels else 0.0 for name in PLACES])[:, None]
@@ -86,7 +86,7 @@ def test_a_zero_offset_changes_nothing(channels, tmp_path):
     assert [p["status"] for p in expected["passages"]] == ["accepted"]
     assert {f["status"] for f in with_model(expected)} == {"accepted"}
     for table in ("passages", "passage_fits"):
-        same(found[table], expected[table])
+        assert_same_rows(found[table], expected[table])
     assert found["quarantine"] == []
 
 

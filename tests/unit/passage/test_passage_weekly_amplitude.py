@@ -38,7 +38,7 @@ def passing_train(rng, week):
 
 
 @pytest.fixture(scope="module")
-def charted(tmp_path_factory, repository):
+def chart_rows(tmp_path_factory, repository):
     """The rows of the weekly charts of a registry that was computed from raw files of several weeks."""
     root, rng = tmp_path_factory.mktemp("weeks"), np.random.default_rng(61)
     raw, folder = root / "raw", root / "raw" / "tommerup_s1" / "passages"
@@ -67,15 +67,15 @@ def charted(tmp_path_factory, repository):
         return connection.execute(question).fetchall()
 
 
-def test_there_is_a_value_per_section_and_week_with_five_trains(charted):
+def test_there_is_a_value_per_section_and_week_with_five_trains(chart_rows):
     weeks = [FIRST.replace(hour=0) + timedelta(days=7 * k) for k in range(4)]
-    assert [(s, m) for s, m, *_ in charted] == [(f"tommerup_s1/{n}", w) for n in sorted(HEARD) for w in weeks]
+    assert [(s, m) for s, m, *_ in chart_rows] == [(f"tommerup_s1/{n}", w) for n in sorted(HEARD) for w in weeks]
 
 
-def test_charts_show_by_how_much_the_amplitude_of_two_sensors_rose_and_others_stay(charted):
+def test_charts_show_by_how_much_the_amplitude_of_two_sensors_rose_and_others_stay(chart_rows):
     for name in HEARD:
         truth = LOUDER if name in LOUD else 1.0
-        rows = [(np.log(value), se / value) for section, _, value, se in charted if section.endswith(name)]
+        rows = [(np.log(value), se / value) for section, _, value, se in chart_rows if section.endswith(name)]
         (before, error_before), (after, error_after) = (
             (np.mean([v for v, _ in part]), np.hypot(*(e for _, e in part)) / 2) for part in (rows[:2], rows[2:])
         )

@@ -1,4 +1,4 @@
-"""Each term against a closed form or a published number of its own."""
+"""Each term against a closed form or a published number."""
 
 from dataclasses import replace
 from types import SimpleNamespace

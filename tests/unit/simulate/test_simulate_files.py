@@ -17,7 +17,7 @@ LEVEL = '  level: {value: 3, unit: dB, source: "estimate: a main line some years
 STRETCH = "stretches:\n  - {from: {value: %s, unit: m, source: x}, to: {value: %s, unit: m, source: x}, rail: *rail}\n"
 
 
-def rejected(load, path, text, said):
+def check_rejection(load, path, text, said):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=said) as caught:
         load(str(path))
@@ -60,7 +60,7 @@ def rejected(load, path, text, said):
 )  # fmt: skip
 def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, new, said):
     assert old in TRACK
-    rejected(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
+    check_rejection(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, n
 )
 def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, said):
     assert old in VEHICLE
-    rejected(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
+    check_rejection(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, said):
 def test_an_error_of_a_track_file_names_its_line(tmp_path, old, new, line):
     text = TRACK.replace(old, new, 1)
     number = 1 + next(k for k, said in enumerate(text.split("\n")) if said.startswith(line))
-    rejected(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
+    check_rejection(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
 
 
 def test_an_error_in_an_extended_track_file_states_the_line_of_that_file(tmp_path):
@@ -150,7 +150,7 @@ SMALL_VEHICLE = {
 }  # fmt: skip
 
 
-def spoilt(content):
+def wrong_contents(content):
     """``content`` with one entry after the other, at every depth, replaced by a wrong value."""
 
     def places(inside, way=()):
@@ -179,7 +179,7 @@ def test_any_content_of_a_file_is_loaded_or_rejected_with_a_message(tmp_path, mo
     # the true reader takes twenty times as long
     monkeypatch.setattr("turnout.config.parameter_files.read_content", lambda path: (deepcopy(parsed[-1]), None))
     load(str(path))
-    for way, wrong, other in spoilt(content):
+    for way, wrong, other in wrong_contents(content):
         parsed.append(other)
         try:
             load(str(path))

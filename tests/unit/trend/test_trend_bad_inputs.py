@@ -35,7 +35,7 @@ def plain(rows):
     return rows.astype({"turnout_id": object, "section_id": object, "band": object, "source": object})
 
 
-def test_an_event_before_the_first_campaign_changes_nothing(settings):
+def test_an_event_before_the_first_campaign_does_not_change_the_chart(settings):
     rows = modes(FLEET, 1)
     without, a = status_of(rows, settings)
     early, b = status_of(rows, settings, events([None, "2015-06-01", "tamping"]))
@@ -240,7 +240,7 @@ def test_with_the_spread_of_the_paper_a_chart_of_the_ballast_is_too_noisy(settin
     assert (blind.drop("T00000/CP A8")["detectable_pct"] > 1.5).all()
 
 
-def dated(rows, days):
+def with_dates(rows, days):
     """The campaigns of some weeks with other dates, {week: day}, like typing errors."""
     week = ((rows["measured_at_utc"] - rows["measured_at_utc"].min()).dt.days + 1) // 7
     return rows.assign(measured_at_utc=week.map(pd.to_datetime(pd.Series(days))).fillna(rows["measured_at_utc"]))
@@ -249,7 +249,7 @@ def dated(rows, days):
 def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(settings):
     """2000 for 2016: formerly a baseline was then complete after twelve weeks, without a summer."""
     rows = modes(FLEET, 1)
-    far = dated(rows, {5: "2000-02-08 10:00"})
+    far = with_dates(rows, {5: "2000-02-08 10:00"})
     status, charts = status_of(far, settings)
     without, other = status_of(far[far["measured_at_utc"] > pd.Timestamp("2001-01-01")], settings)
     pd.testing.assert_frame_equal(status, without)
@@ -262,7 +262,7 @@ def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(sett
     "days", [{5: "2013-02-08"}, {5: "2000-02-08", 6: "2000-03-08"}], ids=["3 years before", "two of 2000"]
 )
 def test_an_acceptance_test_some_years_before_counts_and_so_do_two_old_campaigns(settings, days):
-    rows = dated(modes(FLEET, 1), days)
+    rows = with_dates(modes(FLEET, 1), days)
     assert (rows["measured_at_utc"] < "2014-01-01").sum() == 8 * len(days)
     shown = chart_rows(status_of(rows, settings)[1])
     assert not (shown["state"] == "wrong_time").any()
@@ -286,7 +286,7 @@ def test_a_section_measured_alone_after_maintenance_is_later_compared_with_the_o
     assert tuple(changed[["state", "direction"]]) == ("alarm", "down")
     assert changed["change_low_pct"] < -6.0 < changed["change_high_pct"]
     before, after = baseline_rows(charts, settings).query("section_id == 'T00000/S2'")["sd_pct"]
-    # 0.6 % of its own and a median of seven, 0.6 sqrt(1 + 1.57 / 7) = 0.66; alone the campaigns' 0.6 % as well: 0.85
+    # its error of 0.6 % and a median of seven, 0.6 sqrt(1 + 1.57 / 7) = 0.66; alone the campaigns' 0.6 % as well: 0.85
     assert before < 0.75 < after
 
 

@@ -58,7 +58,7 @@ def test_the_nightly_update_charts_the_damping_and_lists_its_alarm(tmp_path, set
 @pytest.mark.parametrize(
     ("damping", "step_down", "first"), [(-45.0, -6.0, "railpad"), (-70.0, -3.0, "railpad_damping")]
 )
-def test_alarms_are_sorted_by_change_over_target_whatever_the_quantity(tmp_path, settings, damping, step_down, first):
+def test_alarms_of_all_quantities_are_sorted_by_change_over_target(tmp_path, settings, damping, step_down, first):
     rows = damped(percent=damping)
     is_late = rows["measured_at_utc"] > rows["measured_at_utc"].min() + timedelta(weeks=80)
     fallen = (rows["section_id"] == "T00000/S2") & is_late

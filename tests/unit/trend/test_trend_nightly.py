@@ -51,7 +51,7 @@ def test_every_mode_has_its_row_and_every_chart_its_state(registry, rows):
         assert con.execute("select count(*) from chart_states").fetchall() == [(27,)]
 
 
-def test_a_second_update_of_the_same_data_commits_nothing(registry, settings):
+def test_a_second_update_of_the_same_data_writes_no_files(registry, settings):
     root, done = registry
     before = load(root)
     again = update(root, settings, done.digests)

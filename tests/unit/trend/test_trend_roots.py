@@ -24,11 +24,11 @@ def test_roots_and_evaluations_are_those_of_scipy(name, tolerance):
     function, low, high = FUNCTIONS[name]
     evaluated = []
 
-    def noted(x):
+    def recorded_function(x):
         evaluated.append(x)
         return function(x)
 
-    root = find_root(noted, low, high, tolerance)
+    root = find_root(recorded_function, low, high, tolerance)
     expected, report = brentq(function, low, high, xtol=tolerance, rtol=2.0**-50, maxiter=200, full_output=True)
     assert root == expected and len(evaluated) == report.function_calls
 

@@ -122,7 +122,7 @@ def test_the_advice_for_each_component_follows_its_own_sign(settings):
 
 
 def test_both_rows_of_a_section_state_the_same_change_of_stiffness(settings):
-    """The railpad resonance moves by 0.6 %, too little for an onset of its own; half of the stiffness is truly lost."""
+    """The railpad resonance moves by 0.6 %, too little for a separate onset; the true loss is half of the stiffness."""
     with evaluated_views(both_bands(1.0, 0.5, 7, turnouts=2), settings) as con:
         sizes = con.execute(
             "select ballast_stiffness_low_pct, ballast_stiffness_high_pct, band from chart_states "

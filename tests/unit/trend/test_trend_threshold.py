@@ -47,7 +47,7 @@ def test_delay_of_a_shift_is_the_published_one():
     ("threshold", "allowance", "campaigns", "known"),
     [(3.5, 1.0, 26, 1.18), (6.77, 0.5, 26, 0.92), (3.5, 1.0, 52, 0.95), (6.77, 0.5, 52, 0.70)],
 )
-def test_detectable_shift_of_a_known_baseline_is_what_a_simulation_found(threshold, allowance, campaigns, known):
+def test_the_detectable_shift_of_a_known_baseline_is_that_of_a_simulation(threshold, allowance, campaigns, known):
     # Simulated elsewhere with known baselines and without the rule of outliers, two decimals. Here 2000 charts: the
     # probability has a standard error of 0.007, the shift of 0.01.
     shift = detectable_shift(threshold, allowance, campaigns, 1500, single_share=100.0, outlier_limit=1e3)
