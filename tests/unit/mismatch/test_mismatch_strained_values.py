@@ -61,7 +61,7 @@ def test_a_value_with_a_prior_cost_above_the_threshold_of_a_name_is_strained(sds
 
 
 @pytest.mark.parametrize("sds", [0.0, 3.0, -4.8])
-def test_a_value_within_its_tolerance_is_not_strained(sds):
+def test_a_value_with_a_prior_cost_below_the_threshold_is_not_strained(sds):
     """4.8 standard deviations cost 11.5 nats: less than a name."""
     assert strained_value_of(Beam(sds * TOLERANCE)) is None
 
