@@ -9,7 +9,7 @@ TURNOUT_LEFT_OUT_QUESTIONS chooses questions ("change,visit"), TURNOUT_LEFT_OUT_
 TURNOUT_LEFT_OUT_SITES sets the sites of each effect (2), TURNOUT_LEFT_OUT_FIRST the number of the first one (0).
 TURNOUT_LEFT_OUT_PRESENT=1 diagnoses each site with the whole library too. TURNOUT_LEFT_OUT_STORE is a folder of
 answers: those in it are not computed again, whichever version of the tool gave them. TURNOUT_LEFT_OUT_PAGE is a page
-whose blocks "leave_one_out" and "leave_one_out_visit" are replaced by the results, such as docs/mismatch.md.
+whose blocks "leave_one_out" and "leave_one_out_visit" are replaced by the results, such as docs/left_out_effects.md.
 """
 
 import json

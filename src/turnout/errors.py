@@ -144,6 +144,37 @@ def is_infrastructure(error: BaseException) -> bool:
     return isinstance(error, MemoryError)
 
 
+def remedy_of_access(error: OSError, otherwise: str) -> str:
+    """What to do about a file or folder that cannot be opened; ``otherwise`` if the name itself is the cause.
+
+    A sound file is never to be removed: without permission, or on a disk that fails, it only cannot be opened.
+
+    Parameters
+    ----------
+    error : OSError
+        The exception of the attempt.
+    otherwise : str
+        Remedy where the name stands for no file: a sentence without its full stop.
+
+    Returns
+    -------
+    str
+        A sentence without its full stop.
+
+    Examples
+    --------
+    >>> remedy_of_access(PermissionError(errno.EACCES, ""), "Remove it")
+    'Correct its permissions'
+    >>> remedy_of_access(OSError(errno.EIO, ""), "Remove it")
+    'Check the disk or the network that holds it'
+    >>> remedy_of_access(IsADirectoryError(errno.EISDIR, ""), "Remove it")
+    'Remove it'
+    """
+    if isinstance(error, PermissionError):
+        return "Correct its permissions"
+    return "Check the disk or the network that holds it" if is_infrastructure(error) else otherwise
+
+
 # Packages whose name for pip differs from the name that is imported.
 PIP_NAMES = {"nptdms": "npTDMS", "sklearn": "scikit-learn", "ruamel": "ruamel.yaml", "_soundfile_data": "soundfile"}
 

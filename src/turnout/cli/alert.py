@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     entries = worklist_entries(args.registry)
     if args.dry_run:
         add_result(args, entries)
-        print(message_text(entries) if entries else "No entry needs a person.")
+        print(message_text(entries) if entries else "No entry asks for an action.")
         return 0
     counts = send_alerts(entries, settings)
     if not counts:

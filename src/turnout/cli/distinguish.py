@@ -4,8 +4,9 @@ turnout distinguish --track tommerup --sensors 23.4 26.4 --impacts 24.6 --temper
 turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
 
 A figure is the evidence [nats] that is lost if the effect of the row is explained by that of the column, with the best
-size of the latter and all nuisance parameters free; "none" is the base model. Below 5 nats two effects cannot be
-distinguished. A name needs 12 in the column "none" and 6 against each rival.
+size of the latter and all nuisance parameters free. The columns have the numbers of the rows; "none" is the base model.
+Below 5 nats two effects cannot be distinguished. A name needs 12 in the column "none" and 6 against each other effect.
+Each effect has the size from which a diagnosis begins to fit it, in the middle of its possible positions.
 """
 
 import argparse
@@ -56,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from turnout.config.settings.mismatch import MismatchSettings
+    from turnout.mismatch.engine.thresholds import THRESHOLDS
     from turnout.stages.distinguish import planned_matrix
 
     matrix, advice = planned_matrix(
@@ -69,9 +72,15 @@ def run(args: argparse.Namespace) -> int:
         args.configuration,
     )
     print(matrix)
-    for name in matrix.names:
-        confused = matrix.confused_with(name)
-        if confused:
-            print(f"{name} cannot be distinguished from {', '.join(confused)}")
+    confused = {name: matrix.confused_with(name) for name in matrix.names}
+    unseen = [name for name, rivals in confused.items() if "none" in rivals]
+    if unseen:
+        print(f"cannot be seen (below {THRESHOLDS.min_evidence:g} nats in the column none): {', '.join(unseen)}")
+    for name, rivals in confused.items():
+        if rivals and name not in unseen:
+            print(f"{name} cannot be distinguished from {', '.join(rivals)}")
+    settings = MismatchSettings()
+    nameable = [n for n in matrix.names if matrix.can_be_named(n, settings.threshold, settings.margin)]
+    print(f"enough evidence for a name: {', '.join(nameable) or 'no effect'}")
     print(advice)
     return 0

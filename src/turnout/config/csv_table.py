@@ -9,6 +9,7 @@ from pathlib import Path
 
 from turnout.config.document import Place
 from turnout.config.schema import suggestion
+from turnout.errors import remedy_of_access
 from turnout.files import read_regular
 
 EXTRA_CELLS = "cells beyond the header"
@@ -181,7 +182,8 @@ def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
     except OSError as error:
         if isinstance(error, (FileNotFoundError, NotADirectoryError)) and not os.path.lexists(path):
             raise
-        raise TableError(Place(name, 1, 1), str(error.strerror), "Put a readable file there") from None
+        remedy = remedy_of_access(error, "Put a readable file there")
+        raise TableError(Place(name, 1, 1), str(error.strerror), remedy) from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

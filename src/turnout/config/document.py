@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from turnout.errors import ConfigError
+from turnout.errors import ConfigError, remedy_of_access
 
 if TYPE_CHECKING:  # imported late: a command that reads no YAML does not pay for it
     from ruamel.yaml.constructor import BaseConstructor
@@ -68,7 +68,8 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
         yield
     except OSError as error:
         problem = f"cannot be read: {error.strerror}"
-        raise ConfigError(path, where, problem, "Put a file of that name there, or remove it") from None
+        remedy = remedy_of_access(error, "Put a file of that name there, or remove it")
+        raise ConfigError(path, where, problem, remedy) from None
     except UnicodeDecodeError as error:
         before = error.object[: error.start]
         byte = Place(str(path), before.count(b"\n") + 1, error.start - before.rfind(b"\n"))

@@ -155,6 +155,8 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
     ('-1', 'Write a number above 0 Hz')
     >>> value_problem(Key("number", "position", unit="m", minimum=-10000, maximum=10000), 24600)
     ('24600', 'Write a number from -10000 to 10000 m (24600 mm are 24.6 m)')
+    >>> value_problem(Key("number", "position", unit="m"), "24,6")
+    ("'24,6'", 'Write a number in m, with a decimal point: 24.6')
     """
     if value is None and key.nullable:
         return None
@@ -164,7 +166,7 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         single = Key(**{**key.__dict__, "many": False})
         return next((p for v in value if (p := value_problem(single, v))), None)
     if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
-        return quotation(value), f"Write {_expected_text(key)}"
+        return quotation(value), f"Write {_expected_text(key)}{_hint_at_decimal_point(key, value)}"
     if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
         return quotation(value), f"Write {_expected_text(key)}"
     if isinstance(value, str) and CONTROL_CHARACTER.search(value):
@@ -181,6 +183,7 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
 
 
 CONTROL_CHARACTER = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # of no text; pages and tables cannot show it
+DECIMAL_COMMA = re.compile(r"[+-]?\d+,(?!\d{3}$)\d+")  # three digits may be a mark for thousands
 PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
 PREFIXES = (("m", 1e-3), ("k", 1e3))
 LARGEST_NUMBER = 1e300  # beyond it a whole number is no floating-point number
@@ -192,6 +195,12 @@ def _is_in_range(key: Key, value: float) -> bool:
     low = key.minimum is not None and value < key.minimum
     high = key.maximum is not None and value > key.maximum
     return not low and not high and (key.above is None or value > key.above)
+
+
+def _hint_at_decimal_point(key: Key, value: Any) -> str:
+    """A number with a decimal comma, as it has to be written."""
+    is_number = key.value_type == "number" and isinstance(value, str) and DECIMAL_COMMA.fullmatch(value.strip())
+    return f", with a decimal point: {value.strip().replace(',', '.')}" if is_number else ""
 
 
 def _hint_at_other_unit(key: Key, value: float) -> str:

@@ -89,7 +89,7 @@ def find_generation(registry_dir: PathLike | str, as_of: int | str | datetime) -
     if wanted not in generations:
         listed = ", ".join(f"{number} ({time:%Y-%m-%d %H:%M:%S})" for number, (_, time) in generations.items())
         raise RegistryError(
-            f"{root}: no generation of {as_of} is kept. Kept are, with the time of publication in UTC: "
+            f"{root}: no generation is kept for {as_of}. Kept are, with the time of publication in UTC: "
             f"{listed or now.number}. Give one of these numbers, or a later time."
         )
     return read_generation(generations[wanted][0]), generations[wanted][1]

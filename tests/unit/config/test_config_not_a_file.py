@@ -1,10 +1,13 @@
 """A name of the configuration that is a folder, or a link to nothing, is said: it is no file that is not there."""
 
+import errno
+import os
 import shutil
 
 import pytest
 
 from turnout.cli.main import main
+from turnout.config.document import as_config_errors
 from turnout.config.parameter_files import read_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError
@@ -50,6 +53,20 @@ def test_a_row_is_not_entered_elsewhere_and_one_sentence_says_why(config, capsys
     assert main(COMMANDS[name]) == 2
     assert f"config/{name}" in (said := capsys.readouterr().err) and KINDS[kind] in said
     assert not (config / "share").exists() and (config / name).is_symlink() == (kind == "link")
+
+
+@pytest.mark.parametrize(
+    ("code", "remedy"),
+    [
+        (errno.EACCES, "Correct its permissions"),
+        (errno.EIO, "Check the disk or the network that holds it"),
+        (errno.EISDIR, "Put a file of that name there, or remove it"),
+    ],
+)
+def test_nobody_is_asked_to_remove_a_file_that_only_cannot_be_opened(code, remedy):
+    with pytest.raises(ConfigError) as caught, as_config_errors("config/turnouts.tsv", "line 1", ""):
+        raise OSError(code, os.strerror(code))
+    assert str(caught.value) == f"config/turnouts.tsv, line 1: cannot be read: {os.strerror(code)}. {remedy}."
 
 
 def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeypatch):

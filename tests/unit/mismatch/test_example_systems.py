@@ -6,6 +6,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from benchmarks import other_systems
 from examples.own_system import LAWS, Mount, Pendulum, made_records, show, simulate
 
 from turnout.mismatch import diagnose
@@ -83,3 +84,23 @@ def test_both_programs_print_the_output_on_their_page(repository, capsys):
         else:
             runpy.run_path(str(repository / command), run_name="__main__")
         assert capsys.readouterr().out == shown
+
+
+@pytest.mark.slow
+def test_two_systems_of_another_program_have_the_answers_of_their_page(repository):
+    """docs/own_simulator.md: the amounts differ from those of the page by less than their half widths."""
+
+    def cells(lines):
+        rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)
+        return [(row[0], row[1], [float(x) for x in re.findall(r"[\d.]{5,}", row[2])], float(row[3])) for row in rows]
+
+    page = (repository / "docs" / "own_simulator.md").read_text(encoding="utf-8").splitlines()
+    computed = list(other_systems.table())
+    first = page.index(computed[0])
+    shown, found = cells(page[first + 2 : first + 6]), cells(computed[2:])
+    assert [row[:2] for row in shown] == [row[:2] for row in found]
+    for (*_, shown_amount, shown_true), (*_, found_amount, found_true) in zip(shown, found):
+        assert found_true == pytest.approx(shown_true, rel=1e-3)
+        assert len(shown_amount) == len(found_amount)
+        if shown_amount:
+            assert found_amount[0] == pytest.approx(shown_amount[0], abs=shown_amount[1])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.cli.main import main
-from turnout.mismatch.engine.distinguishability import distinguishability
+from turnout.mismatch.engine.distinguishability import Distinguishability, distinguishability
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 
 FAMILIES = ("pad_temperature", "zener_pad", "local_ballast", "local_pad", "mount_resonance")
@@ -30,6 +30,34 @@ def test_at_one_temperature_soft_pads_are_not_distinguished_from_warm_pads(one_w
 def test_no_effect_explains_the_data_of_an_effect_better_than_itself(one_warm_day):
     assert np.all(np.diag(one_warm_day.loss) == 0.0)
     assert np.all(one_warm_day.loss <= one_warm_day.detectability[:, None] + 1e-6 * one_warm_day.detectability.max())
+
+
+def test_a_name_needs_the_threshold_against_none_and_the_margin_against_each_other_effect():
+    loss = np.array([[0.0, 7.0, 30.0], [5.5, 0.0, 30.0], [3.0, 4.0, 0.0]])
+    matrix = Distinguishability(("a", "b", "c"), loss, np.array([30.0, 30.0, 4.0]))
+    assert [matrix.can_be_named(name, 12.0, 6.0) for name in "abc"] == [True, False, False]
+    assert [matrix.can_be_named(name, 12.0, 5.0) for name in "abc"] == [True, True, False]
+    assert not matrix.can_be_named("a", 40.0, 6.0)
+
+
+def test_the_command_states_once_what_cannot_be_seen(capsys, monkeypatch):
+    """Such an effect is not listed again beside every other one: it cannot be distinguished from any of them."""
+    from turnout.stages import distinguish
+
+    loss = np.array([[0.0, 2.0, 30.0], [3.0, 0.0, 4.0], [30.0, 28.0, 0.0]])
+    matrix = Distinguishability(("local_pad", "sensor_gain", "hum"), loss, np.array([13.0, 4.0, 31.0]))
+    monkeypatch.setattr(distinguish, "planned_matrix", lambda *_: (matrix, "No single addition."))
+    assert main(["distinguish", "--sensors", "23.4", "--impacts", "24.6"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "evidence [nats]     none        1        2        3",
+        " 1 local_pad          13        0        2       30",
+        " 2 sensor_gain         4        3        0        4",
+        " 3 hum                31       30       28        0",
+        "cannot be seen (below 5 nats in the column none): sensor_gain",
+        "local_pad cannot be distinguished from sensor_gain",
+        "enough evidence for a name: hum",
+        "No single addition.",
+    ]
 
 
 @pytest.mark.slow

@@ -102,7 +102,9 @@ def test_a_file_that_may_not_be_looked_at_is_a_problem(fleet):
 
     folder = RawFolder(fleet / "raw", "t1")
     assert folder.stat("hammer/A_1.uff", Closed()) is None
-    assert [(p.path, p.problem) for p in folder.problems] == [("t1/hammer/A_1.uff", "Permission denied")]
+    assert [(p.path, p.problem, p.remedy) for p in folder.problems] == [
+        ("t1/hammer/A_1.uff", "Permission denied", "Correct its permissions"),
+    ]  # fmt: skip
 
 
 def test_a_file_that_may_not_be_read_is_new_once_it_may(fleet, monkeypatch):

@@ -56,12 +56,33 @@ class Distinguishability:
             n for k, n in enumerate(self.names) if k != row and self.loss[row, k] < THRESHOLDS.min_evidence
         ]
 
+    def can_be_named(self, name: str, threshold: float, margin: float) -> bool:
+        """Whether an effect of this size is expected to have enough evidence for a name.
+
+        Parameters
+        ----------
+        name : str
+            The effect.
+        threshold : float
+            Evidence against the base model that a name needs. [nats]
+        margin : float
+            Evidence against each other effect that a name needs. [nats]
+
+        Returns
+        -------
+        bool
+        """
+        row = self.names.index(name)
+        leads = np.delete(self.loss[row], row)
+        return bool(self.detectability[row] >= threshold and np.all(leads >= margin))
+
     def __str__(self) -> str:
-        width = max(len(n) for n in self.names)
-        head = " " * width + "      none " + " ".join(f"{n[:9]:>9}" for n in self.names)
-        lines = [head]
-        for name, nats, row in zip(self.names, self.detectability, self.loss):
-            lines.append(f"{name:<{width}} {nats:>9.0f} " + " ".join(f"{min(v, 1e7):>9.0f}" for v in row))
+        title = "evidence [nats]"
+        width = max(len(title), *(len(n) + 3 for n in self.names))
+        lines = [f"{title:<{width}}     none " + " ".join(f"{k:>8}" for k in range(1, len(self.names) + 1))]
+        for k, (name, nats, row) in enumerate(zip(self.names, self.detectability, self.loss), 1):
+            label = f"{k:>2} {name}"
+            lines.append(f"{label:<{width}} {nats:>8.0f} " + " ".join(f"{min(v, 1e7):>8.0f}" for v in row))
         return "\n".join(lines)
 
 
