@@ -11,6 +11,7 @@ from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
 from turnout.config.events import parse_utc, time_problem
 from turnout.config.frozen_mapping import Frozen
+from turnout.config.schema import decimal_point_hint
 from turnout.config.turnout import Campaign, TurnoutConfig
 from turnout.errors import ReadError
 
@@ -19,6 +20,7 @@ COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip
 TRAIN_COLUMNS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 2000)}
 WHOLE_NUMBERS = ("n_axles",)
+UNITS = {"c": " °C", "kmh": " km/h", "t": " t"}  # by the end of the name of a column
 
 
 def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[ReadError]]:
@@ -212,7 +214,8 @@ def _in_range(text: str, column: str, low: float, high: float) -> float | None:
         value = math.nan
     is_whole = column in WHOLE_NUMBERS
     if not low <= value <= high or (is_whole and value % 1.0):
-        unit = " °C" if column.endswith("_c") else ""
-        remedy = f"Write a {'whole ' * is_whole}number from {low} to {high}{unit}, or nothing where it was not noted"
+        unit = UNITS.get(column.rpartition("_")[2], "")
+        expected = f"a {'whole ' * is_whole}number from {low} to {high}{unit}{decimal_point_hint(text)}"
+        remedy = f"Write {expected}, or nothing where it was not noted"
         raise _CellError(column, f"{column} is {text!r}", remedy)
     return value

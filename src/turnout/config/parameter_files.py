@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from turnout.config.document import Place, as_config_errors, compose, place_of_node
 from turnout.config.parameters import KEYS, Entries, Entry, Number, ParameterSet
-from turnout.config.schema import DECIMAL_POINT, suggestion
+from turnout.config.schema import DECIMAL_POINT, decimal_point_hint, suggestion
 from turnout.units import PARAMETER_UNITS
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def _finite(value: Any, place: Place) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise place.error(f"{value!r} is not a number", "Write a number") from None
+        raise place.error(f"{value!r} is not a number", f"Write a number{decimal_point_hint(str(value))}") from None
     if not isfinite(number):
         raise place.error(f"{value!r} is not finite", "Write a number")
     return number

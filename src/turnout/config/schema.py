@@ -166,7 +166,8 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         single = Key(**{**key.__dict__, "many": False})
         return next((p for v in value if (p := value_problem(single, v))), None)
     if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
-        return quotation(value), f"Write {_expected_text(key)}{_hint_at_decimal_point(key, value)}"
+        hint = decimal_point_hint(value) if key.value_type == "number" and isinstance(value, str) else ""
+        return quotation(value), f"Write {_expected_text(key)}{hint}"
     if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
         return quotation(value), f"Write {_expected_text(key)}"
     if isinstance(value, str) and CONTROL_CHARACTER.search(value):
@@ -197,10 +198,25 @@ def _is_in_range(key: Key, value: float) -> bool:
     return not low and not high and (key.above is None or value > key.above)
 
 
-def _hint_at_decimal_point(key: Key, value: Any) -> str:
-    """A number with a decimal comma, as it has to be written."""
-    is_number = key.value_type == "number" and isinstance(value, str) and DECIMAL_COMMA.fullmatch(value.strip())
-    return f", with a decimal point: {value.strip().replace(',', '.')}" if is_number else ""
+def decimal_point_hint(text: str) -> str:
+    """How a number with a decimal comma has to be written.
+
+    Parameters
+    ----------
+    text : str
+        What was written in place of a number.
+
+    Returns
+    -------
+    str
+        The end of a remedy; "" for other texts.
+
+    Examples
+    --------
+    >>> decimal_point_hint("13,1"), decimal_point_hint("20,000"), decimal_point_hint("fast")
+    (', with a decimal point: 13.1', '', '')
+    """
+    return f", with a decimal point: {text.strip().replace(',', '.')}" if DECIMAL_COMMA.fullmatch(text.strip()) else ""
 
 
 def _hint_at_other_unit(key: Key, value: float) -> str:

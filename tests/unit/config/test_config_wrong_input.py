@@ -474,6 +474,7 @@ def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):
     ("row", "column", "found"),
     [
         ("2025-01-10,2025-01-10T10:00,warm", 29, "rail_temperature_c is 'warm'. Write a number from -50 to 80 °C"),
+        ('2025-01-10,2025-01-10T10:00,"3,5"', 29, "Write a number from -50 to 80 °C, with a decimal point: 3.5, or"),
         ("2025-01-10,2025-01-10T10:00,nan", 29, "rail_temperature_c is 'nan'"),
         ("10.1.2025,2025-01-10T10:00,3", 1, "campaign is '10.1.2025'. Write its day as YYYY-MM-DD"),
         ("2025-01-10,ten,3", 12, "started_at_utc is 'ten'. Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"),

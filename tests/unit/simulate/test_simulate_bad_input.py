@@ -138,6 +138,7 @@ def test_errors_about_other_bad_input_state_what_is_wrong(build, said):
         ("mass: {value: 3, unit: kg}", "a number without source"),
         ("mass: {value: 3, unit: stone, source: x}", "unknown unit 'stone'"),
         ("mass: {value: three, unit: kg, source: x}", "'three' is not a number"),
+        ('mass: {value: "3,5", unit: kg, source: x}', "Write a number, with a decimal point: 3.5."),
         ("mass: {value: 3, unit: kg, source: estimate}", "an estimate without a prior"),
         ("mass: {value: 3, unit: kg, source: x, sauce: y}", "unknown key 'sauce'"),
         ("name: [1, 2", "line"),
