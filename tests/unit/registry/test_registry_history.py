@@ -107,7 +107,7 @@ def test_an_earlier_generation_answers_by_number_and_by_time(merged):
         assert connection.execute("select generation, n_files from registry_info").fetchall()[0][0] == 2
         assert connection.execute("select published_at()::varchar").fetchall() == [("2026-11-24 00:00:00",)]
     kept = r"Kept are.*1 \(2026-11-24 07:00:00\)"
-    wrong = {9: "no generation of 9 is kept", "2026-11-24T06:59": kept, "yesterday": "no time and no number"}
+    wrong = {9: "no generation is kept for 9", "2026-11-24T06:59": kept, "yesterday": "no time and no number"}
     for as_of, words in wrong.items():
         with pytest.raises(RegistryError, match=words):
             open_registry(merged.registry, as_of=as_of)
@@ -159,5 +159,5 @@ def test_a_generation_that_is_not_published_yet_is_not_listed(merged):
     path = merged.registry / HISTORY_FOLDER / "000005-20260101T000000000000Z.json"
     path.write_bytes((merged.registry / "_generation.json").read_bytes())
     assert max(history(merged.registry)) == 4 == load(merged.registry).number
-    with pytest.raises(RegistryError, match="no generation of 5 is kept"):
+    with pytest.raises(RegistryError, match="no generation is kept for 5"):
         open_registry(merged.registry, as_of=5)
