@@ -140,7 +140,7 @@ def damage_and_kills(folder):
     lost = len(files) - len(toy.rows(fleet)["recordings"]) - sum(not damage_types[k][2] for k in broken.values())
     yield Bar("undamaged recordings that are not in the registry", abs(lost), 0, "files", "<=", n)
 
-    toy.forget(fleet)
+    toy.remove_outputs(fleet)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 10}\n")
     moments, n_dead = random.Random(20171001), 0
     for _ in range(N_KILL):
@@ -185,7 +185,7 @@ def same_rows(folder):
     (fleet / "config/config.yaml").write_text("")
     registries = {}
     for shards, cores in ((1, 1), (1, 2), (7, 2), (64, 2)):
-        toy.forget(fleet)
+        toy.remove_outputs(fleet)
         toy.run(fleet, shards=shards, cores=cores)
         registries[shards, cores] = tuple(toy.data_files(fleet))
     n = "shards x cores " + ", ".join(f"{s}x{c}" for s, c in registries)

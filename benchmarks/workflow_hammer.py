@@ -22,7 +22,7 @@ def hammer_same_rows(folder, toy):
     n_file = make_fleet(folder)
     registries, cpu_texts = {}, []
     for shards, cores in COMBINATIONS:
-        toy.forget(folder)
+        toy.remove_outputs(folder)
         with stopwatch() as watch:
             toy.run(folder, shards=shards, cores=cores, function="")
         registries[shards, cores] = tuple(toy.data_files(folder))

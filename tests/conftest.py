@@ -1,4 +1,4 @@
-"""Shared by all tests: one BLAS thread, byte code kept, and the folder of other people's recordings if it exists."""
+"""Settings and fixtures of all tests: one BLAS thread, stored byte code, folders of external recordings if present."""
 
 import gc
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
-# numba colours the message of every rejected overload, also of those that nobody reads.
+# numba colours the message of every rejected overload, also of those that are never printed.
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 # As in an installation: otherwise every process that a test starts compiles the package again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -35,20 +35,20 @@ def is_compiled(function: object) -> bool:
 
 
 def pytest_collection(session: pytest.Session) -> None:
-    """No search for unused objects while modules are imported: nearly all of them stay, and each search costs more."""
+    """Switch garbage collection off while modules are imported: nearly all objects stay, and a search costs time."""
     gc.disable()
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Later searches leave out what has been imported; no test may simulate on import (``kernels_of_collection``)."""
+    """Exclude the imported objects from later searches; no test may simulate on import (``kernels_of_collection``)."""
     gc.freeze()
     gc.enable()
     session.config.stash[KERNELS] = used_kernels()
 
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-# In this order two processes compile each kernel once: while one of them is busy with the two files that need none, the
-# other compiles those of the simulation and of the fit of modes (22 CPU s each), then those of the code of the proof.
+# In this order two processes compile each kernel only once. One process runs the two files that need no kernel. The
+# other compiles the kernels of the simulation and of the fit of modes (22 CPU s each), then those of the blind proof.
 FIRST_FILES = (
     "workflow/test_workflow_seeded_faults.py",
     "convergence/test_simulate_march.py",
@@ -59,7 +59,7 @@ FIRST_FILES = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with slow tests first, so that no process is left alone with one at the end (``make test``)."""
+    """Run files with slow tests first, so that no process runs one alone at the end (``make test``)."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     rank = {REPOSITORY / "tests" / name: k for k, name in enumerate(FIRST_FILES)}
     items.sort(key=lambda item: (rank.get(item.path, len(rank)), item.path not in slow))
@@ -73,16 +73,16 @@ def repository() -> Path:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Recordings and curves made by others, beside the checkout; the test is skipped where they are absent."""
+    """Recordings and curves made by others, beside the checkout; the test is skipped if they are absent."""
     folder = REPOSITORY.parent / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip(f"no recordings of others: {folder} does not exist")
+        pytest.skip(f"no external recordings: {folder} does not exist")
     return folder
 
 
 @pytest.fixture(scope="session")
 def shared_recordings() -> Path:
-    """Programs that write recordings as loggers do, beside the checkout; the test is skipped where they are absent."""
+    """Programs that write recordings as data loggers do, beside the checkout; the test is skipped without them."""
     folder = REPOSITORY.parent / "shared" / "inputs" / "recordings"
     if not folder.is_dir():
         pytest.skip(f"no recordings of loggers: {folder} does not exist")
@@ -97,5 +97,5 @@ def kernels_of_collection(request: pytest.FixtureRequest) -> list[str]:
 
 @pytest.fixture(scope="session", name="used_kernels")
 def used_kernels_now() -> Callable[[], list[str]]:
-    """Function that lists the compiled functions that were called so far."""
+    """Function that lists the compiled functions that have been called so far."""
     return used_kernels

@@ -1,4 +1,4 @@
-"""The syntax trees are a module of its own."""
+"""The folder of the tests is on the path, so that they can import the module ``syntax_trees``."""
 
 import sys
 from pathlib import Path

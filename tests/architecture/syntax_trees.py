@@ -1,4 +1,4 @@
-"""Syntax trees of source files. Many tests walk through all of them, so each file is parsed once per process."""
+"""Syntax trees of source files. Many tests use all of them, so each file is parsed once per process."""
 
 import ast
 from functools import cache

@@ -1,4 +1,4 @@
-"""What ``python -m benchmarks`` prints is judged and understood without further documents."""
+"""The output of ``python -m benchmarks`` states its results and can be understood without other documents."""
 
 import ast
 import re
@@ -11,18 +11,18 @@ from benchmarks.bar import Bar, heading
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 CODE = re.compile(
     r"^\s*[A-Z]\d{1,2}\b|\b(bars?|and) [A-Z]\d{1,2}\b"
-)  # a number of a bar, as in a list that is elsewhere
+)  # a code of a bar, which refers to a list elsewhere
 
 
 @pytest.mark.parametrize(("figure", "is_met"), [(0.9, True), (1.1, False), (float("nan"), None)])
 @pytest.mark.parametrize("type_", [float, np.float64, np.float32])
-def test_a_bar_is_missed_or_open_whatever_the_type_of_its_figure(figure, is_met, type_):
+def test_a_bar_is_met_missed_or_open_for_every_type_of_number(figure, is_met, type_):
     bar = Bar("figure", type_(figure), 1.0)
     assert bar.is_met is is_met and bar.is_unmeasured is (is_met is None)
     assert {True: " met", False: " MISSED", None: " open"}[is_met] in str(bar)
 
 
-def test_figures_stand_below_the_names_of_their_columns():
+def test_values_are_aligned_with_the_headings_of_their_columns():
     line = str(Bar("figure", 0.9, 1.0, "Hz", n="n=5"))
     for name, value in (("measured", "0.9"), ("bar", "<= 1")):
         end = re.search(rf"(?<= ){name} ", heading()).end()
@@ -31,7 +31,7 @@ def test_figures_stand_below_the_names_of_their_columns():
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
-def test_names_of_bars_and_docstrings_are_words(path):
+def test_names_of_bars_and_docstrings_contain_no_codes(path):
     tree = ast.parse(path.read_text())
     calls = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "Bar" and n.args)
     names = [ast.unparse(call.args[0]).removeprefix("f").strip("'\"") for call in calls]
@@ -41,5 +41,5 @@ def test_names_of_bars_and_docstrings_are_words(path):
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("bench_*.py")), ids=lambda path: path.name)
-def test_every_benchmark_says_first_what_it_measures(path):
+def test_every_benchmark_has_a_docstring_about_what_it_measures(path):
     assert len(ast.get_docstring(ast.parse(path.read_text())) or "") > 40

@@ -1,14 +1,12 @@
-"""Collecting the tests computes nothing: each process does it, and on a new checkout each would compile the kernels."""
+"""The collection of tests computes nothing, as each process repeats it and would compile the kernels."""
 
 import numpy as np
 
 from turnout.simulate.spline_kernel import second_differences
 
 
-def test_no_test_simulates_while_it_is_collected(kernels_of_collection):
-    assert not kernels_of_collection, (
-        "called on import by a module of tests: a fixture or a cached function calls later"
-    )
+def test_no_test_module_simulates_on_import(kernels_of_collection):
+    assert not kernels_of_collection, "a test module called it on import: call it in a fixture or a cached function"
 
 
 def test_a_called_kernel_is_listed(used_kernels):

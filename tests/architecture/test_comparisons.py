@@ -1,4 +1,4 @@
-"""Numbers are compared with tolerances that are said: receptances are a billionth of a metre per newton."""
+"""Comparisons of numbers state their tolerances, as receptances are of the order of 1e-9 m/N."""
 
 import ast
 from pathlib import Path
@@ -14,13 +14,13 @@ def calls(path):
                 yield node.lineno, {k.arg for k in node.keywords}
 
 
-def test_no_test_leaves_the_absolute_tolerance_to_numpy():
-    """Its default of 1e-8 lets any two receptances of a track pass for equal."""
+def test_every_comparison_by_numpy_states_its_absolute_tolerance():
+    """With the default of 1e-8 any two receptances of a track are equal."""
     tests = Path(__file__).parents[1]
-    silent = [
+    without_tolerance = [
         f"{path.relative_to(tests)}:{line}"
         for path in sorted(tests.rglob("*.py"))
-        for line, said in calls(path)
-        if "atol" not in said
+        for line, keywords in calls(path)
+        if "atol" not in keywords
     ]
-    assert not silent
+    assert not without_tolerance

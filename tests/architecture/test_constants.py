@@ -1,4 +1,4 @@
-"""Physical and statistical constants stand in one module, and units in one table."""
+"""Physical and statistical constants are in one module, and units in one table."""
 
 import ast
 
@@ -7,7 +7,7 @@ from syntax_trees import tree_of
 from turnout import constants
 from turnout.units import PARAMETER_UNITS, UNITS
 
-# The factor 3.6 of km/h is left out: sleepers lie 0.6 m apart, and positions of 3.6 m are common.
+# The factor 3.6 of km/h is left out: sleepers are 0.6 m apart, and positions of 3.6 m are common.
 SHARED = {value for name, value in vars(constants).items() if name.isupper() and name != "KMH"} | {9.81e3}
 
 
@@ -33,7 +33,7 @@ def test_a_repeated_constant_is_found():
     assert list(repeated(ast.parse("weight = 9.81 * mass\nhalf = 1.96 * se"))) == [(1, 9.81), (2, 1.96)]
 
 
-def test_parameter_files_and_raw_files_agree_on_every_unit_that_both_know():
+def test_parameter_files_and_raw_files_agree_on_every_common_unit():
     raw = {name: scale for units in UNITS.values() for name, (scale, offset) in units.items() if not offset}
     common = raw.keys() & PARAMETER_UNITS.keys()
     assert {"kN", "mm", "km/h", "%", "m/s²"} <= common

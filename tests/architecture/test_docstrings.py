@@ -1,4 +1,4 @@
-"""Public functions document their parameters, the shapes of arrays and what they raise."""
+"""Public functions document their parameters, the shapes of arrays and the exceptions that they raise."""
 
 import ast
 import builtins
@@ -11,7 +11,7 @@ HEADINGS = ("Parameters\n", "Attributes\n")
 
 
 def classes(repository):
-    """Name -> (names of its bases, its methods) of every class of the two packages; names are unique but for a few."""
+    """Name -> (names of its bases, its methods) of every class of the two packages; most names are unique."""
     table = {}
     for path in sorted((repository / "src").rglob("*.py")):
         for node in ast.walk(tree_of(path)):
@@ -68,8 +68,8 @@ def test_public_functions_document_their_parameters(repository):
     assert share >= MIN_SHARE, f"{share:.1%} of {len(functions)}; without:\n" + "\n".join(missing)
 
 
-def test_what_is_returned_is_not_said_twice(repository):
-    """A summary that says what is returned needs no second copy below "Returns"."""
+def test_the_returned_value_is_not_described_twice(repository):
+    """If the summary describes the returned value, the section "Returns" need not repeat it."""
     repeated = []
     for path in sorted((repository / "src").rglob("*.py")):
         for node in ast.walk(tree_of(path)):
@@ -84,12 +84,12 @@ def test_what_is_returned_is_not_said_twice(repository):
 
 
 def words(text):
-    """The words of a text in lower case, without blanks and signs between them."""
+    """The words of a text in lower case, without punctuation."""
     return re.findall(r"\w+", text.lower())
 
 
 def test_arrays_have_shapes(repository):
-    """An array without its shape leaves open which of its axes is which. ``(...)`` stands for any shape."""
+    """Without its shape it is unknown what the axes of an array are. ``(...)`` stands for any shape."""
     shapeless = []
     for place, function, _ in public_functions(repository):
         text = ast.get_docstring(function) or ""
@@ -118,12 +118,12 @@ def raised_names(function):
 
 
 def exception_bases(name):
-    """A built-in exception with those that it is a special case of; any other name alone."""
+    """A built-in exception with its base classes; any other name alone."""
     bases = getattr(builtins, name).__mro__ if hasattr(builtins, name) else ()
     return {name} | {base.__name__ for base in bases} - {"Exception", "BaseException", "object"}
 
 
-def test_public_functions_name_what_they_raise(repository):
+def test_public_functions_document_the_exceptions_that_they_raise(repository):
     unnamed = [
         f"{place}: {name}"
         for place, function, _ in public_functions(repository)

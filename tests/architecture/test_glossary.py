@@ -1,4 +1,4 @@
-"""README, docs, pages and messages use the terms of the glossary, and none of the words that it replaces."""
+"""README, documents, pages and messages use the terms of the glossary and none of the words that it replaces."""
 
 import ast
 import re
@@ -6,7 +6,7 @@ import re
 import pytest
 from syntax_trees import tree_of
 
-# Words of the last column of docs/glossary.md with another meaning, in which they may be used.
+# Words of the last column of docs/glossary.md that may be used with another meaning.
 OTHER_MEANINGS = {
     "chain": "the Markov chain of a chart",
     "family": "a family of processors",
@@ -51,7 +51,7 @@ def messages(path):
 
 
 def texts(repository):
-    """(place, text) of README, docs, pages, views, settings and messages; decision pages may speak of former words."""
+    """(place, text) of README, documents, pages, views, settings and messages. Decision pages may use former words."""
     package, docs = repository / "src" / "turnout", repository / "docs"
     pages = (package / "report" / "templates").glob("*.html")
     registry = [package / "registry" / "columns.csv", *(package / "registry" / "views").glob("*.sql")]
@@ -76,11 +76,11 @@ def uses(words, places):
 def test_replaced_words_are_not_used(repository):
     words = set(replaced_words(repository)) - set(OTHER_MEANINGS)
     assert {"blow", "foretell", "whereabouts", "refused"} <= words
-    # Options and names of former versions work for one release and are written in code marks or as options.
+    # Options and names of former versions work for one release; they are in code marks or are options.
     places = [(p, re.sub(r"`[^`]*`|--\w+", "", text)) for p, text in texts(repository)]
     assert not (wrong := uses(words, places)), "\n".join(map(str, wrong))
 
 
 @pytest.mark.parametrize("text", ["A blow of 3 kN", "it Foretells more", "three blows"])
-def test_a_use_is_found(text):
+def test_the_use_of_a_replaced_word_is_found(text):
     assert uses(["blow", "foretell"], [("page", text)])

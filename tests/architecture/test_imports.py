@@ -1,4 +1,4 @@
-"""Which packages may import which: read from the syntax trees of all files."""
+"""The allowed imports between packages, checked with the syntax trees of all files."""
 
 import ast
 from functools import cache
@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from syntax_trees import tree_of
 
-LOWEST = {
+BASE = {
     "arrow_memory",
     "constants",
     "content",
@@ -25,7 +25,7 @@ LOWEST = {
     "threads",
     "units",
 }
-FLOOR = {"config", "readers", "signal", "registry", "fingerprint"}
+FOUNDATION = {"config", "readers", "signal", "registry", "fingerprint"}
 COMPILED = {"kernel_cache"}
 PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
@@ -44,21 +44,21 @@ ALLOWED = {
     "records": {"errors", "plots"},
     "threads": set(),
     "units": {"constants", "errors", "records"},
-    **{package: LOWEST for package in FLOOR},
+    **{package: BASE for package in FOUNDATION},
     "kernel_cache": {"fingerprint"},
-    **{package: LOWEST | FLOOR | COMPILED for package in PARTS},
-    "physics": LOWEST | FLOOR | PARTS,
-    "workflow": LOWEST | FLOOR,
-    "trend": LOWEST | FLOOR | PARTS | {"physics"},
-    "mismatch": LOWEST | FLOOR | COMPILED | PARTS | {"physics"},
-    "stages": LOWEST | FLOOR | PARTS | {"physics", "workflow", "trend", "mismatch"},
+    **{package: BASE | FOUNDATION | COMPILED for package in PARTS},
+    "physics": BASE | FOUNDATION | PARTS,
+    "workflow": BASE | FOUNDATION,
+    "trend": BASE | FOUNDATION | PARTS | {"physics"},
+    "mismatch": BASE | FOUNDATION | COMPILED | PARTS | {"physics"},
+    "stages": BASE | FOUNDATION | PARTS | {"physics", "workflow", "trend", "mismatch"},
 }
 ALLOWED["report"] = set(ALLOWED) | {"report"}
 ALLOWED["demo"] = set(ALLOWED) | {"demo"}
 ALLOWED["cli"] = set(ALLOWED) | {"cli"}
 ALLOWED["__main__"] = {"cli"}
 ALLOWED["api"] = set(ALLOWED) | {"api"}
-OPENS_FILES = LOWEST | {
+OPENS_FILES = BASE | {
     "former_names",
     "api",
     "config",
@@ -75,7 +75,7 @@ OPENS_FILES = LOWEST | {
 
 
 def running_nodes(tree):
-    """Every node below ``tree`` but the body of ``if TYPE_CHECKING:``, which never runs."""
+    """Every node below ``tree`` except the body of ``if TYPE_CHECKING:``, which never runs."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.If) and "TYPE_CHECKING" in (
             getattr(node.test, "id", None),
@@ -112,7 +112,7 @@ def sources(repository):
             yield parts[0], path
 
 
-def test_each_package_imports_only_what_it_may(repository):
+def test_each_package_imports_only_allowed_packages(repository):
     wrong = []
     for package, path in sources(repository):
         assert package in ALLOWED, f"{path}: no rule for {package!r}; give it a line in ALLOWED"
@@ -129,11 +129,10 @@ def test_imports_for_the_type_checker_are_not_counted(tmp_path):
     assert imports_of(path) == ["a", "c"]
 
 
-def circles(imports):
-    """Modules that import each other in a loop, one sorted list per loop.
+def import_cycles(imports):
+    """Modules that import each other, as one sorted list per cycle.
 
-    ``imports``: module -> the modules that it imports.
-    """
+    ``imports``: module -> the modules that it imports."""
     modules = sorted(imports)
     number = {module: k for k, module in enumerate(modules)}
     arrows = [(number[a], number[b]) for a in modules for b in imports[a] if b in number and b != a]
@@ -156,11 +155,11 @@ def test_no_modules_import_each_other(repository):
         name: [m for m in imports_of(path) if not any(n.startswith(f"{m}.") and n in names for n in imports_of(path))]
         for name, path in names.items()
     }
-    assert circles(imports) == []
+    assert import_cycles(imports) == []
 
 
-def test_circles_of_imports():
-    assert circles({"a": ["b"], "b": ["c"], "c": ["a", "d"], "d": ["e"], "e": []}) == [["a", "b", "c"]]
+def test_cycles_of_imports_are_found():
+    assert import_cycles({"a": ["b"], "b": ["c"], "c": ["a", "d"], "d": ["e"], "e": []}) == [["a", "b", "c"]]
 
 
 def test_nothing_in_the_library_imports_snakemake(repository):
@@ -181,7 +180,7 @@ def test_only_the_report_and_the_plots_import_a_plotting_library(repository):
 OPENING_CALLS = {"open", "read_text", "write_text", "read_bytes", "write_bytes"}
 
 
-def test_only_the_named_packages_open_files(repository):
+def test_only_the_listed_packages_open_files(repository):
     wrong = []
     for package, path in sources(repository):
         if package in OPENS_FILES:
@@ -195,7 +194,7 @@ def test_only_the_named_packages_open_files(repository):
 
 
 @pytest.mark.parametrize("folder", ["scripts"])
-def test_scripts_are_thin(repository, folder):
+def test_scripts_are_short(repository, folder):
     for path in sorted((repository / folder).glob("*.py")):
         lines = [line for line in path.read_text().splitlines() if line.strip()]
         assert len(lines) <= 25, f"{path} has {len(lines)} lines; a script loads, calls one function, saves"

@@ -1,4 +1,4 @@
-"""Names are words of the field: read from the syntax trees of every module of the two packages."""
+"""Names use terms of the field, checked with the syntax trees of every module of the two packages."""
 
 import ast
 import re
@@ -7,14 +7,14 @@ from functools import cache
 import pytest
 from syntax_trees import tree_of
 
-# Words that say nothing of what is in a variable. Stored names (assigned names and parameters) are counted.
+# Words that do not describe the content of a variable. Stored names (assigned names and parameters) are counted.
 EMPTY = frozenset(
     """asked begun best both done found given heard held kept kind known left made mine noted other others own part
     parts rest said seen shown stuff taken thing things told way ways""".split()
 )
 MAX_EMPTY_SHARE = 0.005  # of all stored names
 
-# Past participles that do not end in "ed", as they were once used for functions and modules.
+# Past participles that do not end in "ed"; former versions used them as names of functions and modules.
 IRREGULAR = frozenset(
     """begun bent borne bound broken brought built chosen cut drawn driven fallen felt found given gone heard held
     hidden hung kept known laid led left lost made meant met paid put read said seen sent set shown shut sought
@@ -63,7 +63,7 @@ DIALECT = {
     "witnesses": "sources",
 }
 
-# At most 20 names may break a rule, each with its reason.
+# At most 20 names may violate a rule, each with its reason.
 EXCEPTIONS: dict[str, str] = {
     "identify": "a section of config.yaml, and the module of its settings",
     "softest_blow": "a key of config.yaml",
@@ -88,7 +88,7 @@ def stored_names(tree):
 
 
 def is_property(node):
-    """Whether a method is read like a field, as ``impact.accepted``: then it is no verb and may be an adjective."""
+    """Whether a method is used like an attribute, as ``impact.accepted``: its name need not be a verb."""
     names = {getattr(d, "id", getattr(d, "attr", "")) for d in node.decorator_list}
     return bool(names & {"property", "cached_property"})
 
@@ -101,11 +101,10 @@ def functions(tree):
 
 
 def is_bare_participle(name):
-    """Whether a function is named by one past participle, which hides if it asks, changes or searches.
+    """Whether the name of a function is a single past participle, which hides whether it tests, changes or searches.
 
     >>> [is_bare_participle(name) for name in ("scored", "_heard", "with_errors", "speed", "score_candidates")]
-    [True, True, False, False, False]
-    """
+    [True, True, False, False, False]"""
     word = name.strip("_").lower()
     if "_" in word or word in NOT_PARTICIPLES:
         return False
@@ -121,7 +120,7 @@ def is_no_noun(module):
     return is_bare_participle(module) or module in NO_NOUNS
 
 
-def test_few_stored_names_say_nothing_of_their_content(repository):
+def test_few_stored_names_do_not_describe_their_content(repository):
     total, empty = 0, []
     for path, tree in modules(repository):
         for line, name in stored_names(tree):
@@ -131,7 +130,7 @@ def test_few_stored_names_say_nothing_of_their_content(repository):
     assert len(empty) < MAX_EMPTY_SHARE * total, f"{len(empty)} of {total} stored names:\n" + "\n".join(empty)
 
 
-def test_no_function_is_named_by_a_bare_participle(repository):
+def test_the_name_of_no_function_is_a_single_participle(repository):
     wrong = [
         f"src/{path}:{line} {name}"
         for path, tree in modules(repository)
@@ -141,8 +140,8 @@ def test_no_function_is_named_by_a_bare_participle(repository):
     assert not wrong, "\n".join(wrong)
 
 
-def test_every_module_is_named_by_a_noun(repository):
-    """Commands and the stages that they start are verbs of the command line and are not asked."""
+def test_the_name_of_every_module_is_a_noun(repository):
+    """Commands and the stages that they start are verbs of the command line, which are not tested."""
     wrong = [
         f"src/{path}"
         for path, _ in modules(repository)
@@ -163,7 +162,7 @@ def scripts(repository):
 
 @cache
 def names(repository):
-    """Name -> the first place where it stands, of all modules, variables, functions, classes and arguments."""
+    """Name -> its first place, of all modules, variables, functions, classes and arguments."""
     table = {}
     for path, tree in scripts(repository):
         table.setdefault(path.rsplit("/", 1)[-1].removesuffix(".py"), path)
@@ -185,12 +184,12 @@ def test_no_name_uses_a_word_of_the_dialect(repository, word):
     assert not wrong, "\n".join(sorted(wrong))
 
 
-def test_the_exceptions_are_few():
+def test_there_are_at_most_20_exceptions():
     assert len(EXCEPTIONS) <= 20
     assert all(EXCEPTIONS.values())
 
 
-def test_the_rules_find_what_they_forbid():
+def test_the_rules_find_forbidden_names():
     tree = ast.parse("def judged(found):\n    made = 1\n    return made")
     assert [name for _, name in stored_names(tree)] == ["found", "made"]
     assert [name for _, name in functions(tree) if is_bare_participle(name)] == ["judged"]

@@ -11,7 +11,7 @@ PAGES = [
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "docs" / "decisions").glob("*.md")),
 ]
-# A comment in front of a block says why it is not run, which test runs it, or of which file it is a part.
+# A comment before a block states why it is not run, which test runs it, or of which file it is a part.
 COMMENT = r"(?:<!-- (?P<key>not run|run by|file): (?P<value>[^\n]+) -->\n+)?"
 BLOCK = re.compile(rf"^{COMMENT}```(?P<language>[^\n]*)\n(?P<body>.*?)^```$", re.M | re.S)
 INDENTED = re.compile(r"(?:\A|\n)\n((?: {4}\S.*\n)+)")
@@ -22,7 +22,7 @@ EXPLANATION = re.compile(r"\s{3,}(?![-\s])|\s+[#>]")
 
 @dataclass(frozen=True)
 class Block:
-    """One fenced block; ``key`` and ``value`` are those of the comment in front of it."""
+    """One fenced block; ``key`` and ``value`` are those of the comment before it."""
 
     page: Path
     line: int
@@ -47,7 +47,7 @@ def blocks() -> list[Block]:
 
 
 def commands(block: Block) -> list[list[str]]:
-    """Words of each command of a block of the shell, without explanations, redirections and variables in front."""
+    """Words of each command of a shell block, without explanations, redirections and variables before it."""
     lines = block.body.replace("\\\n", " ").splitlines()
     if block.language == "console":
         lines = [line.removeprefix("$ ") for line in lines if line.startswith("$ ")]

@@ -1,4 +1,4 @@
-"""Tables, views, comments and pages say the same, because they all come from the same two lists."""
+"""Tables, views, comments and pages agree, as they are all generated from the same two lists."""
 
 import re
 
@@ -45,29 +45,29 @@ def reported(tmp_path_factory):
     return found, macros
 
 
-def test_tables_have_the_columns_of_the_list(reported):
+def test_tables_have_the_listed_columns(reported):
     for table, columns in tables().items():
         assert reported[0][table] == [(c.name, c.type) for c in columns]
 
 
 def test_every_view_is_documented_with_its_columns(reported):
-    made = {name: columns for name, columns in reported[0].items() if name not in tables()}
+    actual = {name: columns for name, columns in reported[0].items() if name not in tables()}
     listed = {call: [(r["column"], r["type"]) for r in rows] for call, (_, rows) in views().items() if "(" not in call}
-    assert made == listed
+    assert actual == listed
 
 
 def test_every_macro_is_documented_with_its_parameters(reported):
-    made = {(name, *parameters) for name, parameters in reported[1]}
+    actual = {(name, *parameters) for name, parameters in reported[1]}
     listed = set()
     for call in views():
         name, _, parameters = call.partition("(")
         if parameters:
             listed.add((name, *(p.split(":=")[0].strip() for p in parameters.rstrip(")").split(","))))
-    assert made == listed
+    assert actual == listed
 
 
 @pytest.mark.parametrize("call", sorted(views()))
-def test_every_view_says_what_a_row_is_and_every_column_what_it_means(call):
+def test_every_view_has_a_description_of_its_rows_and_columns(call):
     what, rows = views()[call]
     assert what.startswith("One row") and what.endswith(".")
     assert all(r["meaning"] for r in rows)
@@ -77,7 +77,7 @@ def test_every_view_says_what_a_row_is_and_every_column_what_it_means(call):
 def test_a_column_is_fully_described(column):
     assert column.meaning and column.type.removesuffix("[]") in ARROW_TYPES
     if column.type.removesuffix("[]") in ("double", "float"):
-        assert column.check, "a double without a two-sided check lets NaN in"
+        assert column.check, "a double without a two-sided check accepts NaN"
     if column.type == "double" and column.minimum is not None:
         assert column.minimum < column.maximum
     if column.allowed:
@@ -98,7 +98,7 @@ def test_every_table_has_a_key_and_a_total_order():
     assert all(time_column(t) for t in ("modes", "models", "passages", "passage_fits", "events", "campaigns"))
 
 
-def test_what_the_register_relies_on_is_there():
+def test_tables_have_the_columns_that_the_registration_needs():
     for table, id_column, _ in KINDS.values():
         names = {c.name for c in tables()[table]}
         assert {id_column, "result_id"} <= names
@@ -110,13 +110,15 @@ def test_what_the_register_relies_on_is_there():
 
 def test_views_use_no_clock_and_no_newer_syntax():
     for name, sql in view_files().items():
-        code = re.sub(r"'[^']*'", "''", re.sub(r"--.*", "", sql)).lower()  # words in texts are no clock
+        code = re.sub(
+            r"'[^']*'", "''", re.sub(r"--.*", "", sql)
+        ).lower()  # words in texts are not the functions of a clock
         assert not re.search(r"\b(now|current_date|current_timestamp|today|random|uuid)\b", code), name
         assert not re.search(r"(^|;)\s*(install|load|attach|copy|pragma)\b", code), name
         assert not re.search(r"\bif\s*\(", code), f"{name}: DuckDB 1.5 has no if(), write case when"
 
 
-def test_the_pages_are_those_that_the_lists_give(repository):
+def test_the_pages_are_up_to_date_with_the_lists(repository):
     page = (repository / "docs" / "registry.md").read_text(encoding="utf-8")
     parts = {"tables": documentation.table_tables(), "views": documentation.view_tables()}
     assert documentation.with_sections(page, parts) == page, "run: python -m turnout.registry.documentation docs"
@@ -125,7 +127,7 @@ def test_the_pages_are_those_that_the_lists_give(repository):
 
 
 def test_every_view_column_and_macro_of_the_catalogue_has_a_comment(tmp_path):
-    """As a tool for databases shows them; an empty registry has all views."""
+    """Database tools show the comments; an empty registry has all views."""
     from turnout.registry.database import open_registry
     from turnout.registry.job import register
 

@@ -1,10 +1,10 @@
-"""A figure of the demonstration that stands on two pages is the same on both."""
+"""Values of the demonstration that two pages contain are the same on both pages."""
 
 import re
 
 import pytest
 
-# (page, pattern of its figures, page that a run of the demonstration writes, pattern of the same figures there)
+# (page, pattern of its values, page that a run of the demonstration writes, pattern of the same values there)
 REPEATED = {
     "spread of a chart": (
         "measuring.md",
@@ -46,7 +46,7 @@ REPEATED = {
 
 
 @pytest.mark.parametrize("what", REPEATED)
-def test_a_repeated_figure_is_that_of_the_run(what, repository):
+def test_a_repeated_value_is_that_of_the_run(what, repository):
     page, pattern, origin, original = REPEATED[what]
     found = re.search(pattern, (repository / "docs" / page).read_text(encoding="utf-8"))
     expected = re.search(original, (repository / "docs" / origin).read_text(encoding="utf-8"))

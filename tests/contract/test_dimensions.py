@@ -1,7 +1,7 @@
-"""Results carry the units they claim: the same test in other units of length, time and force gives the same numbers.
+"""Results have the stated units: the same test in other units of length, time and force gives the same numbers.
 
-Every input is rescaled by powers of three numbers that have no common factor, and every result must follow by the
-powers of its own unit. A forgotten rate, a hidden absolute threshold or a swapped channel breaks this.
+Every input is rescaled by powers of three numbers without a common factor, and every result must change by the
+powers of its unit. A forgotten rate, an absolute threshold or an exchanged channel violates this.
 """
 
 from dataclasses import replace
@@ -22,13 +22,13 @@ METRE, SECOND, NEWTON = 1.7, 0.6, 2.3
 
 
 def unit(m=0, s=0, n=0):
-    """Factor on a quantity of the unit m^m s^s N^n."""
+    """Factor for a quantity with the unit m^m s^s N^n."""
     return METRE**m * SECOND**s * NEWTON**n
 
 
 ACCELERATION = {"m": 1, "s": -2}
 RNG = np.random.default_rng(5)
-FORCE, ANSWER = RNG.standard_normal((2, 4, 400))
+FORCE, RESPONSE = RNG.standard_normal((2, 4, 400))
 FREQUENCY = np.array([30.0, 80.0, 200.0])
 POLE = np.array([-40.0 + 600j])
 G_FF, G_AA, G_FA = np.array([2.0, 3.0, 1.0]), np.array([5.0, 4.0, 2.0]), np.array([1 + 1j, 2 - 1j, 0.5j])
@@ -36,11 +36,11 @@ G_FF, G_AA, G_FA = np.array([2.0, 3.0, 1.0]), np.array([5.0, 4.0, 2.0]), np.arra
 # name: (function of factors on metre, second, newton; units of its results)
 FUNCTIONS = {
     "cross_spectra": (
-        lambda u: spectra.cross_spectra(FORCE * u(n=1), ANSWER * u(**ACCELERATION), 1000.0 * u(s=-1)),
+        lambda u: spectra.cross_spectra(FORCE * u(n=1), RESPONSE * u(**ACCELERATION), 1000.0 * u(s=-1)),
         [{"s": -1}, {"n": 2, "s": 1}, {"m": 2, "s": -3}, {"n": 1, "m": 1, "s": -1}],
     ),
     "spectral_density": (
-        lambda u: spectra.spectral_density(ANSWER[0] * u(m=1), 1000.0 * u(s=-1), 50),
+        lambda u: spectra.spectral_density(RESPONSE[0] * u(m=1), 1000.0 * u(s=-1), 50),
         [{"s": -1}, {"m": 2, "s": 1}, {}],
     ),
     "h1": (lambda u: [frf.h1(G_FF * u(n=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
@@ -62,10 +62,10 @@ FUNCTIONS = {
         [{"s": -1}],
     ),
     "band_pass": (
-        lambda u: [filters.band_pass(ANSWER * u(m=1), 20.0 * u(s=-1), 90.0 * u(s=-1), 1000.0 * u(s=-1))],
+        lambda u: [filters.band_pass(RESPONSE * u(m=1), 20.0 * u(s=-1), 90.0 * u(s=-1), 1000.0 * u(s=-1))],
         [{"m": 1}],
     ),
-    "reduce_rate": (lambda u: [filters.reduce_rate(ANSWER * u(n=1), 4)], [{"n": 1}]),
+    "reduce_rate": (lambda u: [filters.reduce_rate(RESPONSE * u(n=1), 4)], [{"n": 1}]),
     "exponential_window": (lambda u: [spectra.exponential_window(50, 3, 4.0 * u(s=-1), 100.0 * u(s=-1))], [{}]),
     "correct_poles": (lambda u: [spectra.correct_poles(POLE * u(s=-1), 7.0 * u(s=-1))], [{"s": -1}]),
     "force_pulse": (lambda u: [force_pulse("half-sine", np.arange(9) * 1e-4 * u(s=1), 7e-4 * u(s=1))], [{}]),
@@ -77,7 +77,7 @@ def same(**powers):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_function_is_covariant(name):
+def test_the_function_follows_a_change_of_units(name):
     function, units = FUNCTIONS[name]
     for before, after, powers in zip(function(same), function(unit), units, strict=True):
         assert after == pytest.approx(np.asarray(before) * unit(**powers), rel=1e-9, abs=0.0)

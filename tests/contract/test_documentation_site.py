@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning, loads nothing from elsewhere, and lists every command."""
+"""The documentation site builds without a warning, loads nothing from other servers, and lists every command."""
 
 import os
 import re
@@ -32,9 +32,9 @@ def site(repository, tmp_path_factory):
     return folder
 
 
-def test_the_site_has_a_search_that_needs_no_server(site):
+def test_the_search_of_the_site_needs_no_server(site):
     assert (site / "search" / "search_index.json").stat().st_size > 100_000
-    # a page opened from a folder can load a script only, and this one stands in for the worker of the search
+    # a page that is opened from a folder can only load scripts; this script replaces the worker of the search
     assert (site / "search" / "search_index.js").read_text("utf-8").startswith("var __index")
     assert "javascripts/iframe-worker.js" in (site / "index.html").read_text("utf-8")
     assert "identify_modes" in (site / "modules.html").read_text(encoding="utf-8")
@@ -45,7 +45,7 @@ def test_notebooks_are_pages_of_the_site(site):
     assert "From passages to a named mismatch" in text and "Candidate" in text
 
 
-def test_no_page_loads_anything_from_elsewhere(site):
+def test_no_page_loads_anything_from_another_server(site):
     loaded = re.compile(r"<(?:script|img|link[^>]*rel=.?stylesheet)[^>]*(?:src|href)=.?(https?://[^\s>\"']+)")
     wrong = {(page.name, url) for page in site.rglob("*.html") for url in loaded.findall(page.read_text("utf-8"))}
     assert not wrong

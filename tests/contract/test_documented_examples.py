@@ -1,7 +1,7 @@
-"""What the pages and the help tell people to type runs: every block of code, every command, every query.
+"""The examples in pages and help texts work: every block of code, every command, every query.
 
-A block that cannot run says why in a comment in front of it: ``<!-- not run: reason -->``. A YAML block says which
-file it is part of: ``<!-- file: config/config.yaml -->``. One that another test runs names that test:
+A block that cannot run has the reason in a comment before it: ``<!-- not run: reason -->``. A YAML block states its
+file: ``<!-- file: config/config.yaml -->``. A block that another test runs states this test:
 ``<!-- run by: tests/... -->``.
 """
 
@@ -37,7 +37,7 @@ QUERY = re.compile(r'(?:turnout query|-c) "((?:from|select) [^"]*)"')
 INLINE_QUERY = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
 VIEWS = re.compile(r"\bviews? (`\w+`(?:(?:,| and) `\w+`)*)")
 NO_CODE = ("text", "mermaid")  # outputs, tables, drawings
-NOT_RUN = 2  # blocks that cannot run; a new one needs a reason as good
+NOT_RUN = 2  # blocks that cannot run; a new one needs an equally good reason
 BLOCKS = blocks()
 RUN = [block for block in BLOCKS if block.key not in ("not run", "run by")]
 
@@ -48,7 +48,7 @@ def of(*languages):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A project with the configuration, the example's recording and a registry of two turnouts."""
+    """A project with the configuration, the recording of the example and a registry of two turnouts."""
     root = tmp_path_factory.mktemp("documented")
     shutil.copytree(ROOT / "config", root / "config")
     (root / "config" / "tracks" / "small.yaml").write_text(TRACK)
@@ -64,11 +64,11 @@ def registry(folder):
         yield connection
 
 
-def test_every_block_has_a_language_that_is_checked():
+def test_every_block_has_a_known_language():
     known = {"python", "sql", "yaml", "csv", "sh", "console", *NO_CODE}
     assert not [str(block) for block in BLOCKS if block.language not in known]
     n_fences = sum(len(re.findall(r"^```", page.read_text(encoding="utf-8"), re.M)) for page in PAGES)
-    assert n_fences == 2 * len(BLOCKS), "a fence that the collector does not see"
+    assert n_fences == 2 * len(BLOCKS), "the collector misses a fence"
     assert not [str(b) for b in RUN if (b.language == "yaml") != (b.key == "file")], "a YAML block names its file"
     for block in (b for b in BLOCKS if b.key == "run by"):
         assert f"docs/{block.page.name}" in (ROOT / block.value).read_text(encoding="utf-8"), block
@@ -81,8 +81,8 @@ def test_blocks_that_are_not_run_are_few():
 
 
 @of("python")
-def test_generated_python(block):
-    """docs/api.md is made from the docstrings: its examples run as doctests, its headings are signatures."""
+def test_generated_python_is_up_to_date(block):
+    """docs/api.md is generated from the docstrings: its examples are doctests, its headings are signatures."""
     if block.body.startswith(">>> "):
         documented = [inspect.getdoc(getattr(turnout, name)) for name in turnout.__all__]
         assert any(block.body.rstrip() in text for text in documented), "no doctest of the package"
@@ -93,8 +93,8 @@ def test_generated_python(block):
 
 
 @pytest.mark.parametrize("page", sorted({b.page for b in RUN if b.language == "python"}), ids=lambda p: p.name)
-def test_python(page, folder, monkeypatch, capsys):
-    """The blocks of a page run one after the other, with the names of those before, and print the text behind them."""
+def test_python_blocks_print_the_shown_text(page, folder, monkeypatch, capsys):
+    """The blocks of a page run in order with common names, and print the text that follows them."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("MPLBACKEND", "Agg")
     names: dict = {}
@@ -108,19 +108,19 @@ def test_python(page, folder, monkeypatch, capsys):
 
 
 @of("sql")
-def test_sql(block, registry):
+def test_sql_blocks_run(block, registry):
     for query in re.sub(r"--.*", "", block.body).split(";"):
         if query.strip():
             registry.execute(query).fetchall()
 
 
 @of("yaml")
-def test_yaml(block, folder):
+def test_yaml_blocks_are_valid(block, folder):
     file = folder / block.value
     kind = file.parent.name
     if kind == "tracks":
         file.write_text(block.body, encoding="utf-8")
-        assert load_track(file.stem, folder=file.parent).name in (file.stem, "small")  # or that which it extends
+        assert load_track(file.stem, folder=file.parent).name in (file.stem, "small")  # or the file that it extends
         return
     schema = {"config": "config", "layouts": "layout", "overrides": "override"}[kind]
     text = json.loads((ROOT / "config" / "schema" / f"{schema}.json").read_text(encoding="utf-8"))
@@ -129,7 +129,7 @@ def test_yaml(block, folder):
 
 
 def check_command(words):
-    """The command exists and takes its options; it is not run."""
+    """Check that the command exists and accepts its options, without running it."""
     program, *rest = words
     if program.split("/")[-1] == "turnout":
         build_parser().parse_args(rest)
@@ -147,18 +147,18 @@ def check_command(words):
     elif program == "snakemake":
         get_argument_parser().parse_args(rest)
     else:
-        assert program in ("cd", "mkdir", "source", "duckdb"), words  # the query of duckdb is run with all others
+        assert program in ("cd", "mkdir", "source", "duckdb"), words  # the query of duckdb runs with all other queries
 
 
 @of("sh", "console")
-def test_commands(block):
+def test_the_commands_of_blocks_exist(block):
     assert commands(block), "a block without a command"
     for words in commands(block):
         check_command(words)
 
 
 def unknown_words(words):
-    """Command or options of a mention that the program does not have; what the command needs may be left out."""
+    """Command or options in a text that the program does not have; required arguments may be left out."""
     parser, wrong = build_parser(), []
     for n, word in enumerate(words):
         groups = [a.choices for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
@@ -168,40 +168,40 @@ def unknown_words(words):
             wrong += [] if word.split("=")[0] in parser._option_string_actions else [word]
         elif groups and word in groups[0]:
             parser = groups[0][word]
-        elif n == 0 and not word.isupper():  # else it stands for any command
+        elif n == 0 and not word.isupper():  # a word in capitals stands for any command
             wrong.append(word)
     return wrong
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_commands_within_the_text(page):
+def test_the_commands_in_texts_exist(page):
     assert not [(words, wrong) for words in loose_commands(page) if (wrong := unknown_words(words))]
 
 
 @pytest.mark.parametrize("page", [*PAGES, *HELP], ids=lambda p: p.name)
-def test_queries_within_the_text(page, registry):
+def test_the_queries_in_texts_can_be_bound(page, registry):
     text = page.read_text(encoding="utf-8")
     for query in QUERY.findall(text) + INLINE_QUERY.findall(text):
-        registry.execute(f"explain {query}")  # binds every table, column and macro
+        registry.execute(f"explain {query}")  # explain binds every table, column and macro
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_views_within_the_text_can_be_read_without_arguments(page, registry):
-    """A macro with arguments is called a macro, and shown with its parentheses."""
+def test_the_views_in_texts_need_no_arguments(page, registry):
+    """A macro with arguments is called a macro and written with its parentheses."""
     for views in VIEWS.findall(page.read_text(encoding="utf-8")):
         for name in re.findall(r"`(\w+)`", views):
             registry.execute(f"explain from {name}")
 
 
 @pytest.mark.parametrize("module", HELP, ids=lambda p: p.stem)
-def test_every_command_of_the_help_is_one_the_program_takes(module):
+def test_the_commands_of_the_help_exist(module):
     text = module.read_text(encoding="utf-8").split('"""')[1]
     typed = re.findall(r"^ *(?:\$ )?turnout (\S.*)$", text.replace("\\\n", " "), re.MULTILINE)
     for line in typed:
         check_command(["turnout", *shlex.split(re.split(r"\s{3,}(?![-\s])|\s+[#>]", line)[0])])
 
 
-def test_the_text_shows_queries_and_commands_at_all():
+def test_the_texts_contain_queries_and_commands():
     shown = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     assert len(QUERY.findall(shown) + INLINE_QUERY.findall(shown)) > 30
     assert sum(len(loose_commands(page)) for page in PAGES) > 30

@@ -1,4 +1,4 @@
-"""The first sentence of each page of the documentation says what the page is for, and its sentences are short."""
+"""The first sentence of each page of the documentation states its purpose, and its sentences are short."""
 
 import re
 from pathlib import Path
@@ -16,7 +16,10 @@ END = re.compile(r"(?<=[.!?])[)\"*]*\s+(?=[^a-z])")
 
 
 def sentences(text):
-    """Sentences of paragraphs and lists, without headings, tables, pictures and code; code in a line is one word."""
+    """Sentences of paragraphs and lists, without headings, tables, pictures and code blocks.
+
+    Code within a line is one word.
+    """
     paragraphs = [[]]
     for line in BLOCK.sub("", text).splitlines():
         if not line.strip() or line.startswith(("#", "|", "!", "    ", "---")):
@@ -29,14 +32,14 @@ def sentences(text):
     return [sentence for paragraph in joined for sentence in END.split(paragraph) if sentence.strip()]
 
 
-def test_sentences_are_those_of_the_text():
+def test_the_sentences_of_a_text_are_found():
     text = "# No\n\nOne two. Three (four\nfive)! 6 is `a b c`.\n- An [item](x.md) here.\n\n| no |\n```sh\nno.\n```\n"
     assert sentences(text) == ["One two.", "Three (four five)!", "6 is code.", "An item here."]
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if p.name != "index.md"], ids=lambda p: p.stem)
-def test_a_page_begins_with_its_purpose(page):
-    """index.md says what the program is for."""
+def test_a_page_starts_with_its_purpose(page):
+    """index.md states the purpose of the program instead."""
     lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.strip()]
     first = next(line for line in lines if not line.startswith(("#", "<!--")))
     assert PURPOSE.match(first), first

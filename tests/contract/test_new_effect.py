@@ -1,4 +1,4 @@
-"""A new effect takes one file and one line: a diagnosis then tests it, names it and says what to do on site."""
+"""A new effect needs one file and one line: a diagnosis then tests it, names it and states what to check on site."""
 
 import importlib
 import json
@@ -69,7 +69,7 @@ class SleeperBox(PhysicsTerm):
 
 @pytest.fixture
 def box(tmp_path, monkeypatch):
-    """The new effect: its file, and the line in ``physics.TERMS``."""
+    """The new effect: its file, and its line in ``physics.TERMS``."""
     (tmp_path / "sleeper_box.py").write_text(FILE)
     monkeypatch.syspath_prepend(tmp_path)
     effect = importlib.import_module("sleeper_box").SleeperBox
@@ -78,13 +78,13 @@ def box(tmp_path, monkeypatch):
     del sys.modules["sleeper_box"]
 
 
-def test_a_diagnosis_tests_it_at_every_support(box):
+def test_a_diagnosis_tests_the_new_effect_at_every_support(box):
     case = PlannedCase(small_plan((15.0,), passages=False, hammer_positions=(24.0,)))
     boxes = [c for c in case.candidates if c.family == "sleeper_box"]
     pads = [c for c in case.candidates if c.family == "local_pad"]
     assert [c.where for c in boxes] == [c.where for c in pads] and len(boxes) > 10
     assert boxes[0].term((40.0,)) == box(boxes[0].where["sleeper"], 40.0)
-    # one added link changes a receptance exactly: the order of refits needs nothing else of the effect
+    # an added link changes a receptance exactly: the order of the fits needs no other property of the effect
     fit = fit_jointly(case, iterations=0)
     column, candidate = case.screen(fit)[boxes[5].key, 0], boxes[5]
     for o, before, found in zip(case.observations, fit.predictions, column):
@@ -92,7 +92,7 @@ def test_a_diagnosis_tests_it_at_every_support(box):
         assert np.linalg.norm(found - (after - before)) < 1e-5 * np.linalg.norm(after - before)
 
 
-def test_a_finding_names_it_and_says_what_to_do(box):
+def test_a_finding_names_the_new_effect_and_states_what_to_check(box):
     term = {"term": "sleeper_box", "fixed": {"sleeper": 24.6}}
     term["parameters"] = {"mass": {"value": 62.0, "se": 3.0, "unit": "kg"}}
     finding = {"verdict": "named", "term_json": json.dumps([term]), "rival_term": None, "train": None, "channel": None}
@@ -105,12 +105,12 @@ def test_a_finding_names_it_and_says_what_to_do(box):
     assert recommendation(pair) == "Measure a hammer test on this sleeper"
 
 
-def test_the_page_of_effects_has_it(box):
+def test_the_page_of_effects_contains_the_new_effect(box):
     row = "| A box on one sleeper | `sleeper_box` | a position | mass on one sleeper [kg] | 10 kg | Look for a box"
     assert row in page()
 
 
-def test_a_track_file_may_have_it(box):
+def test_a_track_file_can_contain_the_new_effect(box):
     track = SimpleNamespace(support=np.arange(0.0, 48.0, 0.6), nearest_support=lambda x: round(x / 0.6))
     effect = AcceptedEffect("sleeper_box", {"sleeper": 24.6}, {"mass": (62.0, 3.0)})
     assert effect.term(track) == box(41, 62.0) and [p.name for p in effect.parameters] == ["mass"]

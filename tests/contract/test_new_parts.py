@@ -1,4 +1,4 @@
-"""A new reader takes one file and one line, a new view one file (a panel: tests/unit/report/test_turnout_page.py)."""
+"""A new reader needs one file and one line, a new view one file (a panel: tests/unit/report/test_turnout_page.py)."""
 
 import shutil
 from importlib.resources import files
@@ -39,7 +39,7 @@ create or replace view models_of_sections as
 """
 
 
-def test_a_new_reader(tmp_path, monkeypatch):
+def test_a_new_reader_needs_one_file_and_one_line(tmp_path, monkeypatch):
     (tmp_path / "package").mkdir()
     (tmp_path / "package" / "one_channel.py").write_text(READER)
     monkeypatch.setattr(turnout.readers, "__path__", [*turnout.readers.__path__, str(tmp_path / "package")])
@@ -61,12 +61,12 @@ def views_folder(tmp_path, monkeypatch):
         view_texts, "files", lambda package: folder if package == "turnout.registry" else files(package)
     )
     for name, function in list(vars(view_texts).items()):
-        if hasattr(function, "cache_clear"):  # a value kept now would be one with the added view
+        if hasattr(function, "cache_clear"):  # a value that is cached now would contain the added view
             monkeypatch.setattr(view_texts, name, function.__wrapped__)
     return folder / "views"
 
 
-def test_a_new_view(views_folder, tmp_path):
+def test_a_new_view_needs_one_file(views_folder, tmp_path):
     (views_folder / "models_of_sections.sql").write_text(VIEW)
     register([], tmp_path / "registry", read=iter)
     with duckdb.connect(str(tmp_path / "registry" / "registry.duckdb"), read_only=True) as connection:

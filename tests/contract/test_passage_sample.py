@@ -6,7 +6,7 @@ from turnout.cli.passage import FIT_HEAD, _train_lines, score_basis
 from turnout.config.settings.passage import PassageSettings
 
 
-def test_the_sample_has_the_head_the_basis_and_a_row_of_known_status_per_sensor(repository):
+def test_the_sample_has_the_heading_the_basis_and_a_row_with_a_known_status_per_sensor(repository):
     page = (repository / "docs" / "passages.md").read_text(encoding="utf-8")
     sample = page.split("$ turnout passage", 1)[1].split("```", 1)[0]
     assert FIT_HEAD in sample and score_basis(PassageSettings()) in sample

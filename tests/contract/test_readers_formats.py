@@ -1,4 +1,4 @@
-"""Every format keeps the readers' contract: a module with ``read_raw``, a writer, a meaning, its own extensions."""
+"""Every format has what readers need: a module with ``read_raw``, a writer, a meaning, its own extensions."""
 
 from collections import Counter
 from importlib import import_module
@@ -27,8 +27,8 @@ def test_an_extension_belongs_to_one_format():
     assert all(e == e.lower() and e.startswith(".") for e in counts)
 
 
-def test_a_reader_knows_no_other_reader(repository):
-    """A new format is one file and one line: formats share what raw.py, variables.py, stamps.py, clock.py hold."""
+def test_a_reader_imports_no_other_reader(repository):
+    """A new format is one file and one line: formats share raw.py, variables.py, stamps.py and clock.py."""
     readers = {entry.module for entry in FORMATS.values()}
     folder = Path(repository) / "src" / "turnout" / "readers"
     for module in readers:

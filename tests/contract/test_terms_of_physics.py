@@ -1,4 +1,4 @@
-"""What every listed physics term promises, in pressed and in lifted states."""
+"""Properties of every listed physical effect, with pressed and with lifted sleepers."""
 
 import dataclasses
 import re
@@ -52,7 +52,7 @@ EXTRA_UNITS = {"-", "1/K", "s", "rad", "Hz", "N", "m/s²", "°C", "V", "N/m per 
 
 
 def passage(*terms, turnout=TURNOUT):
-    """A light bogie over a dip: sleepers are pressed under the wheels and lifted between and ahead of them."""
+    """A light bogie over a dip: sleepers are pressed under the wheels, and lifted between and before them."""
     bogie = car(half_pivot=2.6, half_base=1.0)
     return simulate_passage(
         turnout, bogie, 40.0, SENSORS, terms=terms, rate=10e3, lead=0.05, tail=0.02, entry=3.0
@@ -70,7 +70,7 @@ def recordings(term):
 
 
 def turnout_of(term):
-    """Effects of a blade need one."""
+    """The turnout with a blade if the effect needs one."""
     return SWITCH if BladeSite in term.site_types else TURNOUT
 
 
@@ -86,13 +86,13 @@ def base(term, bases):
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda t: t.name)
 class TestTerm:
-    def test_it_is_described(self, term):
+    def test_the_effect_is_described(self, term):
         example = term.example()
         assert issubclass(term, PhysicsTerm) and dataclasses.is_dataclass(term)
         assert term.effect_type in EFFECT_TYPES and re.fullmatch(r"[a-z0-9_]+", term.name)
         words = example.sentence()
         assert len(words.split()) >= 5 and "{" not in words
-        assert term.parameters, "a term without a parameter cannot be fitted"
+        assert term.parameters, "an effect without a parameter cannot be fitted"
         fields = {f.name for f in dataclasses.fields(term)}
         for p in term.parameters:
             assert p.name in fields
@@ -102,7 +102,7 @@ class TestTerm:
             assert len(p.meaning.split()) >= 3
             assert re.search(r"\b(18|19|20)\d\d\b", p.source), f"no year in the source {p.source!r}"
 
-    def test_it_says_what_the_person_on_site_needs(self, term):
+    def test_the_message_of_the_effect_is_complete(self, term):
         example, size = term.example(), term.parameters[0]
         words = {name: "?" for name in ("place", "channel", "train", "wheel")}
         words |= {p.name: f"{getattr(example, p.name):.3g} {p.unit}" for p in term.parameters}
@@ -114,8 +114,8 @@ class TestTerm:
         assert not term.message_negative or size.bounds[0] < 0.0, "the size cannot be negative"
         assert not term.left_out_negative or size.bounds[0] < 0.0, "the size cannot be negative"
 
-    def test_what_it_says_follows_the_sign_of_its_size(self, term):
-        """A sentence with a direction, such as "gives more", has another one for a negative size."""
+    def test_the_message_depends_on_the_sign_of_the_size(self, term):
+        """A sentence with a direction, such as "gives more", has another version for a negative size."""
         size = term.parameters[0]
         if size.bounds[0] >= 0.0:
             return
@@ -131,7 +131,7 @@ class TestTerm:
         assert len(term.site_check.split()) >= 4 and not term.site_check.endswith(".")
         assert not term.separating_test or term.separating_test.split()[0].islower()
 
-    def test_it_says_how_a_diagnosis_tests_it(self, term):
+    def test_the_effect_states_how_a_diagnosis_tests_it(self, term):
         assert term.frame in FRAMES and term.column_type in COLUMN_TYPES
         assert 0.0 <= term.model_error_share < 1.0 and term.smallest_reportable >= 0.0
         assert 1 <= term.n_size_parameters <= len(term.parameters)
@@ -142,8 +142,8 @@ class TestTerm:
         if term.column_type == "support":
             assert len(term.example().supports) >= 1
 
-    def test_what_it_assumes_at_a_site_can_be_simulated(self, term):
-        """Its starts lie within the bounds and away from neutral, and all its fields are there."""
+    def test_the_hypotheses_at_a_site_can_be_simulated(self, term):
+        """Their starting values are within the bounds and not neutral, and they have all fields."""
         hypotheses = [h for site in SITES if isinstance(site, term.site_types) for h in term.hypotheses(site)]
         assert len(hypotheses) >= len(term.site_types)
         for hypothesis in hypotheses:
@@ -158,12 +158,12 @@ class TestTerm:
                 assert start[0] != parameters[0].neutral
                 assert "{" not in made.sentence()
 
-    def test_it_vanishes_at_its_neutral_value(self, term, base):
+    def test_the_effect_vanishes_at_its_neutral_value(self, term, base):
         neutral = term.example().neutral()
         for found, expected in zip(recordings(neutral), base):
             assert np.max(np.abs(found - expected)) <= 1e-9 * np.max(np.abs(expected))
 
-    def test_it_changes_something(self, term, base):
+    def test_the_effect_changes_a_recording(self, term, base):
         example = term.example()
         changes = [
             np.max(np.abs(found - expected)) / np.max(np.abs(expected))
@@ -180,8 +180,10 @@ class TestTerm:
             assert np.ptp(silent) < 1e-3 or "hum" in term.name
 
     def test_small_values_have_small_effects(self, term, base):
-        """Continuous at the neutral value: a hundredth of the way there changes less than all of the way. In the norm:
-        a rail that shears has a kink under a wheel, which a sensor 3 mm further on records one sample later."""
+        """Continuity at the neutral value: a hundredth of the way changes less than the whole way.
+
+        The comparison uses the norm: a rail that shears has a kink under a wheel, which a sensor 3 mm farther on gets
+        one sample later."""
         example, neutral = term.example(), term.example().neutral()
         near = dataclasses.replace(
             example,
@@ -196,19 +198,19 @@ class TestTerm:
 
     def test_forces_on_sleepers_vanish_in_every_state(self, term):
         if term.effect_type != "port":
-            pytest.skip("acts without ports")
+            pytest.skip("the effect has no ports")
         position = np.linspace(-4e-4, 8e-4, TRACK.support.size)  # lifted and pressed
         state = SimpleNamespace(track=TRACK, sleeper_position=position, sleeper_velocity=0.1 * np.cos(9.0 * position))
         try:
             force = term.example().neutral().force(state)
         except TypeError:
-            pytest.skip("does not act on sleepers alone")
+            pytest.skip("the effect does not act only on sleepers")
         assert np.all(force == 0.0)
 
 
 @pytest.mark.parametrize("term", [t for t in TERMS if t.column_type == "support"], ids=lambda t: t.name)
 def test_the_pseudo_force_is_the_static_force_of_its_links_and_ports(term):
-    """Rail and sleeper pressed down and at rest: what its springs exert, with the signs of the track."""
+    """Rail and sleeper are pressed down and at rest: the force of the springs, with the signs of the track."""
     example = term.example()
     (j, *_), motion = example.supports, {"rail": 2e-4, "sleeper": 1e-4}
     target, force = example.pseudo_force(
@@ -221,7 +223,7 @@ def test_the_pseudo_force_is_the_static_force_of_its_links_and_ports(term):
     )
     expected = 0.0
     for link in example.links(TRACK):
-        if all(node[0] in motion for node, _ in link.ends):  # a node of its own follows the track at rest
+        if all(node[0] in motion for node, _ in link.ends):  # an additional node follows the track at rest
             expected -= link.stiffness * sum(weight * motion[node[0]] for node, weight in link.ends)
     for port in example.ports(TRACK):
         if port.ends[0][0][1] == j:

@@ -1,4 +1,4 @@
-"""The toy fleet is a module of its own, for the workflow's jobs import it, too."""
+"""The folder of the tests is on the path, as jobs of the workflow import the toy fleet, too."""
 
 import sys
 from pathlib import Path

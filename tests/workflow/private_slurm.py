@@ -1,4 +1,4 @@
-"""A real Slurm on this machine alone, without system services: started for a test, always stopped."""
+"""A private Slurm on this machine without system services: a test starts it, and it is always stopped."""
 
 import getpass
 import os
@@ -47,13 +47,13 @@ PartitionName=batch Nodes=localhost Default=YES MaxTime=INFINITE State=UP
 
 
 def missing():
-    """Programs that are not here."""
+    """Required programs that are not installed."""
     path = f"{os.environ.get('PATH', '')}:{SBIN}"
     return [name for name in NEEDED if shutil.which(name, path=path) is None]
 
 
 class Slurm:
-    """``with Slurm(folder) as slurm``: ``slurm.environment`` is what its programs need."""
+    """``with Slurm(folder) as slurm``: programs of Slurm need the variables in ``slurm.environment``."""
 
     def __init__(self, folder):
         self.base = Path(folder)
@@ -74,7 +74,7 @@ class Slurm:
         key = self.base / "munge.key"
         key.write_bytes(secrets.token_bytes(128))
         key.chmod(0o600)
-        # The executor's inner job step clears SLURM_CONF before it calls srun: this one puts it back.
+        # The inner job step of the executor clears SLURM_CONF before it calls srun: this script sets it again.
         shim = self.base / "bin/srun"
         real = shutil.which("srun", path=self.path)
         shim.write_text(f'#!/bin/sh\nSLURM_CONF={self.base}/slurm.conf exec {real} "$@"\n')
@@ -121,7 +121,7 @@ class Slurm:
             self.guard.wait(30)
 
 
-# It reads until the process that started it closes the pipe or dies, also by SIGKILL, then ends what it guards.
+# The guard reads until its parent process closes the pipe or dies, also by SIGKILL, and then stops the daemons.
 GUARD = """
 import os, pathlib, shutil, subprocess, sys, time
 sys.stdin.read()
@@ -142,13 +142,13 @@ for number in (15, 9):
 
 
 def start_guard(run, environment=None, patience=1.0):
-    """Process that ends the daemons whose numbers are in ``run``/*.pid when this process closes it or dies."""
+    """Process that stops the daemons with numbers in ``run``/*.pid when this process closes it or dies."""
     command = [sys.executable, "-c", GUARD, str(run), str(patience)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, env=environment)
 
 
 def free_ports(n):
-    """Ports that nobody listens on."""
+    """Ports on which no program listens."""
     sockets = [socket.socket() for _ in range(n)]
     try:
         for s in sockets:

@@ -1,4 +1,4 @@
-"""The built package runs everything outside the checkout, in folders whose names have a space and an umlaut."""
+"""The built package works outside the checkout, in folders whose names have a space and an umlaut."""
 
 import importlib.metadata
 import os
@@ -21,7 +21,7 @@ NOT_SOURCE = shutil.ignore_patterns(
 
 
 def build(command, folder, out):
-    """Run one hook of the build backend in ``folder``; returns the file it made."""
+    """Run one hook of the build backend in ``folder``; return the file that it creates."""
     code = f"import setuptools.build_meta as backend; print(backend.{command}({str(out)!r}))"
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, capture_output=True, text=True)
@@ -44,7 +44,7 @@ def archives(tmp_path_factory, repository):
     return sdist, build("build_wheel", unpacked, folder)
 
 
-def test_the_wheel_holds_workflow_configuration_and_templates(archives, repository):
+def test_the_wheel_contains_workflow_configuration_and_templates(archives, repository):
     with zipfile.ZipFile(archives[1]) as wheel:
         names = set(wheel.namelist())
         metadata = wheel.read(next(n for n in names if n.endswith("METADATA"))).decode()
@@ -64,18 +64,18 @@ def test_the_wheel_holds_workflow_configuration_and_templates(archives, reposito
 
 @pytest.fixture(scope="module")
 def installed(archives, tmp_path_factory):
-    """Function that runs a program of a new environment, which holds the wheel, in a new folder."""
+    """Function that runs a program of a new environment with the wheel, in a new folder."""
     folder = tmp_path_factory.mktemp("Gleis Süd")
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "env"], check=True)
     python = folder / "env" / "bin" / "python"
     pip = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index"]
     subprocess.run([*pip, archives[1]], check=True)
     (site,) = (folder / "env" / "lib").glob("python*/site-packages")
-    # Dependencies are those of this environment. Its editable packages do not count: no .pth file there is read.
+    # Dependencies are those of this environment, without its editable packages: no .pth file there is read.
     (site / "dependencies.pth").write_text("\n".join(p for p in sys.path if p.endswith("-packages")) + "\n")
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     environment |= {"PATH": f"{python.parent}{os.pathsep}{os.environ['PATH']}"}
-    if kernels := cache_folder():  # the code is the same, and it takes a minute to compile
+    if kernels := cache_folder():  # the code is the same, and its compilation takes a minute
         environment |= {"NUMBA_CACHE_DIR": str(kernels.parent)}
 
     def call(program, *options, cwd=".", check=True):
@@ -89,7 +89,7 @@ def installed(archives, tmp_path_factory):
     return call, folder
 
 
-def test_version_is_that_of_the_package(installed):
+def test_the_version_is_that_of_the_package(installed):
     call, _ = installed
     assert call("turnout", "--version") == f"turnout {turnout.__version__}\n"
 
@@ -111,7 +111,7 @@ def shown_commands(body):
 
 
 def agrees(line, shown):
-    """Whether a printed line is the shown one: ``...`` stands for any text, decimals and spaces may differ."""
+    """Whether a printed line agrees with the shown one: ``...`` stands for any text, decimals may differ."""
     parts = [NUMBER.sub("\0", part) for part in " ".join(shown.split()).split("...")]
     pattern = ".*".join(re.escape(part).replace("\0", r"(\d+\.?\d*)") for part in parts)
     found = re.fullmatch(pattern, " ".join(line.split()))
@@ -120,7 +120,7 @@ def agrees(line, shown):
 
 
 def agree(printed, shown):
-    """Whether the shown lines follow in the printed text; a line ``...`` stands for any number of lines."""
+    """Whether the printed text contains the shown lines in order; a line ``...`` stands for any number of lines."""
     lines = iter(printed.splitlines())
     for n, line in enumerate(shown):
         if line == "...":
@@ -131,7 +131,7 @@ def agree(printed, shown):
     return True
 
 
-def test_a_shown_output_can_disagree():
+def test_the_comparison_of_outputs_finds_differences():
     assert agree("a 1.000\nb\nc", ["a 1.010", "...", "c"]) and agree("x 7 Hz, y", ["x 7 ..."])
     assert agree("A7   1.001 10", ["A7    1.00 10"])
     assert not agree("a 1.000\nb\nc", ["a 1.100", "...", "c"]) and not agree("a\nb", ["b"])
@@ -139,7 +139,7 @@ def test_a_shown_output_can_disagree():
 
 
 @pytest.mark.slow
-def test_the_tutorial_leads_from_init_to_pages(installed, repository):
+def test_the_commands_of_the_tutorial_give_the_shown_output(installed, repository):
     call, folder = installed
     project, where = folder / "railway", "."
     layout = project / "config/layouts/my_logger.yaml"
@@ -160,22 +160,22 @@ def test_the_tutorial_leads_from_init_to_pages(installed, repository):
     assert n_commands >= 10
     assert "W1" in (project / "results/pages/index.html").read_text(encoding="utf-8")
     assert len((project / "README.md").read_text(encoding="utf-8").splitlines()) <= 10
-    (project / "Snakefile").unlink()  # a project need not have its own, nor profiles
+    (project / "Snakefile").unlink()  # a project needs neither its own Snakefile nor profiles
     shutil.rmtree(project / "profiles")
     assert "sound: 2 units known, 0 processed" in call("turnout", "nightly", cwd=project)
 
 
-def test_init_changes_no_project(installed):
+def test_init_does_not_change_an_existing_project(installed):
     call, folder = installed
     call("turnout", "init", "once")
     (folder / "once/config/config.yaml").write_text("fleet: {shards: 2}\n")
-    said = call("turnout", "init", "once", check=False)
-    assert "a configuration is here already" in said
+    message = call("turnout", "init", "once", check=False)
+    assert "a configuration is here already" in message
     assert (folder / "once/config/config.yaml").read_text() == "fleet: {shards: 2}\n"
 
 
 def test_tracks_and_configuration_of_the_package_are_found(installed):
-    """Without a project the tracks and vehicles of the demonstration are used."""
+    """Without a project, the tracks and vehicles of the demonstration are used."""
     call, folder = installed
     (folder / "empty").mkdir()
     code = "import turnout; print(turnout.load_track('tommerup').locations['A7'], turnout.load_vehicle('ic3').name)"

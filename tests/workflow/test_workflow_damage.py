@@ -1,4 +1,4 @@
-"""Damaged files, a fault of the program, a lost disk: every sound recording goes in, the rest is said by name."""
+"""Damaged files, a fault of the program, a missing disk: valid recordings are registered, the others are reported."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 QUARANTINE = "select path, reason_code from {} where reason_code <> 'nothing_found'"
 
 
-# One fleet goes through the tests of this file in their order: workers take whole files.
+# The tests of this file use one fleet in their order, as a worker runs all tests of a file.
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def open_quarantine(folder):
     return quarantine(folder, superseded)
 
 
-def test_every_damaged_file_is_named_with_its_reason_and_leaves_when_repaired(fleet):
+def test_every_damaged_file_is_in_quarantine_with_its_reason_until_it_is_repaired(fleet):
     kinds = toy.damages(fleet)
     files = sorted((fleet / "raw").glob("*/hammer/*/*.npz"))
     broken = {f: kind for f, kind in zip(files[3::9], kinds)}
@@ -61,7 +61,7 @@ def test_every_damaged_file_is_named_with_its_reason_and_leaves_when_repaired(fl
     assert recordings == {str(f.relative_to(fleet / "raw")) for f in files}
 
 
-def test_too_many_in_quarantine_fail_the_run_after_the_registry_is_out(fleet):
+def test_too_many_units_in_quarantine_fail_the_run_after_the_registry_is_published(fleet):
     toy.add_raw(fleet, "T00005", n_section=5, n_campaign=5, first=2)
     new = sorted((fleet / "raw/T00005/hammer").glob("2024-0[3-7]-01/*.npz"))
     assert len(new) == 25
@@ -69,7 +69,7 @@ def test_too_many_in_quarantine_fail_the_run_after_the_registry_is_out(fleet):
         path.write_bytes(b"")
     done = toy.run(fleet, shards=2, check=False)
     assert done.returncode != 0, done.stdout
-    # with the 11 of the run before, which were too few to be judged
+    # with the 11 units of the run before, which were too few for a verdict
     assert "10 of 36 new units of the fleet have rows in quarantine, 28 %, above the limit of 20 %" in done.stdout
     assert len([p for p in open_quarantine(fleet) if p.startswith("T00005")]) == 10
     for seed, path in enumerate(new[:10], 9000):
@@ -77,7 +77,7 @@ def test_too_many_in_quarantine_fail_the_run_after_the_registry_is_out(fleet):
     toy.run(fleet, shards=2)
 
 
-def test_a_fault_of_the_program_is_isolated_named_and_fails_the_run(fleet):
+def test_a_fault_of_the_program_affects_only_its_unit_is_reported_and_fails_the_run(fleet):
     bug = fleet / "raw/T00006/hammer/2024-01-01/A1_bug.npz"
     bug.write_bytes(toy.raw_bytes(1, fleet))
     done = toy.run(fleet, shards=2, check=False)
@@ -92,7 +92,7 @@ def test_a_fault_of_the_program_is_isolated_named_and_fails_the_run(fleet):
     assert open_quarantine(fleet) == {}
 
 
-def test_a_lost_disk_stops_the_run_before_anything_is_changed(fleet):
+def test_a_missing_disk_stops_the_run_before_any_change(fleet):
     before = toy.data_files(fleet)
     (fleet / "raw").rename(fleet / "away")
     (fleet / "raw").mkdir()
@@ -106,7 +106,7 @@ def test_a_lost_disk_stops_the_run_before_anything_is_changed(fleet):
     assert "Nothing to be done" in toy.run(fleet, shards=2).stdout
 
 
-def test_files_removed_on_purpose_keep_their_rows(fleet):
+def test_the_rows_of_files_that_were_removed_on_purpose_are_kept(fleet):
     before = toy.rows(fleet)["recordings"]
     shutil.rmtree(fleet / "raw/T00009/hammer/2024-01-01")
     done = toy.run(fleet, shards=2)

@@ -1,4 +1,4 @@
-"""What the machine does to single units and to whole jobs holds nothing else back. One fleet, test by test."""
+"""Faults of the machine in single units and jobs delay no other unit. The tests use one fleet in their order."""
 
 import re
 import shutil
@@ -25,7 +25,7 @@ def unit(unit, turnout, raw_root, algo=""):
 '''
 
 
-# One fleet goes through the tests of this file in their order: workers take whole files.
+# The tests of this file use one fleet in their order, as a worker runs all tests of a file.
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def measured(fleet):
     return {t for row in toy.rows(fleet)["recordings"] for t in row if re.fullmatch(r"T\d{5}", str(t))}
 
 
-def test_a_unit_that_cannot_be_read_is_in_quarantine_the_second_night_and_tried_again_every_night(fleet):
+def test_an_unreadable_unit_is_in_quarantine_in_the_second_run_and_is_tried_again_in_every_run(fleet):
     (fleet / "bad_sector").touch()
     done = run(fleet)
     assert done.returncode != 0 and "1 units wait for the next run, first T00001/hammer/A1" in done.stdout
@@ -61,7 +61,7 @@ def test_a_unit_that_cannot_be_read_is_in_quarantine_the_second_night_and_tried_
     assert "Nothing to be done" in run(fleet).stdout
 
 
-def test_a_registration_that_failed_is_tried_again_though_nothing_is_new(fleet):
+def test_a_failed_registration_is_repeated_without_new_files(fleet):
     toy.add_raw(fleet, "T00002", n_section=1, n_campaign=1, first=1)
     recordings = fleet / "results/registry/recordings"
     recordings.rename(fleet / "away")
@@ -74,7 +74,7 @@ def test_a_registration_that_failed_is_tried_again_though_nothing_is_new(fleet):
     assert "Nothing to be done" in run(fleet).stdout
 
 
-def test_a_damaged_registry_is_repaired_each_time_and_the_night_after_has_nothing_to_do(fleet):
+def test_a_damaged_registry_is_repaired_each_time_and_the_next_run_has_nothing_to_do(fleet):
     assert run(fleet).returncode == 0
     before = toy.rows(fleet)
     for file in ("recordings/**/*.parquet", "registry.duckdb", "registry.duckdb"):
@@ -83,7 +83,7 @@ def test_a_damaged_registry_is_repaired_each_time_and_the_night_after_has_nothin
         assert "Nothing to be done" in run(fleet).stdout
 
 
-def test_a_file_that_is_at_two_turnouts_is_named_by_the_run_and_in_the_registry(fleet):
+def test_a_file_at_two_turnouts_is_reported_by_the_run_and_in_the_registry(fleet):
     name, copy = "T00004/hammer/2024-01-01/A1_1.npz", "T00005/hammer/2024-01-01/A1_2.npz"
     shutil.copy(fleet / "raw" / name, fleet / "raw" / copy)
     done = run(fleet)
@@ -91,7 +91,7 @@ def test_a_file_that_is_at_two_turnouts_is_named_by_the_run_and_in_the_registry(
     assert sum("other_turnout" in row for row in toy.rows(fleet)["quarantine"]) == 2
 
 
-def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
+def test_a_job_that_dies_delays_only_the_units_that_it_has_not_computed(fleet):
     for turnout in ("T00000", "T00001", "T00003"):
         toy.add_raw(fleet, turnout, n_section=1, n_campaign=1, first=1)
     assert shard_of("T00000", SHARDS) != shard_of("T00001", SHARDS) == shard_of("T00003", SHARDS)
@@ -104,6 +104,6 @@ def test_a_job_that_dies_holds_back_nothing_but_what_it_has_not_computed(fleet):
     assert done.returncode != 0 and "not published" not in done.stdout
     assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 3
     (fleet / "killer").unlink()
-    done = run(fleet)  # no plan has changed since
+    done = run(fleet)  # no plan has changed since the last run
     assert done.returncode == 0 and re.search(r"hammer 02of03: 4 known, 1 processed", done.stdout), done.stdout
     assert sum("2024-02-01" in repr(row) for row in toy.rows(fleet)["recordings"]) == 4

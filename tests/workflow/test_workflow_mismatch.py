@@ -1,4 +1,4 @@
-"""The stage of mismatches over a tiny fleet: opt in, only what is new, faults in quarantine. In order."""
+"""The mismatch stage over a small fleet: on request, only new visits, faults in quarantine. Test order matters."""
 
 import re
 import shutil
@@ -35,8 +35,8 @@ def run(folder, *options):
     return toy.run(folder, FUNCTION, *options, function="", target=REGISTRY, cores=1)
 
 
-def said(done):
-    """(known, processed, quarantined) of the stage; None where it did not run."""
+def counts(done):
+    """(known, processed, quarantined) of the stage; None if it did not run."""
     found = re.search(r"^mismatch \S+: (\d+) known, (\d+) processed, (\d+) quarantined", done.stdout, re.M)
     return tuple(map(int, found.groups())) if found else None
 
@@ -44,7 +44,7 @@ def said(done):
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory, repository):
     folder = tmp_path_factory.mktemp("diagnosed")
-    config = small.lay_out(folder, repository)
+    config = small.write_configuration(folder, repository)
     small.write_hammer_tests(folder, small.soft_pad)
     (config / "turnouts.tsv").write_text("turnout\tlayout\nt1\tsmall\nt2\tsmall\nt3\tsmall\n")
     for name in ("t2", "t3"):
@@ -53,14 +53,14 @@ def fleet(tmp_path_factory, repository):
     return folder
 
 
-def test_nobody_is_diagnosed_unasked(fleet):
-    assert said(run(fleet)) is None
+def test_no_turnout_is_diagnosed_without_a_request(fleet):
+    assert counts(run(fleet)) is None
     assert not (fleet / "work/mismatch").exists()
 
 
-def test_asked_for_all_are_diagnosed_and_a_fault_stops_nobody(fleet):
+def test_all_turnouts_are_diagnosed_on_request_and_a_fault_affects_only_its_turnout(fleet):
     done = run(fleet, "diagnose=true")
-    assert said(done) == (3, 3, 1)
+    assert counts(done) == (3, 3, 1)
     rows = toy.rows(fleet)
     assert {r[1] for r in rows["mismatch_findings"]} == {"t1", "t2"}
     assert any("toy fault" in str(r) and "internal_error" in r for r in rows["quarantine"])
@@ -68,26 +68,26 @@ def test_asked_for_all_are_diagnosed_and_a_fault_stops_nobody(fleet):
 
 
 def test_a_second_run_diagnoses_nothing(fleet):
-    assert (said(run(fleet, "diagnose=true")) or (3, 0, 0))[1] == 0
+    assert (counts(run(fleet, "diagnose=true")) or (3, 0, 0))[1] == 0
 
 
-def test_an_accepted_term_is_a_new_diagnosis_of_its_turnout_alone(fleet):
+def test_an_accepted_effect_causes_a_new_diagnosis_of_its_turnout_only(fleet):
     text = (fleet / "config/tracks/small.yaml").read_text()
     (fleet / "config/tracks/t2.yaml").write_text(text + TERMS)
-    assert said(run(fleet, "diagnose=true"))[1] == 1
+    assert counts(run(fleet, "diagnose=true"))[1] == 1
     rows = toy.rows(fleet)["mismatch_parameters"]
     assert any("t2" in r and True in r for r in rows)
 
 
-def test_a_setting_asks_for_one_turnout_alone(fleet):
+def test_a_setting_requests_the_diagnosis_of_one_turnout_only(fleet):
     (fleet / "config/overrides").mkdir()
     (fleet / "config/overrides/t2.yaml").write_text("settings: {mismatch: {enabled: true}}\n")
     done = run(fleet)
-    assert said(done)[:2] == (1, 1)
+    assert counts(done)[:2] == (1, 1)
 
 
-def test_a_new_campaign_is_a_new_visit_and_the_old_one_stays(fleet):
+def test_a_new_campaign_is_a_new_visit_and_the_old_visit_is_kept(fleet):
     small.write_hammer_tests(fleet, small.soft_pad, day=small.DAY.replace(month=9), seed=9, turnout="t2")
-    assert said(run(fleet))[1] == 1
+    assert counts(run(fleet))[1] == 1
     found = {r for r in toy.rows(fleet)["mismatch_findings"] if "t2" in r}
     assert {v for r in found for v in r} >= {"2026-07-25", "2026-09-25"}

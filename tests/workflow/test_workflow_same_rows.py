@@ -1,4 +1,4 @@
-"""The registry does not depend on shards, cores, checkpoints or kills."""
+"""The registry does not depend on the numbers of shards and cores, on checkpoints or on kills."""
 
 import random
 import subprocess
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 ALGO = "toy_fleet:unit"
 
 
-# One fleet goes through the tests of this file in their order: workers take whole files.
+# The tests of this file use one fleet in their order, as a worker runs all tests of a file.
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +37,13 @@ def fleet(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def undisturbed(fleet):
-    toy.forget(fleet)
+    toy.remove_outputs(fleet)
     toy.run(fleet, shards=1, cores=1, check=False)
     return toy.data_files(fleet)
 
 
-def without_engine(folder, shards, threads):
-    """The same steps as the workflow's, called one after another."""
+def run_without_snakemake(folder, shards, threads):
+    """The steps of the workflow, called one after another."""
     from turnout import __version__
 
     configuration, raw = load_configuration(folder / "config"), folder / "raw"
@@ -58,50 +58,50 @@ def without_engine(folder, shards, threads):
     )  # fmt: skip
 
 
-def test_a_run_leaves_data(undisturbed):
+def test_a_run_writes_data(undisturbed):
     assert {"recordings", "impacts", "quarantine", "turnouts", "campaigns"} <= {table for table, _ in undisturbed}
 
 
 @pytest.mark.parametrize("shards, threads", [(7, 2), (64, 1)])
-def test_shards_and_cores_change_no_byte(fleet, undisturbed, shards, threads):
-    toy.forget(fleet)
-    without_engine(fleet, shards, threads)
+def test_the_numbers_of_shards_and_cores_change_no_byte(fleet, undisturbed, shards, threads):
+    toy.remove_outputs(fleet)
+    run_without_snakemake(fleet, shards, threads)
     assert toy.data_files(fleet) == undisturbed
 
 
-def test_the_engine_with_two_cores_and_seven_shards_changes_no_byte(fleet, undisturbed):
-    toy.forget(fleet)
+def test_snakemake_with_two_cores_and_seven_shards_changes_no_byte(fleet, undisturbed):
+    toy.remove_outputs(fleet)
     toy.run(fleet, shards=7, cores=2, check=False)
     assert toy.data_files(fleet) == undisturbed
 
 
-def test_a_campaign_moved_to_its_right_day_counts_once(tmp_path):
+def test_a_campaign_that_is_moved_to_its_correct_day_is_used_once(tmp_path):
     folder = toy.make(tmp_path, n_turnout=1, n_section=1)
-    without_engine(folder, shards=1, threads=1)
+    run_without_snakemake(folder, shards=1, threads=1)
     campaigns = folder / "raw/T00000/hammer"
     (campaigns / "2024-01-01").rename(campaigns / "2024-01-02")
-    without_engine(folder, shards=1, threads=1)
+    run_without_snakemake(folder, shards=1, threads=1)
     with open_registry(folder / "results/registry") as connection:
         for table in ("recordings_current", "impacts_current"):
-            asked = f"select distinct campaign_id from {table}"
-            assert connection.execute(asked).fetchall() == [("T00000/2024-01-02",)]
+            query = f"select distinct campaign_id from {table}"
+            assert connection.execute(query).fetchall() == [("T00000/2024-01-02",)]
 
 
-def test_kills_at_random_moments_change_no_byte(fleet, undisturbed):
-    toy.forget(fleet)
+def test_kills_at_random_times_change_no_byte(fleet, undisturbed):
+    toy.remove_outputs(fleet)
     (fleet / "config/config.yaml").write_text("fleet: {checkpoint_units: 2}\n")
     (fleet / "pause").write_text("0.1")
     moments = random.Random(20171001)
     for _ in range(3):
-        killed_after(fleet, moments.uniform(2.0, 7.0))
+        kill_after(fleet, moments.uniform(2.0, 7.0))
     (fleet / "pause").unlink()
     nightly(fleet)
     (fleet / "config/config.yaml").write_text("")
     assert toy.data_files(fleet) == undisturbed
 
 
-def killed_after(folder, seconds):
-    """Start a run, kill it and all its jobs without warning."""
+def kill_after(folder, seconds):
+    """Start a run, and kill it and all its jobs after a time."""
     run = subprocess.Popen(
         nightly_command(), cwd=folder, env=toy.environment(), start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

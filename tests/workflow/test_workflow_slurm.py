@@ -1,4 +1,4 @@
-"""The same workflow on a real Slurm: the same registry as on one machine, and a cancelled job is tried again."""
+"""The workflow on a real Slurm: the same registry as on one machine, and a cancelled job is tried again."""
 
 import importlib.util
 import shutil
@@ -22,7 +22,7 @@ FAST = ("--slurm-init-seconds-before-status-checks", "3", "--latency-wait", "20"
 
 @pytest.fixture(scope="module")
 def slurm(tmp_path_factory):
-    # the socket's path must stay below 108 characters
+    # the path of the socket must be shorter than 108 characters
     folder = tmp_path_factory.mktemp("s")
     with private_slurm.Slurm(folder) as running:
         yield running
@@ -41,24 +41,24 @@ def test_slurm_gives_the_same_registry_and_a_cancelled_job_is_tried_again(slurm,
         | slurm.environment
         | {"PATH": f"{slurm.base}/bin:{toy.environment()['PATH']}:{private_slurm.SBIN}"}
     )
-    # each unit takes its time, so that there is a job to cancel
+    # each unit waits, so that there is a job to cancel
     (cluster / "pause").write_text("3")
-    with open(cluster / "said", "w") as said:
-        run = subprocess.Popen(command, cwd=cluster, env=environment, stdout=said, stderr=subprocess.STDOUT)
+    with open(cluster / "said", "w") as output:
+        run = subprocess.Popen(command, cwd=cluster, env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
             cancelled = cancel_one(slurm)
             assert run.wait(170) == 0, (cluster / "said").read_text()
         finally:
             run.kill()
-    said = (cluster / "said").read_text()
-    assert cancelled in said and "Trying to restart job" in said
+    output = (cluster / "said").read_text()
+    assert cancelled in output and "Trying to restart job" in output
     assert toy.data_files(cluster) == toy.data_files(here)
     again = subprocess.run(command, cwd=cluster, env=environment, capture_output=True, text=True, timeout=100)
     assert "Nothing to be done" in again.stdout + again.stderr
 
 
 def cancel_one(slurm):
-    """Cancel the first job that runs; its id."""
+    """Cancel the first job that runs; return its id."""
     end = time.monotonic() + 60
     while time.monotonic() < end:
         running = slurm.call("squeue", "-h", "-t", "R", "-o", "%i").split()

@@ -1,4 +1,4 @@
-"""What a test starts in the background ends with it, also where the test is ended by force."""
+"""Background processes of a test end with it, also if the test is killed."""
 
 import os
 import signal
@@ -9,7 +9,7 @@ from pathlib import Path
 import private_slurm
 
 
-def test_daemons_end_though_their_test_is_killed(tmp_path):
+def test_daemons_end_if_their_test_is_killed(tmp_path):
     daemon = subprocess.Popen(["sleep", "600"], start_new_session=True)
     (tmp_path / "daemon.pid").write_text(f"{daemon.pid}\n")
     code = (

@@ -1,4 +1,4 @@
-"""The workflow's files keep to their style, and the plans they make can be trusted by a person who reads them."""
+"""The files of the workflow keep to their style, and profiles and default stages are used."""
 
 import re
 import subprocess
@@ -9,7 +9,7 @@ import toy_fleet as toy
 
 RULES = sorted((toy.REPOSITORY / "rules").glob("*.smk"))
 SCRIPTS = sorted((toy.REPOSITORY / "scripts").glob("*.py"))
-# Every script job costs an environment of its own there; here all share one.
+# Elsewhere every script job may have its own environment; here all jobs share one.
 ALLOWED = "Specify a conda environment or container for each rule."
 
 
@@ -36,7 +36,7 @@ def test_every_rule_has_log_benchmark_resources_and_no_code(path):
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.name)
-def test_every_script_is_thin(path):
+def test_every_script_is_short(path):
     lines = path.read_text().splitlines()
     assert len(lines) <= 25 and lines[0].startswith('"""')
 
@@ -44,19 +44,19 @@ def test_every_script_is_thin(path):
 @pytest.mark.parametrize(
     ("file", "rule", "result"), [("report", "report", "pages/index.html"), ("trend", "worklist", "worklist.csv")]
 )
-def test_a_job_that_fails_leaves_what_the_day_before_has_made(file, rule, result):
-    """Snakemake removes the output of a job before it begins and where it fails, but for what is to be updated."""
+def test_a_failed_job_keeps_the_output_of_the_day_before(file, rule, result):
+    """Snakemake removes the output of a job before it starts and if it fails, except outputs to be updated."""
     text = (toy.REPOSITORY / "rules" / f"{file}.smk").read_text()
     assert f'update("results/{result}")' in text and f'again=attempts("{rule}")' in text
 
 
 def test_profiles_are_read(tmp_path):
     folder = toy.make(tmp_path, n_turnout=1)
-    said = toy.run(folder, "--dry-run").stdout
-    assert "profiles/default" in said and "hammer" in said
+    output = toy.run(folder, "--dry-run").stdout
+    assert "profiles/default" in output and "hammer" in output
 
 
 def test_the_stage_of_the_program_is_the_default(tmp_path):
     folder = toy.make(tmp_path, n_turnout=1)
-    said = toy.run(folder, "--dry-run", "--printshellcmds", function=None, target=None).stdout
-    assert "rule hammer" in said
+    output = toy.run(folder, "--dry-run", "--printshellcmds", function=None, target=None).stdout
+    assert "rule hammer" in output

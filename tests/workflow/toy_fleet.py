@@ -1,4 +1,4 @@
-"""A fleet of tiny raw files, and a function that only reads them: real workflow, hardly any computing."""
+"""A fleet of tiny raw files, and a stage function that only reads them: the real workflow with little computation."""
 
 import hashlib
 import json
@@ -36,7 +36,7 @@ hammer:
 
 
 def unit(unit, turnout, raw_root, algo=""):
-    """Toy function: read every file, one row for it, one row per record."""
+    """Read every file; give one row for the file and one row per record."""
     from turnout.stages.raw_files import read_or_quarantine, recording_row
 
     base = {
@@ -59,7 +59,7 @@ def unit(unit, turnout, raw_root, algo=""):
 
 
 def nothing(unit, turnout, raw_root, algo=""):
-    """A function that gives no row at all: what is left is the workflow's own work."""
+    """Function that gives no row: only the work of the workflow remains."""
     return {}
 
 
@@ -90,16 +90,16 @@ def raw_bytes(seed, folder, **changes):
 
 
 def damages(folder):
-    """Ten ways in which a file is damaged: name -> (bytes, reason in quarantine, whether a sound record is left)."""
-    sound = raw_bytes(99, folder)
+    """Ten kinds of damage of a file: name -> (bytes, reason in quarantine, whether a valid record remains)."""
+    valid = raw_bytes(99, folder)
     ok = np.random.default_rng(5).normal(size=(2, N_SAMPLE))
     nan, dead = ok.copy(), ok.copy()
     nan[1, 3], dead[1] = np.nan, 3.0
     return {
         "empty": (b"", "empty", False),
-        "half copied": (sound[: len(sound) // 2], "unreadable", False),
+        "half copied": (valid[: len(valid) // 2], "unreadable", False),
         "not of its format": (np.random.default_rng(3).bytes(600), "unreadable", False),
-        "a byte flipped": (_flip(sound), "unreadable", True),
+        "a byte flipped": (_flip(valid), "unreadable", True),
         "wrong rate": (raw_bytes(11, folder, fs=4000.0), "wrong_rate", False),
         "channel missing": (raw_bytes(12, folder, channels=np.array(["force", "wheel"])), "channel_missing", False),
         "not a number": (raw_bytes(13, folder, record_001=nan), "not_finite", True),
@@ -110,7 +110,7 @@ def damages(folder):
 
 
 def _flip(content):
-    """One bit changed in the samples of the last record: the archive's checksum no longer fits."""
+    """Change one bit in the samples of the last record: the checksum of the archive no longer agrees."""
     at = content.index(b"record_001.npy") + 200
     return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
 
@@ -120,7 +120,7 @@ def labels(n):
 
 
 def make(folder, n_turnout=6, n_section=2, n_campaign=1, n_test=1, config=""):
-    """Configuration and raw files of a fleet."""
+    """Write the configuration and the raw files of a fleet."""
     folder = Path(folder)
     for sub in ("config/layouts", "raw"):
         (folder / sub).mkdir(parents=True, exist_ok=True)
@@ -140,7 +140,7 @@ def make(folder, n_turnout=6, n_section=2, n_campaign=1, n_test=1, config=""):
 
 
 def add_raw(folder, turnout, n_section=2, n_campaign=1, n_test=1, first=0):
-    """Raw files and campaigns.csv of one turnout."""
+    """Write the raw files and campaigns.csv of one turnout."""
     base = Path(folder) / "raw" / turnout
     base.mkdir(parents=True, exist_ok=True)
     days = [f"2024-{1 + k % 12:02d}-{1 + k // 12:02d}" for k in range(first + n_campaign)]
@@ -162,7 +162,7 @@ def campaigns_csv(days):
 
 
 def environment():
-    """Environment of a run: this interpreter's programs come first in the path."""
+    """Environment of a run: the programs of this interpreter are first in the path."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     more = {"PATH": path, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     return os.environ | more
@@ -179,10 +179,10 @@ def command(*options, cores=2, shards=1, function="toy_fleet:unit", target="work
 
 
 def run(folder, *options, check=True, **more):
-    """Run the workflow in ``folder``; the completed process with what it said in ``stdout``.
+    """Run the workflow in ``folder``; return the completed process with its output in ``stdout``.
 
-    Snakemake and the scripts of its jobs run in forks of processes that have imported what they need, which costs more
-    than a whole run of a toy fleet. The nights in these tests and the tutorial start new interpreters.
+    Snakemake and the scripts of its jobs run in forks of processes that have imported all they need, as imports take
+    longer than a whole run of a toy fleet. The nightly runs in these tests and the tutorial start new interpreters.
     """
     words, output = command(*options, **more), Path(folder) / ".output"
     process = FORKS.Process(target=snakemake, args=(words[3:], str(folder), str(output), environment()))
@@ -206,7 +206,7 @@ FORKS.set_forkserver_preload(
 
 
 def snakemake(words, folder, output, variables):
-    """What ``python -m snakemake`` does, in ``folder`` and with its output in a file."""
+    """Do the same as ``python -m snakemake``, in ``folder`` and with the output in a file."""
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(variables)
@@ -217,7 +217,7 @@ def snakemake(words, folder, output, variables):
     from snakemake.script import PythonScript
 
     with Listener(family="AF_UNIX") as listener:
-        # Snakemake has threads, from which no process is forked: this one has none.
+        # Snakemake has threads, so its process must not be forked; this process has no threads.
         server = os.fork()
         if server == 0:
             serve_scripts(listener)
@@ -230,7 +230,7 @@ def snakemake(words, folder, output, variables):
 
 
 def execute_script(job, address, path, edit=False):
-    """Instead of Snakemake's method: the server runs the script, and this raises what a new interpreter would cause."""
+    """Replace the method of Snakemake: the server runs the script; raise the error of a new interpreter."""
     from snakemake.benchmark import benchmarked
 
     with Client(address) as connection:
@@ -242,7 +242,7 @@ def execute_script(job, address, path, edit=False):
 
 
 def serve_scripts(listener):
-    """Run each script that a client asks for in a fork; the answers are its process and at its end its exit code."""
+    """Run each script that a client requests in a fork; send its process number, and at its end its exit code."""
     signal.signal(signal.SIGCHLD, lambda *_: os.waitpid(-1, os.WNOHANG))
     while True:
         connection = listener.accept()
@@ -258,7 +258,7 @@ def serve_scripts(listener):
 
 
 def run_script(path):
-    """Exit code of the script. A traceback is not kept, since its frames would keep a pool of processes open."""
+    """Exit code of the script. A traceback is not kept, as its frames would keep a pool of processes open."""
     try:
         runpy.run_path(path, run_name="__main__")
     except SystemExit as end:
@@ -291,7 +291,7 @@ def _descendants(pid):
 
 
 def rows(folder):
-    """Rows of every table of the registry but ``runs``, sorted, without the columns that name the run."""
+    """Rows of every table of the registry except ``runs``, sorted, without the columns that identify the run."""
     import duckdb
 
     found = {}
@@ -304,12 +304,12 @@ def rows(folder):
 
 
 def data_files(folder):
-    """(table, sha256) of every data file of the registry but those of ``runs``."""
+    """(table, sha256) of every data file of the registry except those of ``runs``."""
     generation = json.loads((Path(folder) / "results/registry/_generation.json").read_text())
     return sorted((f["table"], f["sha256"]) for f in generation["files"] if f["table"] != "runs")
 
 
-def forget(folder):
-    """Remove all that a run made."""
+def remove_outputs(folder):
+    """Remove everything that a run wrote."""
     for name in ("work", "results", "logs", ".snakemake"):
         shutil.rmtree(Path(folder) / name, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""A script that imports a module by its former name is told the present one."""
+"""A script that imports a module by its former name gets an error with the present name."""
 
 from importlib import import_module
 
@@ -22,18 +22,18 @@ def test_the_error_names_the_present_module(former, now):
         import_module(former)
 
 
-def test_a_name_taken_from_a_former_package_is_told_where_it_is():
+def test_the_error_of_an_import_from_a_former_package_names_the_present_package():
     with pytest.raises(ImportError, match=r"Import modes_of_frf from turnout\.modal instead"):
         from turnout.identify import modes_of_frf  # noqa: F401
 
 
-def test_a_module_that_never_existed_is_simply_not_found():
+def test_a_module_that_never_existed_gives_the_usual_error():
     with pytest.raises(ModuleNotFoundError, match=r"No module named .turnout\.nothing."):
         import_module("turnout.nothing")
 
 
 def test_every_present_name_in_the_table_exists(repository):
-    """The table cannot go stale: each module that it names is there."""
+    """Every module that the table names exists, so the table cannot become outdated."""
     for former, now in former_names().items():
         root = repository if now.split(".")[0] in ("benchmarks", "examples", "tests") else repository / "src"
         path = root.joinpath(*now.split("."))

@@ -1,4 +1,4 @@
-"""What ``import turnout`` offers: the names, their page, the five lines of the README, errors and short texts."""
+"""The public interface of ``import turnout``: names, reference page, the example of the README, errors and texts."""
 
 import ast
 import inspect
@@ -28,7 +28,7 @@ SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
-    """Folder with the file of the example, and the variables that its lines leave behind."""
+    """Folder with the file of the example, and the variables after its lines have run."""
     folder = tmp_path_factory.mktemp("example")
     reference_page.write_example_file(folder / "OT_1.uff")
     with pytest.MonkeyPatch.context() as patch:
@@ -48,7 +48,7 @@ def pair(n=200, **fields):
 # Names
 
 
-def test_importing_turnout_loads_none_of_its_names():
+def test_importing_turnout_loads_no_other_module():
     code = "import sys, turnout; print([m for m in sys.modules if m.split('.')[0] in ('numpy', 'typing', 'matplotlib') "
     code += "or m.startswith('turnout.')])"
     output = subprocess.run([sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}\n{code}"],
@@ -56,7 +56,7 @@ def test_importing_turnout_loads_none_of_its_names():
     assert output.strip() == "[]"
 
 
-def test_names_page_and_type_stubs_agree(repository):
+def test_names_reference_page_and_type_stubs_agree(repository):
     page = (repository / "docs" / "api.md").read_text(encoding="utf-8")
     on_page = re.findall(r"^### turnout\.(\w+)$", page, re.MULTILINE)
     tree = ast.parse((repository / "src" / "turnout" / "__init__.py").read_text(encoding="utf-8"))
@@ -69,7 +69,7 @@ def test_names_page_and_type_stubs_agree(repository):
     assert set(turnout.__all__) <= set(dir(turnout))
 
 
-def test_the_page_follows_the_docstrings(repository):
+def test_the_reference_page_is_up_to_date_with_the_docstrings(repository):
     assert (repository / "docs" / "api.md").read_text(encoding="utf-8") == reference_page.page()
 
 
@@ -88,7 +88,7 @@ def test_an_unknown_name_is_an_attribute_error():
         turnout.identify  # noqa: B018
 
 
-def test_the_function_receptance_survives_a_script_that_asks_for_the_former_package():
+def test_the_function_receptance_stays_callable_after_an_import_of_the_former_package():
     code = """
 import turnout
 for line in ("from turnout.receptance.estimators import h1", "from turnout.receptance import find_impacts"):
@@ -112,7 +112,7 @@ def test_the_readme_and_the_page_show_the_five_lines_that_are_run(repository):
     assert len([line for line in reference_page.EXAMPLE.splitlines() if line]) == 5
 
 
-def test_five_lines_lead_from_a_file_to_modes_with_errors_and_a_figure(example, repository):
+def test_the_five_lines_compute_modes_with_standard_errors_and_a_figure_from_a_file(example, repository):
     folder, variables = example
     model, impacts = variables["model"], variables["impacts"]
     assert model.status == "accepted" and [mode.band for mode in model.modes] == ["ballast", "railpad"]
@@ -126,7 +126,7 @@ def test_five_lines_lead_from_a_file_to_modes_with_errors_and_a_figure(example, 
     assert re.sub(r"\d+(\.\d+)?", "#", shown) == re.sub(r"\d+(\.\d+)?", "#", repr(model))
 
 
-def test_the_modes_are_those_of_the_nightly_run(example):
+def test_the_modes_equal_those_of_the_nightly_run(example):
     from turnout.config.settings.identify import IdentifySettings
     from turnout.hammer_test import find_impacts, receptance_of
     from turnout.modal import identify
@@ -151,7 +151,7 @@ def test_axes_have_units_and_the_figure_shows_every_impact(example):
     assert impacts and receptance.get_xscale() == receptance.get_yscale() == "log"
 
 
-def test_a_receptance_draws_its_coherence_and_a_recording_its_channels(example):
+def test_the_plot_of_a_receptance_has_its_coherence_and_that_of_a_recording_its_channels(example):
     variables = example[1]
     magnitude, coherence = turnout.receptance(variables["impacts"]).plot()
     assert magnitude.get_ylabel() == "receptance [m/N]" and coherence.get_ylabel() == "coherence [-]"
@@ -160,7 +160,7 @@ def test_a_receptance_draws_its_coherence_and_a_recording_its_channels(example):
     assert acceleration.get_xlabel() == "time [s]"
 
 
-def test_a_figure_that_is_given_is_drawn_into(example):
+def test_plots_are_drawn_into_a_given_figure(example):
     from matplotlib.figure import Figure
 
     figure = Figure(layout="constrained")
@@ -169,7 +169,7 @@ def test_a_figure_that_is_given_is_drawn_into(example):
     assert len(axes) == 5 and all(one.get_figure(root=True) is figure for one in axes)
 
 
-def test_a_model_without_modes_draws_its_reason():
+def test_the_plot_of_a_model_without_modes_states_the_reason():
     model = turnout.identify_modes(turnout.find_impacts(pair()))
     assert model.status == "rejected" and repr(model).endswith(
         "0 of 1 impacts accepted, 3 needed; rejected for no_impact)"
@@ -181,7 +181,7 @@ def test_a_model_without_modes_draws_its_reason():
 # Texts
 
 
-def test_every_result_prints_in_one_line(example, repository):
+def test_the_repr_of_every_result_is_one_line(example, repository):
     variables = example[1]
     model, impacts, recordings = (variables[name] for name in ("model", "impacts", "recordings"))
     many = Recording(np.zeros((9, 10)), 1e3, tuple(Channel(f"sensor_{k}", "acceleration") for k in range(9)), "passage")
@@ -199,14 +199,14 @@ def test_every_result_prints_in_one_line(example, repository):
     assert findings.frame().loc[0, "sections"] == "A7+A8" and findings.sentences == ("sections A7+A8: ...",)
 
 
-def test_a_rejected_impact_says_why():
+def test_the_repr_of_a_rejected_impact_states_the_reason():
     impacts = turnout.find_impacts([pair(), pair()])
     assert isinstance(impacts, Impacts) and impacts.usable == ()
     assert repr(impacts) == "Impacts(2: 0 accepted, 2 rejected: impact 1 no_impact, 2 no_impact)"
     assert repr(impacts[0]) == "Impact(record 1, rejected: no_impact)"
 
 
-def test_a_model_with_one_mode_says_what_is_missing():
+def test_the_repr_of_a_model_with_one_mode_states_what_is_missing():
     empty = np.zeros(0)
     reason = Rejection("not_identified", detail="ballast band holds no stable mode")
     model = ModalModel(np.zeros((0, 0)), empty, empty, 1e3, (), status="second_order_only", rejections=(reason,))
@@ -216,7 +216,7 @@ def test_a_model_with_one_mode_says_what_is_missing():
 # Read
 
 
-def test_a_file_without_units_needs_its_channels_described(tmp_path):
+def test_a_file_without_units_needs_a_description_of_its_channels(tmp_path):
     path = tmp_path / "test.npz"
     np.savez(path, hammer=np.array([0.0, 1.0, 0.0]), rail=np.array([0.0, 2.0, 1.0]), fs=1000.0)
     with pytest.raises(
@@ -230,7 +230,7 @@ def test_a_file_without_units_needs_its_channels_described(tmp_path):
 
 
 @pytest.mark.parametrize("names", [("Beschleunigung", "Kraft"), ("accelerometer 3", "rail")])
-def test_a_unit_that_is_not_that_of_the_name_needs_a_description(tmp_path, names):
+def test_a_channel_whose_unit_and_name_disagree_needs_a_description(tmp_path, names):
     path = tmp_path / "test.npz"
     np.savez(path, **dict(zip(names, np.eye(2, 3))), fs=1000.0, units=np.array(["N", "m/s²"]), channels=np.array(names))
     with pytest.raises(ReadError, match=f"channel '{names[0]}': its unit 'N' is one of force, and its name says accel"):
@@ -238,7 +238,7 @@ def test_a_unit_that_is_not_that_of_the_name_needs_a_description(tmp_path, names
     assert turnout.read(path, channels=dict(zip(names, ("force", "acceleration"))), kind="passage").recordings
 
 
-def test_a_channel_without_real_numbers_says_what_it_holds(tmp_path):
+def test_the_error_of_a_channel_with_complex_numbers_states_what_it_contains(tmp_path):
     path = tmp_path / "test.npz"
     np.savez(path, force=np.arange(100) + 1j, rail=np.random.default_rng(1).normal(size=100), fs=1000.0)
     with pytest.raises(ReadError, match=r"test\.npz, the channels: the channel 'force' holds complex numbers"):
@@ -264,7 +264,9 @@ def test_only_the_channels_that_differ_need_a_description(tmp_path):
         ({"format": "tdms"}, r"a\.h5"),
     ],
 )
-def test_what_contradicts_the_file_is_a_read_error_with_the_path_as_given(tmp_path, monkeypatch, options, message):
+def test_an_option_that_contradicts_the_file_is_a_read_error_with_the_path_as_given(
+    tmp_path, monkeypatch, options, message
+):
     write([pair()], tmp_path / "a.h5", "hdf5")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ReadError, match=message) as caught:
@@ -306,7 +308,7 @@ def test_a_layout_describes_the_files_of_its_sections(tmp_path, repository):
     turnout_s1 = turnout.load_configuration(repository / "config").turnout("tommerup_s1")
     assert turnout.read(path, layout=turnout_s1, section="A7")[9].channels == result[9].channels
     with pytest.raises(ReadError, match="there is no channel"):
-        turnout.read(path, layout=layout)  # a file of passages has other channels
+        turnout.read(path, layout=layout)  # passage files have other channels
     with pytest.raises(ConfigError, match=r"tommerup\.yaml, section: there is no section 'X9'\. Write one of OT, SP"):
         turnout.read(path, layout=layout, section="X9")
     with pytest.raises(ConfigError, match=r"none\.yaml, the path: there is no such file"):
@@ -341,7 +343,7 @@ def test_spikes_in_a_hammer_test_are_replaced_and_a_warning_states_them(caplog):
     assert "OT_1.uff, record 1: hammer: 1 sample replaced, the first at 0.120 s" in caplog.text
 
 
-def test_which_of_several_channels_is_meant_must_be_said():
+def test_the_caller_must_choose_one_of_several_channels():
     samples = np.zeros((3, 50))
     channels = Channel("hammer", "force"), Channel("acc_1", "acceleration"), Channel("acc_2", "acceleration")
     recording = Recording(samples, 1e3, channels)
@@ -383,7 +385,7 @@ def test_a_passage_needs_positions_and_one_train():
         turnout.analyse_passage(hour)
 
 
-def test_settings_rule_a_simulated_hammer_test():
+def test_a_simulated_hammer_test_follows_the_settings():
     settings = SimulateSettings(rate=10e3, hammer_duration=0.05, hammer_half_length=6.0)
     (recording,) = turnout.simulate_hammer(uniform_track(30.0), 15.0, impacts=1, settings=settings)
     assert recording.rate == 10e3 and recording.n_sample == 500
@@ -391,7 +393,7 @@ def test_settings_rule_a_simulated_hammer_test():
         turnout.simulate_hammer("tommerup", "X9")
 
 
-def test_accepted_effects_of_a_track_file_act(tmp_path, repository):
+def test_accepted_effects_of_a_track_file_change_the_simulation(tmp_path, repository):
     tracks = repository / "config" / "tracks"
     heavy = tmp_path / "heavy.yaml"
     heavy.write_text(
@@ -440,7 +442,7 @@ def registry_folder(tmp_path_factory):
     return root
 
 
-def test_a_registry_answers_in_data_frames_and_is_read_only(registry_folder):
+def test_a_registry_returns_data_frames_and_is_read_only(registry_folder):
     with turnout.open_registry(registry_folder) as registry:
         assert {"recordings", "modes", "worklist"} <= set(registry.tables)
         assert registry.sql("select ? + 1 as n", [2]).loc[0, "n"] == 3
@@ -453,13 +455,13 @@ def test_a_registry_answers_in_data_frames_and_is_read_only(registry_folder):
     assert repr(registry) == f"Registry({registry_folder}, closed)"
 
 
-def test_a_folder_without_registry_is_said(tmp_path):
+def test_a_folder_without_a_registry_is_an_error(tmp_path):
     with pytest.raises(RegistryError, match="there is no registry here"):
         turnout.open_registry(tmp_path)
 
 
-def test_the_package_of_the_names_is_thin():
-    """The functions call those of the packages: none of them computes."""
+def test_the_package_of_the_public_names_does_not_compute():
+    """The functions call those of other packages: no module imports numpy."""
     folder = Path(inspect.getfile(Impacts)).parent
     for path in folder.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -467,7 +469,7 @@ def test_the_package_of_the_names_is_thin():
 
 
 @pytest.mark.parametrize("call", [turnout.receptance, turnout.identify_modes, turnout.diagnose])
-def test_a_wrong_kind_of_object_is_named_with_what_is_needed(call):
+def test_the_error_of_a_wrong_type_of_argument_states_the_type_that_is_needed(call):
     recording = Recording(np.zeros((1, 10)), 1e3, (Channel("A7", "acceleration"),))
     with pytest.raises(TypeError, match=r"impacts, as turnout\.find_impacts gives them|the id of a turnout"):
         call([recording])

@@ -1,4 +1,4 @@
-"""``turnout check --read`` names files whose content contradicts what they are filed under, and rows of the future."""
+"""``turnout check --read`` reports files whose content contradicts their folder or name, and dates in the future."""
 
 import shutil
 from datetime import UTC, datetime, timedelta
@@ -47,12 +47,12 @@ def check_output(capsys):
     return main(["check", "--read"]), capsys.readouterr().out
 
 
-def test_files_in_their_places_agree(project, capsys):
+def test_files_in_the_right_folders_are_reported_to_agree(project, capsys):
     _, printed = check_output(capsys)
     assert "W1, A7: " in printed and printed.count(": agrees: ") == 2
 
 
-def test_a_file_of_another_year_is_named(project, capsys):
+def test_a_file_that_was_recorded_in_another_year_is_reported(project, capsys):
     (project / f"raw/W1/hammer/{DAY}").rename(project / "raw/W1/hammer/2025-05-13")
     (project / "raw/W1/campaigns.csv").write_text(f"{HEAD}2025-05-13,2025-05-13T09:00:00,15\n")
     code, printed = check_output(capsys)
@@ -61,7 +61,7 @@ def test_a_file_of_another_year_is_named(project, capsys):
 
 
 @pytest.mark.parametrize("copy", [f"W1/hammer/{DAY}/A8_1.csv", f"W2/hammer/{DAY}/A7_1.csv"])
-def test_a_copy_of_the_file_of_another_section_or_turnout_is_named(project, capsys, copy):
+def test_a_copy_of_the_file_of_another_section_or_turnout_is_reported(project, capsys, copy):
     (project / "raw" / copy).parent.mkdir(parents=True, exist_ok=True)
     shutil.copy(project / f"raw/W1/hammer/{DAY}/A7_1.csv", project / "raw" / copy)
     code, printed = check_output(capsys)
@@ -69,13 +69,13 @@ def test_a_copy_of_the_file_of_another_section_or_turnout_is_named(project, caps
 
 
 @pytest.mark.parametrize("noted, is_named", [(59, True), (20, False), (-2, True)])
-def test_a_temperature_that_differs_from_that_of_the_file_is_named(project, capsys, noted, is_named):
+def test_a_temperature_that_differs_from_that_of_the_file_is_reported(project, capsys, noted, is_named):
     (project / "raw/W1/campaigns.csv").write_text(f"{HEAD}{DAY},{DAY}T09:00:00,{noted}\n")
     _, printed = check_output(capsys)
     assert (f"its rail temperature is 15 °C, that in campaigns.csv {noted} °C" in printed) == is_named
 
 
-def test_a_fault_of_all_impacts_is_one_line_that_names_the_key_to_change(project, capsys):
+def test_a_fault_of_all_impacts_is_one_line_that_states_the_key_to_change(project, capsys):
     layout = project / "config/layouts/own.yaml"
     text = layout.read_text(encoding="utf-8")
     layout.write_text(text.replace("quantity: force", "quantity: force\n      sign: -1", 1), encoding="utf-8")
@@ -84,7 +84,7 @@ def test_a_fault_of_all_impacts_is_one_line_that_names_the_key_to_change(project
     assert printed.count("Look at 'sign' of 'hammer': -1 reverses it") == 2
 
 
-def test_a_campaign_and_a_train_of_the_future_are_named(project, capsys):
+def test_a_campaign_and_a_train_with_future_dates_are_reported(project, capsys):
     (project / "raw/W1/campaigns.csv").write_text(f"{HEAD}{DAY},{DAY}T09:00:00,15\n2098-05-13,2098-05-13T09:00:00,15\n")
     (project / "raw/W1/trains.csv").write_text("passed_at_utc,train_type\n2098-05-13T10:00:00,IC3\n")
     layout = project / "config/layouts/own.yaml"
@@ -97,6 +97,6 @@ def test_a_campaign_and_a_train_of_the_future_are_named(project, capsys):
     assert "trains.csv, column passed_at_utc: a train at 2098-05-13T10:00:00, in the future" in printed
 
 
-def test_tomorrow_in_another_time_zone_is_not_the_future():
+def test_a_time_of_tomorrow_in_another_time_zone_is_not_in_the_future():
     now = datetime.now(UTC).replace(tzinfo=None)
     assert not is_future(now + timedelta(hours=14)) and is_future(now + timedelta(days=2))

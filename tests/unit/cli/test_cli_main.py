@@ -1,4 +1,4 @@
-"""What holds for every command: groups, JSON, quiet, exit codes, messages, completion, former options."""
+"""Rules of all commands: groups, JSON, quiet, exit codes, messages, completion, former options."""
 
 import json
 import re
@@ -42,7 +42,7 @@ def test_help_lists_each_command_once_in_its_group():
 
 
 @pytest.mark.parametrize("leaf", [*leaf_parsers(PARSER)], ids=lambda leaf: leaf.prog)
-def test_the_usage_of_a_command_begins_as_it_is_typed(leaf):
+def test_the_usage_of_a_command_begins_with_the_words_that_a_user_types(leaf):
     assert leaf.format_usage().startswith(f"usage: {leaf.prog}") and re.match(r"turnout [a-z-]+( [a-z-]+)?$", leaf.prog)
 
 
@@ -53,19 +53,19 @@ def test_every_command_and_action_has_the_common_options(leaf):
 
 def test_json_is_one_object_with_result_text_and_exit_code(project, capsys):
     assert main(["events", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert (said["command"], said["exit_code"], said["error"]) == ("events", 0, None)
-    assert len(said["result"]) == len(said["text"]) == 3 and said["result"][0]["kind"] in said["text"][0]
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["command"], printed["exit_code"], printed["error"]) == ("events", 0, None)
+    assert len(printed["result"]) == len(printed["text"]) == 3 and printed["result"][0]["kind"] in printed["text"][0]
 
 
 def test_json_of_an_error(project, capsys):
     assert main(["config", "show", "tommerup_s9", "--json"]) == 2
-    said = json.loads(capsys.readouterr().out)
-    assert said["exit_code"] == 2 and "no turnout 'tommerup_s9'" in said["error"] and said["result"] is None
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["exit_code"] == 2 and "no turnout 'tommerup_s9'" in printed["error"] and printed["result"] is None
 
 
-def test_json_keeps_output_of_other_programs_out_of_the_object():
-    """What a subprocess prints goes to standard error."""
+def test_the_json_object_contains_no_output_of_other_programs():
+    """The output of a subprocess goes to standard error."""
     code = (
         "import subprocess, types, turnout.cli.init as command\n"
         "command.run = lambda args: subprocess.run(['echo', 'from elsewhere']).returncode\n"
@@ -83,7 +83,7 @@ def raising(error):
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "said"),
+    ("error", "code", "message"),
     [
         (ConfigError("plan", "number", "none", "Write one"), 2, "turnout plan: number: none. Write one.\n"),
         (ConfigError("planned.csv", "line 1", "none", "Write one"), 2, "turnout plan: planned.csv, line 1: none."),
@@ -92,17 +92,17 @@ def raising(error):
         (KeyboardInterrupt(), 130, "turnout plan: interrupted"),
     ],
 )
-def test_exit_codes_and_messages_without_doubled_prefixes(monkeypatch, capsys, error, code, said):
+def test_exit_codes_are_right_and_messages_repeat_no_prefix(monkeypatch, capsys, error, code, message):
     monkeypatch.setattr("turnout.cli.plan.run", raising(error))
     assert main(["plan"]) == code
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
-def test_verbose_says_exit_code_and_place_of_an_error(monkeypatch, capsys):
+def test_verbose_output_has_the_exit_code_and_the_traceback_of_an_error(monkeypatch, capsys):
     monkeypatch.setattr("turnout.cli.plan.run", raising(ConfigError("a.yaml", "line 1", "wrong", "Change it")))
     main(["plan", "-v"])
-    said = capsys.readouterr().err
-    assert "Traceback" in said and "turnout plan: exit code 2 after" in said
+    message = capsys.readouterr().err
+    assert "Traceback" in message and "turnout plan: exit code 2 after" in message
 
 
 def test_a_wrong_id_gives_the_message_that_the_workflow_gives(project, capsys):
@@ -145,7 +145,7 @@ def test_bash_completes(tmp_path, capsys, typed, expected):
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_get_every_command(capsys, shell):
+def test_the_completion_of_other_shells_has_every_command(capsys, shell):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
     assert all(name in script for name in COMMANDS)
@@ -158,8 +158,8 @@ def test_other_shells_get_every_command(capsys, shell):
         "try: os.kill(os.getpid(), 2); time.sleep(5)\n    except KeyboardInterrupt: raise RuntimeError('ended')",
     ],
 )
-def test_an_interrupt_is_none_of_the_program_also_behind_a_library(body):
-    """DuckDB raises a RuntimeError of its own."""
+def test_an_interrupt_that_a_library_converts_is_not_reported_as_a_fault_of_the_program(body):
+    """DuckDB converts the interrupt to a RuntimeError of its own."""
     code = f"import os, signal, sys, time, turnout.cli.plan as command\ndef run(args):\n    {body}\ncommand.run = run\n"
     code += "signal.signal(2, signal.default_int_handler)\n"  # a process in the background ignores interrupts
     code += "from turnout.cli.main import main; sys.exit(main(['plan']))"
@@ -167,6 +167,6 @@ def test_an_interrupt_is_none_of_the_program_also_behind_a_library(body):
     assert (done.returncode, done.stderr) == (130, "turnout plan: interrupted\n")
 
 
-def test_an_interrupt_before_the_command_begins_is_none_of_the_program(monkeypatch, capsys):
+def test_an_interrupt_before_the_command_begins_is_not_reported_as_a_fault_of_the_program(monkeypatch, capsys):
     monkeypatch.setattr("turnout.cli.main.build_parser", lambda: raising(KeyboardInterrupt())(None))
     assert main(["plan"]) == 130 and capsys.readouterr().err == "turnout: interrupted\n"

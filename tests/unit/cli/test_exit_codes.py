@@ -15,19 +15,19 @@ from turnout.cli.main import EXIT_CODES, main
 from turnout.workflow.nightly import NightReport
 from turnout.workflow.project import create_project
 
-GO_ON = {"blind", "diagnose", "nightly", "plan", "trains"}  # without the inputs that they cannot use
-JUDGE = {"check", "hammer", "inspect", "passage"}  # 1 by one problem, or without a train
-NEED = {"calibrate", "compare", "layout", "paper", "twin"}  # 2 without a usable input
-OTHERS = {  # answer a question of a registry or a track file, or write what was typed
+CONTINUING = {"blind", "diagnose", "nightly", "plan", "trains"}  # they continue without the inputs that they cannot use
+CHECKING = {"check", "hammer", "inspect", "passage"}  # exit code 1 for one problem, or without a train
+NEEDING_INPUT = {"calibrate", "compare", "layout", "paper", "twin"}  # exit code 2 without a usable input
+OTHERS = {  # they query a registry or a track file, or write what the user typed
     "acknowledge", "add", "alert", "completion", "config", "demo", "distinguish", "events", "export", "init", "query",
     "real", "registry", "report", "simulate", "worklist",
 }  # fmt: skip
 
 
-def test_every_command_is_of_one_kind_and_those_that_go_on_state_what_they_used():
-    assert sorted([*GO_ON, *JUDGE, *NEED, *OTHERS]) == sorted(COMMANDS)
+def test_every_command_is_of_one_kind_and_those_that_continue_state_which_inputs_they_used():
+    assert sorted([*CONTINUING, *CHECKING, *NEEDING_INPUT, *OTHERS]) == sorted(COMMANDS)
     stating = {name for name in COMMANDS if "add_use(" in getsource(import_module(f"turnout.cli.{name}"))}
-    assert stating == GO_ON
+    assert stating == CONTINUING
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def diagnose(monkeypatch, n_used, n_left_out):
 
 
 def trains(monkeypatch, n_used, n_left_out):
-    """Used: the clusters. Left out: the turnout without weighed trains, which is always there."""
+    """Used: the clusters. Left out: the turnout without weighed trains, which always exists."""
     cluster = SimpleNamespace(id="a", mean=[4.0], n=9)
     clusters = SimpleNamespace(version=1, clusters=[cluster] * n_used)
     monkeypatch.setattr("turnout.registry.database.open_registry", lambda path: nullcontext())
@@ -89,7 +89,7 @@ def blind(monkeypatch, n_used, n_left_out):
 
 @pytest.mark.parametrize(("n_used", "n_left_out", "code"), [(0, 2, 1), (1, 2, 0), (1, 0, 0)])
 @pytest.mark.parametrize("command", [diagnose, trains, plan, nightly, blind], ids=lambda c: c.__name__)
-def test_only_a_command_that_could_use_nothing_has_exit_code_1(
+def test_only_a_command_that_could_use_no_input_has_exit_code_1(
     project, monkeypatch, capsys, command, n_used, n_left_out, code
 ):
     words = command(monkeypatch, n_used, n_left_out)
@@ -98,8 +98,8 @@ def test_only_a_command_that_could_use_nothing_has_exit_code_1(
 
 
 @pytest.mark.parametrize("held", [{}, {"2024-05-13": "named"}])
-def test_visits_that_all_differ_from_the_file_are_an_answer(project, monkeypatch, held):
-    """Ballast of a third from the first day on: no visit agrees with the file, which is what the model has to say."""
+def test_visits_that_all_differ_from_the_track_file_give_exit_code_0(project, monkeypatch, held):
+    """Ballast with a third of its stiffness from the first day: the answer is that no visit agrees with the file."""
     history = SimpleNamespace(used_steps=[], steps=[object()] * 4)
     model = SimpleNamespace(history=history, held=held)
     monkeypatch.setattr("turnout.stages.calibrated_model.calibrate_turnout", lambda *args: model)
@@ -108,8 +108,8 @@ def test_visits_that_all_differ_from_the_file_are_an_answer(project, monkeypatch
     assert main(["twin", "--turnout", "t1"]) == 0
 
 
-def test_the_page_of_commands_lists_them(repository):
+def test_the_page_of_commands_lists_the_commands_that_continue(repository):
     text = (repository / "docs/commands.md").read_text()
     names = {"blind": "blind diagnose"}
-    assert all(f"`{names.get(name, name)}`" in text.partition("and 1 if none did")[2] for name in GO_ON)
+    assert all(f"`{names.get(name, name)}`" in text.partition("and 1 if none did")[2] for name in CONTINUING)
     assert "none of the inputs could be used" in EXIT_CODES

@@ -1,4 +1,4 @@
-"""A disk that is full: the command names the file, and leaves no part of it that looks like a whole one."""
+"""On a full disk the command names the file, and leaves no incomplete file that looks complete."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ from turnout.cli.main import main
 from turnout.files import whole_file, write_text
 from turnout.readers.writing import WRITERS
 
-LIMIT = 4096  # bytes that fit on it
+LIMIT = 4096  # bytes that fit on the simulated disk
 
 
 @contextmanager
@@ -23,7 +23,10 @@ def full_disk():
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, hard))
-    writes_bytecode, sys.dont_write_bytecode = not sys.dont_write_bytecode, True  # it would be cut off at the limit
+    writes_bytecode, sys.dont_write_bytecode = (
+        not sys.dont_write_bytecode,
+        True,
+    )  # byte code would be cut off at the limit
     try:
         yield
     finally:
@@ -32,14 +35,14 @@ def full_disk():
         signal.signal(signal.SIGXFSZ, handler)
 
 
-def test_a_text_that_does_not_fit_is_named(tmp_path):
+def test_the_error_of_a_text_that_does_not_fit_names_the_file(tmp_path):
     with full_disk(), pytest.raises(OSError, match="too large") as caught:
         write_text(tmp_path / "a.html", "x" * 3 * LIMIT)
     assert caught.value.filename == str(tmp_path / "a.html") and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("before", [None, "what was there before"])
-def test_a_file_of_a_library_is_whole_or_as_it_was(tmp_path, before):
+def test_a_file_that_a_library_writes_is_complete_or_unchanged(tmp_path, before):
     path = tmp_path / "a.csv"
     if before:
         path.write_text(before)
@@ -56,14 +59,14 @@ def test_a_file_of_a_library_is_whole_or_as_it_was(tmp_path, before):
 def test_standard_output_and_pipes_are_written_directly(tmp_path, capfd):
     with whole_file("/dev/stdout") as path:
         path.write_text("rows\n")
-    assert capfd.readouterr().out == "rows\n"  # here a file, as behind "> file" in a shell
+    assert capfd.readouterr().out == "rows\n"  # here standard output is a file, as with "> file" in a shell
     os.mkfifo(tmp_path / "pipe")
     with whole_file(tmp_path / "pipe") as path:
         assert path == tmp_path / "pipe"
 
 
 @pytest.mark.parametrize("ending", ["csv", "h5", "npz", "mat", "uff", "tdms", "wav", "lvm", "parquet"])
-def test_a_simulated_recording_is_whole_or_not_there(tmp_path, repository, capsys, monkeypatch, ending):
+def test_a_simulated_recording_is_complete_or_absent(tmp_path, repository, capsys, monkeypatch, ending):
     monkeypatch.chdir(repository)
     out = tmp_path / f"A7_1.{ending}"
     formats = {"h5": "hdf5", "uff": "uff58b"}
@@ -75,8 +78,8 @@ def test_a_simulated_recording_is_whole_or_not_there(tmp_path, repository, capsy
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_of_the_cache_stops_no_computation(tmp_path, monkeypatch):
-    """Compiled functions are stored beside the program or in the home folder, which may be full while raw/ is not."""
+def test_a_computation_continues_if_the_disk_of_the_cache_is_full(tmp_path, monkeypatch):
+    """Compiled functions are stored beside the program or in the home folder, which can be full while raw/ is not."""
     monkeypatch.setattr(kernel_cache, "cache_folder", lambda: tmp_path)
     with full_disk():
         assert kernel_cache.kernel(twice)(2.0) == 4.0
@@ -90,19 +93,19 @@ def twice(x):
 
 
 @pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="another system")
-def test_a_fault_of_reading_is_said_with_the_file(capsys):
-    """As a bad sector: the system opens the file, and reading it fails without a name."""
+def test_a_read_error_of_the_system_names_the_file(capsys):
+    """As with a bad sector: the system opens the file, and the read error states no file name."""
     assert main(["inspect", "/proc/self/mem"]) == 2
     assert "/proc/self/mem: Input/output error" in capsys.readouterr().err
 
 
-def test_every_writer_was_tried():
+def test_every_writer_is_tested():
     tried = {"hdf5", "uff58b", "csv", "npz", "mat", "tdms", "wav", "lvm", "parquet"}
-    assert set(WRITERS) - tried == {"uff58", "rcmdx", "mat73"}  # as uff58b and hdf5
+    assert set(WRITERS) - tried == {"uff58", "rcmdx", "mat73"}  # they share the code of uff58b and hdf5
 
 
-def test_a_read_only_disk_names_the_file_that_was_asked_for(tmp_path, monkeypatch):
-    """It reports itself at the removal of the temporary file, too, although that was never made."""
+def test_the_error_of_a_read_only_disk_names_the_requested_file(tmp_path, monkeypatch):
+    """The removal of the temporary file fails, too, although that file never existed."""
 
     def fail(path, *args, **kwargs):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))

@@ -1,4 +1,4 @@
-"""Standard output that lacks characters, is closed, is full, or whose reader has gone: never a fault of the program."""
+"""Standard output that lacks characters, is closed or full, or has no reader is never a fault of the program."""
 
 import json
 import os
@@ -28,7 +28,7 @@ def run(words, registry=None, encoding="utf-8", **options):
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1", "cp1252"])
 @pytest.mark.parametrize("form", [[], ["--csv", "-"], ["--json"]])
-def test_a_character_that_the_terminal_lacks_is_an_escape(registry, encoding, form):
+def test_a_character_that_the_encoding_lacks_is_printed_as_an_escape_sequence(registry, encoding, form):
     done = run(["query", QUERY, *form], registry, encoding, stdout=subprocess.PIPE)
     printed = done.stdout.decode(encoding)
     assert done.returncode == 0 and not done.stderr
@@ -39,7 +39,7 @@ def test_a_character_that_the_terminal_lacks_is_an_escape(registry, encoding, fo
 
 
 @pytest.mark.parametrize("words", [["query", "--list"], ["query", QUERY, "--json"], ["query", "from range(9999)"]])
-def test_a_reader_that_has_gone_is_no_fault(registry, words):
+def test_a_closed_pipe_is_no_fault(registry, words):
     reading, writing = os.pipe()
     os.close(reading)
     try:
@@ -51,7 +51,7 @@ def test_a_reader_that_has_gone_is_no_fault(registry, words):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="another system")
 @pytest.mark.parametrize("form", [[], ["--json"]])
-def test_a_full_disk_behind_standard_output_is_a_message(registry, form):
+def test_a_full_disk_at_standard_output_is_reported_without_traceback(registry, form):
     with open("/dev/full", "wb") as full:
         done = run(["query", QUERY, *form], registry, stdout=full)
     assert done.returncode == 2 and b"Traceback" not in done.stderr
@@ -64,6 +64,6 @@ def test_a_closed_standard_output_is_no_fault(registry):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_a_query_of_another_encoding_is_named(registry):
+def test_a_query_that_is_not_utf8_is_reported(registry):
     done = run(["query", b"select '\xfc' as x"], registry, stdout=subprocess.PIPE)
     assert done.returncode == 2 and b"contains a byte that is not UTF-8" in done.stderr

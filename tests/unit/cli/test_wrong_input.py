@@ -1,4 +1,4 @@
-"""What a user sees who types something wrong: one message that says where, what was found, and what to do."""
+"""Wrong input of a user gives one message with the place, the fault and the remedy."""
 
 import argparse
 import os
@@ -86,14 +86,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("line", WRONG)
-def test_the_message_says_what_to_do(project, capsys, line):
+def test_the_message_states_place_fault_and_remedy(project, capsys, line):
     assert main(line.split()) == 2
     message = capsys.readouterr().err
     assert WRONG[line] in message and "Traceback" not in message
 
 
 @pytest.mark.parametrize("command", ["hammer", "passage"])
-def test_no_table_is_proposed_as_a_recording(project, capsys, command):
+def test_the_message_proposes_no_table_as_a_recording(project, capsys, command):
     for name in ("campaigns.csv", "trains.csv"):
         (project / "raw" / "W1" / name).write_text("a,b\n")
     assert main([command, "raw/W1", "--turnout", "W1"]) == 2
@@ -101,7 +101,7 @@ def test_no_table_is_proposed_as_a_recording(project, capsys, command):
 
 
 @pytest.mark.parametrize("command", ["passage", "compare"])
-def test_a_layout_without_passages_is_named(project, capsys, command):
+def test_the_error_of_a_layout_without_passages_names_the_layout(project, capsys, command):
     without_passages(project)
     assert main([command, "raw/W1/hammer/A7_1.csv", "--turnout", "W1"]) == 2
     message = capsys.readouterr().err
@@ -132,33 +132,33 @@ def test_a_layout_without_passages_is_named(project, capsys, command):
         ("distinguish --sensors nan", "argument --sensors: 'nan' is not a number"),
     ],
 )
-def test_a_wrong_command_line_ends_with_2(capsys, line, message):
+def test_a_wrong_command_line_has_exit_code_2(capsys, line, message):
     with pytest.raises(SystemExit) as end:
         main(line.split())
     assert end.value.code == 2 and message in capsys.readouterr().err
 
 
-def test_a_folder_without_effects_for_the_blind_proof_is_named(capsys):
+def test_the_error_of_a_folder_without_effects_for_the_blind_proof_names_it(capsys):
     assert main(["blind", "make", "--out", "proof", "--effects", "nowhere", "--limit", "1"]) == 2
     assert "nowhere, --effects: no file of an effect. Name a folder with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", ["inspect ''", "hammer '' --turnout W1", "report --pages ''", "query ''", "init ''"])
-def test_an_empty_argument_is_no_path(project, capsys, line):
-    """As "$FILE" of a shell without a value; the path would be the present folder."""
+def test_an_empty_argument_is_not_accepted_as_a_path(project, capsys, line):
+    """An unset "$FILE" of a shell gives such an argument; as a path it would be the current folder."""
     with pytest.raises(SystemExit) as end:
         main(shlex.split(line))
     assert end.value.code == 2 and "is empty. Give it a value, or leave it out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("sql", ["select 1; select 2", ";", "-- nothing"])
-def test_only_one_query_is_answered(tmp_path, capsys, sql):
+def test_a_command_accepts_exactly_one_query(tmp_path, capsys, sql):
     register([], tmp_path, read=iter)
     assert main(["query", sql, "--registry", str(tmp_path)]) == 2
     assert "Give one query." in capsys.readouterr().err
 
 
-def test_a_section_of_the_track_that_the_layout_lacks_is_named(project, capsys):
+def test_a_section_of_the_track_that_the_layout_lacks_is_reported(project, capsys):
     layout = project / "config/layouts/tommerup.yaml"
     lines = layout.read_text().splitlines(keepends=True)
     layout.write_text("".join(line for line in lines if not line.lstrip().startswith("SP:")))
@@ -167,7 +167,7 @@ def test_a_section_of_the_track_that_the_layout_lacks_is_named(project, capsys):
     assert "'SP' is no section of W1" in capsys.readouterr().err
 
 
-def test_inspect_leaves_out_no_entry_of_a_folder_without_a_word(tmp_path, capsys, monkeypatch):
+def test_inspect_reports_every_entry_of_a_folder_that_it_cannot_read(tmp_path, capsys, monkeypatch):
     (tmp_path / "raw/closed").mkdir(parents=True)
     (tmp_path / "raw/a.csv").symlink_to("nowhere.csv")
     (tmp_path / "raw/b.csv").symlink_to("b.csv")
@@ -197,7 +197,7 @@ def test_inspect_checks_the_tables_beside_the_recordings(tmp_path, capsys):
     assert "line 3, column 1: campaign is '2026-5-14'" in printed and "not read" not in printed
 
 
-def test_drawings_of_files_of_one_name_do_not_replace_each_other(tmp_path, repository, monkeypatch, capsys):
+def test_plots_of_files_with_the_same_name_do_not_overwrite_each_other(tmp_path, repository, monkeypatch, capsys):
     monkeypatch.chdir(repository)
     file = tmp_path / "a/A7_1.csv"
     assert main(["simulate", "hammer", "--section", "A7", "--impacts", "1", "--out", str(file)]) == 0
@@ -208,21 +208,21 @@ def test_drawings_of_files_of_one_name_do_not_replace_each_other(tmp_path, repos
     assert {p.name for p in tmp_path.glob("*.svg")} == {"A7_1.csv.svg", "b_A7_1.csv.svg"}
 
 
-def test_a_tab_in_yaml_is_named(project, capsys):
+def test_a_tab_in_yaml_is_reported(project, capsys):
     (project / "config/config.yaml").write_text("fleet:\n\tshards: 2\n")
     assert main(["check"]) == 2
     assert "config/config.yaml, line 2, column 1: a tab. Write blanks" in capsys.readouterr().err
 
 
-def test_counts_of_one_have_no_plural(project, capsys):
+def test_a_count_of_one_is_in_the_singular(project, capsys):
     shutil.rmtree(project / "raw/W1")
     main(["check"])
     assert "config: 1 turnout with 1 layout, 0 events, 0 acknowledgements, no fault." in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["tommerup", "unused"])
-def test_a_draft_that_is_not_finished_is_listed(project, capsys, name):
-    """Before a turnout uses it, too."""
+def test_an_unfinished_draft_of_a_layout_is_listed(project, capsys, name):
+    """A draft that no turnout uses yet is listed, too."""
     layout = project / f"config/layouts/{name}.yaml"
     text = (project / "config/layouts/tommerup.yaml").read_text()
     layout.write_text(text.replace("position: 24.6}  ", "position: 24.6}  # DECIDE: position [m]"))
@@ -231,7 +231,7 @@ def test_a_draft_that_is_not_finished_is_listed(project, capsys, name):
     assert f"config/layouts/{name}.yaml, line {line}: position [m]" in capsys.readouterr().out
 
 
-def test_a_project_without_a_turnout_says_how_to_add_one(tmp_path, monkeypatch, capsys):
+def test_check_states_how_to_add_the_first_turnout(tmp_path, monkeypatch, capsys):
     create_project(tmp_path)
     monkeypatch.chdir(tmp_path)
     assert main(["check"]) == 0 and "no turnout yet: `turnout add ID LAYOUT` adds one" in capsys.readouterr().out
@@ -243,13 +243,13 @@ def test_the_first_command_of_a_project_can_be_pasted_into_a_shell(tmp_path, cap
     assert shlex.split(capsys.readouterr().out.split("first: ")[1]) == ["cd", str(folder)]
 
 
-def test_the_first_command_of_a_project_with_a_leading_dash_is_no_option(tmp_path, capsys, monkeypatch):
+def test_the_first_command_does_not_pass_a_folder_name_with_a_leading_dash_as_an_option(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["init", "--", "-a b"]) == 0
     assert shlex.split(capsys.readouterr().out.split("first: ")[1]) == ["cd", "./-a b"]
 
 
-def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):
+def test_the_next_init_completes_an_interrupted_one(tmp_path, monkeypatch):
     write, n_written = project_module.write_text, []
 
     def interrupted(path, text):
@@ -268,24 +268,24 @@ def test_an_interrupted_init_is_completed_by_the_next(tmp_path, monkeypatch):
     assert names == {str(p.relative_to(tmp_path / "whole")) for p in (tmp_path / "whole").rglob("*") if p.is_file()}
 
 
-def test_no_events_are_said_to_be_none(project, capsys):
+def test_the_list_of_events_states_that_it_is_empty(project, capsys):
     assert main(["events"]) == 0
     assert "config/events.csv: no event yet" in capsys.readouterr().out
 
 
-def test_a_project_gets_no_page_of_the_documentation(project, capsys):
+def test_config_generate_writes_no_page_of_the_documentation_into_a_project(project, capsys):
     assert main(["config", "generate"]) == 0
     assert not (project / "docs").exists() and "settings.md" not in capsys.readouterr().out
 
 
-def test_a_night_without_a_project_writes_nothing(tmp_path, monkeypatch, capsys):
+def test_nightly_outside_a_project_writes_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["nightly"]) == 2
     assert "Run the command in the folder of a project" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
-def test_a_night_with_a_wrong_configuration_begins_nothing(project, capsys):
+def test_nightly_with_a_wrong_configuration_starts_nothing(project, capsys):
     (project / "config" / "config.yaml").write_text("fleet: {shard: 3}\n")
     assert main(["nightly"]) == 2
     assert "config/config.yaml, line 1, column 9: unknown key 'shard'" in capsys.readouterr().err
@@ -301,7 +301,7 @@ def test_a_name_with_a_control_character_is_an_error(project, capsys, name):
     assert "Write it without control characters" in message and name not in message
 
 
-def test_the_folder_of_the_configuration_is_no_name_of_a_command(tmp_path, monkeypatch, capsys):
+def test_the_error_of_a_missing_configuration_names_the_folder_and_not_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["config", "show", "W1"]) == 2
     assert "turnout config: config, the folder: there is no such folder" in capsys.readouterr().err
@@ -318,14 +318,16 @@ def options_of(parser):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_no_option_accepts_a_number_that_is_none(command):
-    """``float`` accepts nan and inf, and the message of ``int`` names a type of Python."""
+def test_no_option_uses_float_or_int_as_its_type(command):
+    """``float`` accepts nan and inf, and the message of ``int`` contains the name of a Python type."""
     parser = argparse.ArgumentParser()
     import_module(f"turnout.cli.{command}").add_arguments(parser)
     assert not [action.dest for action in options_of(parser) if action.type in (float, int)]
 
 
-def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project, capsys, monkeypatch):
+def test_the_error_of_a_file_without_write_permission_names_the_file_and_no_temporary_file(
+    project, capsys, monkeypatch
+):
     def forbidden(file, mode="r", **options):
         if "w" in mode:
             raise PermissionError(13, "Permission denied", str(file))
@@ -337,12 +339,12 @@ def test_a_file_that_may_not_be_written_has_its_own_name_in_the_message(project,
     assert "config/turnouts.tsv: Permission denied" in message and ".tmp" not in message
 
 
-def test_an_export_that_cannot_be_made_leaves_no_folder(project, capsys):
+def test_a_failed_export_leaves_no_folder(project, capsys):
     assert main(["export", "out"]) == 2
     assert "there is no registry here" in capsys.readouterr().err and not (project / "out").exists()
 
 
-def test_work_that_is_there_already_is_not_entered_twice(project, capsys):
+def test_maintenance_that_is_already_listed_is_not_added_again(project, capsys):
     line = ["events", "W1", "tamping", "2026-04-02"]
     assert main(line) == 0
     before = (project / "config/events.csv").read_bytes()
@@ -351,7 +353,7 @@ def test_work_that_is_there_already_is_not_entered_twice(project, capsys):
     assert "config/events.csv, the work: tamping at W1, 2026-04-02, is there already." in capsys.readouterr().err
 
 
-ENTRIES = {  # an entry of a track file, and what `turnout check` says about it
+ENTRIES = {  # an entry of a track file, and the message of `turnout check`
     "term: local_padd\n    sleeper: 18.0": "W1.yaml, terms[0]: no effect 'local_padd'; there are",
     "term: local_pad\n    faktor: 0.5": "W1.yaml, terms[0]: local_pad has no 'faktor'; it has factor, sleeper",
     "term: local_pad\n    sleeper: 900\n    factor: {value: 0.5, unit: '-', source: me}": "is on no route of the track",
@@ -397,7 +399,7 @@ def test_files_of_tracks_and_vehicles_are_checked(project, capsys, change):
     name, _, edit = change.partition(": ")
     old, new = edit.split(" => ")
     path = project / "config" / name
-    assert main(["check"]) == 1  # the example has a problem in its raw files alone
+    assert main(["check"]) == 1  # the only problem of the example is in its raw files
     printed = capsys.readouterr().out
     assert "improbable" not in printed and "no train" not in printed
     content = path.read_text()
@@ -407,7 +409,7 @@ def test_files_of_tracks_and_vehicles_are_checked(project, capsys, change):
     assert VALUES[change] in capsys.readouterr().out
 
 
-def test_a_file_in_place_of_the_recordings_is_named(project, capsys):
+def test_a_file_in_place_of_the_folder_of_recordings_is_reported(project, capsys):
     shutil.rmtree(project / "raw")
     (project / "raw").write_text("")
     assert main(["check"]) == 2

@@ -1,4 +1,4 @@
-"""Aliases of YAML: a small file may stand for billions of values, or for itself; both are errors by place."""
+"""Aliases of YAML: a small file can stand for billions of values or contain itself. Both are errors with a line."""
 
 import pytest
 
@@ -6,8 +6,8 @@ from turnout.config.document import load
 from turnout.errors import ConfigError
 
 
-def test_mappings_that_multiply_are_an_error_at_once(tmp_path):
-    """A mapping is three nodes and line k + 1 stands for 3 * 10^k of them and its lists: 3.1 million in line 7."""
+def test_aliases_that_stand_for_too_many_values_are_an_error(tmp_path):
+    """A mapping has three nodes; line k + 1 stands for 3 * 10^k nodes and their lists: 3.1 million in line 7."""
     lines = ["a0: &a0 {x: 1}", *(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, 10))]
     (tmp_path / "config.yaml").write_text("\n".join(lines) + "\n")
     with pytest.raises(ConfigError, match=r"line 7, column 5.*: its aliases stand for more than 1000000 values"):

@@ -1,4 +1,4 @@
-"""Tables that people keep: what is not understood in them is said, and no row gets lost in another."""
+"""Tables that users edit: every faulty entry is reported, and no row is lost because of a fault in another."""
 
 import resource
 import signal
@@ -27,7 +27,7 @@ def events(folder, text):
     return [(e.turnout, e.resets, e.note) for e in found], [str(e) for e in errors]
 
 
-def test_an_unknown_title_of_the_events_is_an_error(tmp_path):
+def test_an_unknown_column_of_events_csv_is_an_error(tmp_path):
     _, errors = events(tmp_path, "turnout,section,date,kind,reset,note\nt1,,2025-01-01,sensor_change,none,same type\n")
     assert errors == [
         "config/events.csv, line 1, column 27: unknown column 'reset'. "
@@ -35,12 +35,12 @@ def test_an_unknown_title_of_the_events_is_an_error(tmp_path):
     ]
 
 
-def test_a_title_that_comes_twice_is_an_error(tmp_path):
+def test_a_repeated_column_is_an_error(tmp_path):
     _, errors = events(tmp_path, "turnout,section,date,kind,note,note\n")
     assert errors == ["config/events.csv, line 1, column 32: column 'note' for the second time. Keep one of them."]
 
 
-def test_a_quote_that_is_not_closed_takes_no_other_row_with_it(tmp_path):
+def test_an_unclosed_quote_affects_no_other_row(tmp_path):
     rows = 't2,,2025-11-05,tamping,,"machine 09-3X\nt1,A7,2025-11-06,pad_exchange,,"a, b"\n'
     found, errors = events(tmp_path, HEADER + rows)
     assert found == [("t1", ("railpad",), "a, b")]
@@ -48,7 +48,7 @@ def test_a_quote_that_is_not_closed_takes_no_other_row_with_it(tmp_path):
 
 
 @pytest.mark.parametrize("row", ["t1;;2025-01-01;tamping;;", "t1\t\t2025-01-01\ttamping"])
-def test_a_row_with_another_separator_is_said_to_have_it(tmp_path, row):
+def test_a_row_with_another_separator_is_reported(tmp_path, row):
     found, errors = events(tmp_path, f"{HEADER}{row}\nt2,,2025-01-02,tamping,,a; b\n")
     separator = "semicolons" if ";" in row else "tabs"
     assert errors == [
@@ -63,18 +63,18 @@ def test_letters_behind_a_closed_quote_are_an_error(tmp_path):
     assert not found and "line 2, column 1: ',' expected after '\"'. Write each row in one line" in errors[0]
 
 
-def test_a_byte_that_is_not_utf8_is_said_with_line_and_column(tmp_path):
+def test_a_byte_that_is_not_utf8_is_reported_with_line_and_column(tmp_path):
     found, errors = events(tmp_path, (HEADER + "t1,,2025-11-05,tamping,,Århus\n").encode("latin-1"))
     assert not found
     assert errors == ["config/events.csv, line 2, column 25: a byte that is not UTF-8. Save the file as UTF-8."]
 
 
-def test_what_a_spreadsheet_leaves_behind_is_no_error(tmp_path):
+def test_byte_order_mark_empty_columns_and_line_ends_of_a_spreadsheet_are_accepted(tmp_path):
     text = '\ufeff"turnout",section,date,kind,resets,note,,\r\n\r\nt1,,2025-11-05,tamping,,a\u2028b,,\r\n'
     assert events(tmp_path, text) == ([("t1", ("ballast",), "a\u2028b")], [])
 
 
-def test_a_suppression_without_its_end_does_not_count(tmp_path):
+def test_a_suppression_without_a_column_for_its_end_is_not_used(tmp_path):
     path = tmp_path / "acknowledgements.csv"
     path.write_text("turnout,section,band,action,by,at,untill,reason\nt1,,,suppress,me,2026-01-01,2026-02-01,x\n")
     rows, errors = read_acknowledgements(path)
@@ -82,7 +82,7 @@ def test_a_suppression_without_its_end_does_not_count(tmp_path):
 
 
 def test_a_suppression_needs_the_day_on_which_it_ends(tmp_path):
-    """Left empty by hand, it would hide every alarm of the place for ever."""
+    """Without an end it would hide every alarm of the section for ever."""
     path = tmp_path / "acknowledgements.csv"
     seen = "t1,,,acknowledge,me,2026-01-01,,seen"
     path.write_text(f"turnout,section,band,action,by,at,until,reason\n{seen}\nt1,,,suppress,me,2026-01-01,,x\n")
@@ -93,7 +93,7 @@ def test_a_suppression_needs_the_day_on_which_it_ends(tmp_path):
     ) == 1 and "line 3, column 29: until is empty. Write the day from which the alarm is shown again" in str(errors[0])
 
 
-def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(tmp_path):
+def test_an_unknown_name_of_the_temperature_column_is_reported_and_the_other_cells_are_used(tmp_path):
     path = tmp_path / "campaigns.csv"
     path.write_text("campaign,started_at_utc,rail_temp_c\n2024-05-13,2024-05-13T09:30,18.5\n")
     campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
@@ -102,7 +102,7 @@ def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("passed_at_utc;train_type\n2024-05-13T10:00;IC3\n", "line 1, column 1: semicolons between the columns"),
         ("passed_at_utc,axle_load\n", "unknown column 'axle_load'. Did you mean 'axle_load_t'?"),
@@ -117,14 +117,14 @@ def test_a_temperature_under_another_title_is_said_and_the_other_cells_are_used(
         ("passed_at_utc,track\n2024-05-13T10:00,left\n", "track is 'left'. Write main or diverging, or nothing"),
     ],
 )
-def test_trains_that_cannot_be_used_are_said(tmp_path, text, said):
+def test_trains_that_cannot_be_used_are_reported(tmp_path, text, message):
     path = tmp_path / "trains.csv"
     path.write_text(text)
     trains, errors = read_trains(path, "t1/trains.csv")
-    assert trains == () and len(errors) == 1 and said in str(errors[0])
+    assert trains == () and len(errors) == 1 and message in str(errors[0])
 
 
-def test_a_train_that_is_listed_twice_counts_once(tmp_path):
+def test_a_train_that_is_listed_twice_is_used_once(tmp_path):
     path = tmp_path / "trains.csv"
     rows = "2024-05-13T10:00,main,8\n2024-05-13T10:00,diverging,16\n2024-05-13T10:00:00Z,main,12\n"
     path.write_text("passed_at_utc,track,n_axles\n" + rows)
@@ -152,34 +152,36 @@ def config(tmp_path, repository, monkeypatch):
 
 
 EVENT = ["events", "tommerup_s1", "tamping", "2026-04-02"]
-SAID = ["acknowledge", "tommerup_s1", "--by", "M. Jensen", "--reason", "seen", "--at", "2026-03-01"]
+ACK = ["acknowledge", "tommerup_s1", "--by", "M. Jensen", "--reason", "seen", "--at", "2026-03-01"]
 ADD = ["add", "new", "tommerup"]
 ACKNOWLEDGED = "turnout,section,band,action,by,at,until,reason\n"
 
 
 @pytest.mark.parametrize(
-    ("command", "table", "content", "said"),
+    ("command", "table", "content", "message"),
     [
         (EVENT, "events.csv", (HEADER + "tommerup_s1,,2025-11-05,tamping,,Århus\n").encode("latin-1"), "not UTF-8"),
         (EVENT, "events.csv", b"", "an empty table. Write its header"),
         ([*EVENT, "--resets", "none"], "events.csv", b"turnout,section,date,kind\n", "no column 'resets' for 'none'"),
         ([*EVENT, "--note", "hi"], "events.csv", b"turnout,section,date,kind,resets\n", "no column 'note' for 'hi'"),
-        (SAID, "acknowledgements.csv", (ACKNOWLEDGED + "# Århus\n").encode("latin-1"), "not UTF-8"),
-        (SAID, "acknowledgements.csv", b"", "an empty table. Write its header"),
-        (SAID, "acknowledgements.csv", ACKNOWLEDGED.replace("until", "untill").encode(), "unknown column 'untill'"),
-        ([*SAID, "--suppress-until", "2026-05-01"], "acknowledgements.csv", b"turnout,section,band,action,by,at,reason",
+        (ACK, "acknowledgements.csv", (ACKNOWLEDGED + "# Århus\n").encode("latin-1"), "not UTF-8"),
+        (ACK, "acknowledgements.csv", b"", "an empty table. Write its header"),
+        (ACK, "acknowledgements.csv", ACKNOWLEDGED.replace("until", "untill").encode(), "unknown column 'untill'"),
+        ([*ACK, "--suppress-until", "2026-05-01"], "acknowledgements.csv", b"turnout,section,band,action,by,at,reason",
          "no column 'until' for '2026-05-01'"),
         (ADD, "turnouts.tsv", "turnout\tlayout\tname\nx\ttommerup\tÅrhus\n".encode("latin-1"), "not UTF-8"),
         (ADD, "turnouts.tsv", b"# nothing yet\n", "an empty table. Write a header"),
         (["add", "#x", "tommerup"], "turnouts.tsv", b"turnout\tlayout\na\ttommerup\n", "no turnout '#x'"),
     ],
 )  # fmt: skip
-def test_a_command_says_what_is_wrong_with_a_table_and_leaves_it_alone(config, capsys, command, table, content, said):
+def test_a_command_reports_the_fault_of_a_table_and_does_not_change_it(
+    config, capsys, command, table, content, message
+):
     (config / "events.csv").unlink()
     (config / table).write_bytes(content)
     assert main(command) == 2
     err = capsys.readouterr().err
-    assert said in err and table in err
+    assert message in err and table in err
     assert (config / table).read_bytes() == content
 
 
@@ -188,11 +190,11 @@ def test_a_rejected_first_event_leaves_no_file(config):
     assert main(["events", "nowhere", "tamping", "2026-04-02"]) == 2 and not (config / "events.csv").exists()
 
 
-def test_a_row_is_entered_by_the_header_of_its_table(config):
+def test_a_new_row_has_the_columns_and_line_ends_of_its_table(config):
     (config / "events.csv").write_bytes(b'"note","date",kind,section,turnout\r\n,2025-04-02,grinding,A8,tommerup_s1')
     (config / "acknowledgements.csv").write_text("reason,until,at,by,action,band,section,turnout\n")
     assert main([*EVENT, "--note", "machine\n09-3X, night"]) == 0
-    assert main([*SAID, "--suppress-until", "2026-05-01", "--band", "ballast"]) == 0
+    assert main([*ACK, "--suppress-until", "2026-05-01", "--band", "ballast"]) == 0
     read = load_configuration(config)
     assert [(e.kind, e.note) for e in read.events] == [("grinding", ""), ("tamping", "machine 09-3X, night")]
     (row,) = read.acknowledgements
@@ -204,7 +206,7 @@ def test_a_row_is_entered_by_the_header_of_its_table(config):
 
 @contextmanager
 def full_disk():
-    """No file may grow beyond 4 kB: to a program that is a disk that is full in the midst of a write."""
+    """No file may grow beyond 4 kB: for a program this is a disk that becomes full during a write."""
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
@@ -216,7 +218,7 @@ def full_disk():
 
 
 @pytest.mark.parametrize(("name", "tab"), [("events.csv", ","), ("t.tsv", "\t")])
-def test_a_table_is_as_it_was_where_there_is_no_room_for_one_more_row(tmp_path, name, tab):
+def test_a_table_is_unchanged_if_the_disk_is_full(tmp_path, name, tab):
     path, columns = tmp_path / name, ("turnout", "layout")
     rows = [tab.join(columns), *(tab.join((f"t{k:04d}", "main")) for k in range(800))]
     path.write_text("\n".join(rows) + "\n")
@@ -236,7 +238,7 @@ def files_in(folder):
     return sorted(p.name for p in folder.iterdir() if p.name != ".lock")
 
 
-def test_a_row_that_is_checked_is_not_in_the_table_yet_and_leaves_mode_link_and_bytes(tmp_path):
+def test_a_row_is_added_after_its_check_and_mode_link_and_other_bytes_stay(tmp_path):
     path, link = tmp_path / "kept" / "events.csv", tmp_path / "events.csv"
     path.parent.mkdir()
     path.write_bytes(b"turnout,section\r\nt1,A7")
@@ -245,7 +247,7 @@ def test_a_row_that_is_checked_is_not_in_the_table_yet_and_leaves_mode_link_and_
     before = path.read_bytes()
     with pytest.raises(KeyError), added_row(link, {"turnout": "t2"}, ("turnout", "section")) as tables:
         assert tables["events.csv"].read_bytes() == before + b"\r\nt2,\r\n"
-        assert path.read_bytes() == before  # what a run sees that reads it now, or after this process was killed
+        assert path.read_bytes() == before  # what another run reads now, or after this process is killed
         raise KeyError
     assert path.read_bytes() == before and files_in(tmp_path) == ["events.csv", "kept"]
     with added_row(link, {"turnout": "t2"}, ("turnout", "section")):
@@ -255,14 +257,14 @@ def test_a_row_that_is_checked_is_not_in_the_table_yet_and_leaves_mode_link_and_
     assert files_in(tmp_path) == ["events.csv", "kept"] and files_in(path.parent) == ["events.csv"]
 
 
-def test_a_new_table_with_a_wrong_row_is_not_made(tmp_path):
+def test_no_new_table_is_written_for_a_wrong_row(tmp_path):
     with pytest.raises(KeyError), added_row(tmp_path / "events.csv", {"turnout": "t2"}, ("turnout", "section")) as t:
         assert t["events.csv"].read_text() == "turnout,section\nt2,\n"
         raise KeyError
     assert files_in(tmp_path) == []
 
 
-def test_rows_that_are_entered_at_once_are_all_in_the_table(tmp_path):
+def test_rows_that_are_added_at_the_same_time_are_all_in_the_table(tmp_path):
     path, columns = tmp_path / "events.csv", ("turnout", "section")
 
     def enter(k):
@@ -275,7 +277,7 @@ def test_rows_that_are_entered_at_once_are_all_in_the_table(tmp_path):
 
 
 @pytest.mark.parametrize("command", [EVENT, ["add", "t1", "tommerup"]])
-def test_a_folder_that_does_not_exist_is_named_and_not_made(tmp_path, capsys, monkeypatch, command):
+def test_a_folder_that_does_not_exist_is_reported_and_not_created(tmp_path, capsys, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     assert main([*command[:4], "--configuration", "nowhere"]) == 2
     err = capsys.readouterr().err
@@ -283,7 +285,7 @@ def test_a_folder_that_does_not_exist_is_named_and_not_made(tmp_path, capsys, mo
     assert not (tmp_path / "nowhere").exists()
 
 
-@pytest.mark.parametrize("command", [EVENT, SAID])
+@pytest.mark.parametrize("command", [EVENT, ACK])
 def test_an_empty_argument_ends_the_command_before_it_writes(config, capsys, command):
     before = {path: path.read_bytes() for path in config.glob("*.csv")}
     with pytest.raises(SystemExit) as ended:
@@ -293,23 +295,23 @@ def test_an_empty_argument_ends_the_command_before_it_writes(config, capsys, com
 
 
 @pytest.mark.parametrize("place", [" ", "/", "/A7", "tommerup_s1/"])
-@pytest.mark.parametrize("command", [EVENT, SAID])
-def test_an_empty_turnout_or_section_does_not_count_for_all(config, capsys, command, place):
-    """As a script writes it whose variable is empty."""
+@pytest.mark.parametrize("command", [EVENT, ACK])
+def test_an_empty_turnout_or_section_does_not_stand_for_all(config, capsys, command, place):
+    """A script whose variable is empty writes such an argument."""
     before = {path: path.read_bytes() for path in config.glob("*.csv")}
     assert main([command[0], place, *command[2:]]) == 2
     assert "Write TURNOUT or TURNOUT/SECTION" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in config.glob("*.csv")} == before
 
 
-SAME_WORK = "t1,A7,2025-11-05,tamping"
+SAME_MAINTENANCE = "t1,A7,2025-11-05,tamping"
 
 
 @pytest.mark.parametrize(
-    ("resets", "other", "said"),
+    ("resets", "other", "message"),
     [
         ("", "", "the same work as in line 2. Remove one of the rows."),
-        ("", "ballast", "the same work as in line 2. Remove one of the rows."),  # what tamping resets without a word
+        ("", "ballast", "the same work as in line 2. Remove one of the rows."),  # what tamping resets by default
         ("none", "none", "the same work as in line 2. Remove one of the rows."),
         (
             "ballast",
@@ -319,36 +321,36 @@ SAME_WORK = "t1,A7,2025-11-05,tamping"
         ("", "ballast railpad", "the same work resets ballast, this line ballast and railpad. Correct one"),
     ],
 )
-def test_two_rows_about_the_same_work_are_named(tmp_path, resets, other, said):
-    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},{resets},\n{SAME_WORK},{other},again\n")
+def test_two_rows_of_the_same_maintenance_are_reported(tmp_path, resets, other, message):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_MAINTENANCE},{resets},\n{SAME_MAINTENANCE},{other},again\n")
     found, errors, warnings = read_events(tmp_path / "events.csv", "events.csv", None, {})
     assert len(found) == 1
-    (fault,) = errors if "this line" in said else warnings
-    assert str(fault).startswith("events.csv, line 3, column 26: ") and said in str(fault)
+    (fault,) = errors if "this line" in message else warnings
+    assert str(fault).startswith("events.csv, line 3, column 26: ") and message in str(fault)
     assert len(errors) + len(warnings) == 1
 
 
 @pytest.mark.parametrize("row", ["t1,A8,2025-11-05,tamping", "t1,,2025-11-05,tamping", "t1,A7,2025-11-05,grinding",
                                  "t1,A7,2025-11-06,tamping", "t2,A7,2025-11-05,tamping"])  # fmt: skip
-def test_other_work_is_no_repetition(tmp_path, row):
-    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},,\n{row},,\n")
+def test_other_maintenance_is_no_repetition(tmp_path, row):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_MAINTENANCE},,\n{row},,\n")
     found, errors, warnings = read_events(tmp_path / "events.csv", "events.csv", None, {})
     assert len(found) == 2 and not errors and not warnings
 
 
-def test_a_year_that_lacks_a_digit_is_said(tmp_path):
+def test_a_year_that_lacks_a_digit_is_reported(tmp_path):
     (tmp_path / "events.csv").write_text(f"{HEADER}t1,A7,0225-11-05,tamping,,\n")
     _, errors, (warning,) = read_events(tmp_path / "events.csv", "events.csv", None, {})
     assert not errors and "column 7: date 0225-11-05 is before 1900. Correct its year." in str(warning)
 
 
-def test_none_beside_a_resonance_contradicts_it(tmp_path):
-    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_WORK},none ballast,\n")
+def test_none_together_with_a_resonance_is_an_error(tmp_path):
+    (tmp_path / "events.csv").write_text(f"{HEADER}{SAME_MAINTENANCE},none ballast,\n")
     found, (error,), _ = read_events(tmp_path / "events.csv", "events.csv", None, {})
     assert not found and "resets is 'none ballast'. Write the resonances, or 'none' alone." in str(error)
 
 
-def test_the_table_of_turnouts_and_the_registry_have_the_same_limits():
+def test_turnouts_tsv_and_the_registry_have_the_same_limits():
     columns = {column.name: column for column in registry_schema.tables()["turnouts"]}
     limits = {name: (key.minimum, key.maximum) for name, key in ROW.items() if name in columns and key.maximum}
     assert {"km", "lat_deg", "lon_deg"} <= set(limits)

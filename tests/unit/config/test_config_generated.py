@@ -1,4 +1,4 @@
-"""The generated files of the repository are those that the settings give, and the program reads them."""
+"""The generated files of the repository are up to date with the settings, and the program reads them."""
 
 import json
 import re
@@ -21,7 +21,7 @@ def test_generated_files_are_up_to_date(repository):
 
 
 def test_the_page_of_settings_lists_every_key_once(repository):
-    """As many rows as there are keys in the schema for editors, which has the keys of a channel three times."""
+    """The page has one row for each key of the JSON schema, which has the keys of a channel three times."""
     page = (repository / "docs" / "settings.md").read_text(encoding="utf-8")
     layout = page.partition("## Keys of config/layouts")[2].partition("## Settings:")[0]
     rows = re.findall(r"^\| `(\w+)` \| (?:yes)? \| (.+) \|$", layout, re.M)
@@ -43,14 +43,14 @@ def names_of(schema):
     return names
 
 
-def test_the_repository_is_sound(repository):
+def test_the_configuration_of_the_repository_is_valid(repository):
     configuration = load_configuration(repository / "config", FORMATS, to_si)
     assert {"tommerup_s1", "tommerup_s2", "aarup_n4"} <= set(configuration.ids)
     labels = [s.label for s in configuration.turnout("tommerup_s1").sections]
     assert labels == ["OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"]
 
 
-def test_the_written_defaults_are_the_built_in_ones(repository):
+def test_the_defaults_in_the_files_equal_the_built_in_defaults(repository):
     settings = load_configuration(repository / "config").settings
     assert dict(settings) == {name: cls() for name, cls in parts().items()}
 
@@ -101,48 +101,48 @@ def test_add_writes_one_row(copy, capsys):
 
 
 @pytest.mark.parametrize("row", [("tommerup_s1", "tommerup"), ("new", "tomerup"), ("new", "tommerup", "--km", "far")])
-def test_add_leaves_the_table_alone_where_the_row_is_wrong(copy, row, capsys):
+def test_add_does_not_change_the_table_if_the_row_is_wrong(copy, row, capsys):
     before = (copy / "config/turnouts.tsv").read_bytes()
     assert main(["add", *row]) == 2
     assert (copy / "config/turnouts.tsv").read_bytes() == before
     assert "config/turnouts.tsv, " in capsys.readouterr().err
 
 
-def test_check_names_files_that_no_pattern_knows(copy, capsys):
+def test_check_reports_files_that_match_no_pattern(copy, capsys):
     folder = copy / "raw/tommerup_s1/hammer/2024-05-13"
     folder.mkdir(parents=True)
     for name in ("A7_1.uff", "A77_1.uff", ".hidden.uff", "A8_1.uff.part"):
         (folder / name).write_bytes(b"")
     (copy / "raw/tommerup_s2").mkdir()
     assert main(["check"]) == 1
-    said = capsys.readouterr().out
-    assert "1 file in 1 unit, 3 problems" in said
-    assert "tommerup_s1/hammer/2024-05-13/A77_1.uff, file name: its name follows no pattern of the layout" in said
-    assert "tommerup_s2, folder: no file matches a pattern of the layout" in said
+    printed = capsys.readouterr().out
+    assert "1 file in 1 unit, 3 problems" in printed
+    assert "tommerup_s1/hammer/2024-05-13/A77_1.uff, file name: its name follows no pattern of the layout" in printed
+    assert "tommerup_s2, folder: no file matches a pattern of the layout" in printed
 
 
-def test_check_names_tables_that_no_command_reads(copy, capsys):
+def test_check_reports_tables_that_no_command_reads(copy, capsys):
     for name in ("turnouts.csv", "config (1).yaml", "README.md", ".lock"):
         (copy / "config" / name).write_bytes(b"")
     main(["check"])
-    said = capsys.readouterr().out
-    assert said.count("no command reads a file of this name") == 2
-    assert "config/turnouts.csv: no command" in said and "config/config (1).yaml: no command" in said
+    printed = capsys.readouterr().out
+    assert printed.count("no command reads a file of this name") == 2
+    assert "config/turnouts.csv: no command" in printed and "config/config (1).yaml: no command" in printed
 
 
-def test_check_names_folders_that_no_turnout_reads(copy, capsys):
+def test_check_reports_folders_that_no_turnout_reads(copy, capsys):
     for name in ("raw/tommerup_s1", "raw/line_7/v7", "raw/W 12"):
         (copy / name).mkdir(parents=True)
     main(["check"])
-    said = capsys.readouterr().out
-    assert "raw/W 12: no turnout reads this folder" in said and "raw/line_7: no turnout reads this folder" in said
-    assert "raw/tommerup_s1: no turnout" not in said
+    printed = capsys.readouterr().out
+    assert "raw/W 12: no turnout reads this folder" in printed and "raw/line_7: no turnout reads this folder" in printed
+    assert "raw/tommerup_s1: no turnout" not in printed
     assert main(["add", "odense_v7", "tommerup", "--raw", "line_7/v7"]) == 0
     main(["check"])
     assert "raw/line_7: no turnout" not in capsys.readouterr().out
 
 
-def test_show_and_plan_and_formats_speak(copy, capsys):
+def test_show_plan_and_formats_print_their_results(copy, capsys):
     assert main(["config", "show", "aarup_n4", "--only", "sections.A9"]) == 0
     assert "config/layouts/tommerup.yaml, line" in capsys.readouterr().out
     assert main(["plan"]) == 1 and main(["check", "--formats"]) == 0  # the copy has no recordings

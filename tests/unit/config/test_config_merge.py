@@ -1,4 +1,4 @@
-"""Defaults < config.yaml < layout < row < override, and hashes that change exactly when a result may."""
+"""The order of precedence is defaults, config.yaml, layout, row, override; hashes change exactly when results can."""
 
 import pickle
 
@@ -46,7 +46,7 @@ def folder(tmp_path):
     return config
 
 
-def test_the_later_one_wins_key_by_key(folder):
+def test_a_later_file_overrides_an_earlier_one_key_by_key(folder):
     one, two, three = map(load_configuration(folder).turnout, ("t1", "t2", "t3"))
     assert [t.settings["receptance"].gate_level for t in (one, two, three)] == [0.7, 0.7, 0.9]
     assert {t.settings["receptance"].minimum_impacts for t in (one, two, three)} == {5}
@@ -55,7 +55,7 @@ def test_the_later_one_wins_key_by_key(folder):
     assert [[s.pad for s in t.sections] for t in (one, two)] == [["EVA", ""], ["HDPE", "HDPE"]]
 
 
-def test_a_section_may_differ(folder):
+def test_a_section_can_override_the_layout(folder):
     hammer = load_configuration(folder).turnout("t1").hammer
     rails = {label: d.channels[1] for label, d in hammer.descriptions.items()}
     assert (rails["A7"].limit, rails["A8"].limit) == (None, 500.0)
@@ -64,7 +64,7 @@ def test_a_section_may_differ(folder):
     assert (force.source, force.position, force.sensitivity) == (1, None, 0.23)
 
 
-def test_every_value_names_its_file(folder):
+def test_every_value_has_its_source_file_and_line(folder):
     found = {key: (value, source) for key, value, source in sources(load_configuration(folder), "t3")}
     assert found["hammer.rate"] == (8000, "config/overrides/t3.yaml, line 1")
     assert found["hammer.force"] == ("force", "config/layouts/main.yaml, line 13")
@@ -74,7 +74,7 @@ def test_every_value_names_its_file(folder):
 
 
 def changed_hashes(folder, change):
-    """Kinds of hash of turnout t1 that ``change`` moves; "" is the whole."""
+    """Kinds of hash of turnout t1 that ``change`` alters; "" is the hash of everything."""
     before = load_configuration(folder)
     change(folder)
     after = load_configuration(folder)
@@ -91,11 +91,11 @@ def rewrite(name, old, new):
 
 
 @pytest.mark.parametrize(
-    "change, moved",
+    "change, changed",
     [
         (rewrite("config.yaml", "minimum_impacts: 5", "minimum_impacts: 6"), {"", "hammer"}),
         (rewrite("config.yaml", "minimum_impacts: 5", "minimum_impacts:   5"), set()),
-        (rewrite("config.yaml", "gate_level: 0.6", "gate_level: 0.5"), set()),  # the layout says 0.7
+        (rewrite("config.yaml", "gate_level: 0.6", "gate_level: 0.5"), set()),  # the layout overrides it with 0.7
         (rewrite("config.yaml", "receptance", "fleet: {shards: 64}\nreceptance"), set()),
         (rewrite("turnouts.tsv", "One", "Number one"), set()),
         (rewrite("layouts/main.yaml", "records: 10", "records: 12"), {"", "hammer"}),
@@ -104,11 +104,11 @@ def rewrite(name, old, new):
         (rewrite("overrides/t3.yaml", "8000", "9000"), set()),
     ],
 )
-def test_the_hash_moves_when_a_result_may(folder, change, moved):
-    assert changed_hashes(folder, change) == moved
+def test_a_hash_changes_when_a_result_can_change(folder, change, changed):
+    assert changed_hashes(folder, change) == changed
 
 
-def test_a_written_default_is_the_default(folder):
+def test_a_default_that_is_written_out_changes_no_hash(folder):
     from turnout.config.settings.receptance import ReceptanceSettings
 
     default = ReceptanceSettings().weak
@@ -116,7 +116,7 @@ def test_a_written_default_is_the_default(folder):
     assert changed_hashes(folder, change) == set()
 
 
-def test_a_list_is_replaced_whole(tmp_path):
+def test_a_list_is_replaced_completely(tmp_path):
     (tmp_path / "a.yaml").write_text("a: {x: [1, 2, 3], y: 1}")
     (tmp_path / "b.yaml").write_text("a: {x: [9]}")
     assert plain_values(merge_branches(load(tmp_path / "a.yaml"), load(tmp_path / "b.yaml"))) == {
@@ -124,12 +124,12 @@ def test_a_list_is_replaced_whole(tmp_path):
     }
 
 
-def test_it_travels_between_processes(folder):
+def test_a_turnout_can_be_pickled(folder):
     turnout = load_configuration(folder).turnout("t1")
     assert pickle.loads(pickle.dumps(turnout)) == turnout
 
 
-def test_an_unknown_turnout_is_said(folder):
+def test_an_unknown_turnout_is_an_error(folder):
     with pytest.raises(ConfigError, match=r"no turnout 't4'\. Allowed: t1, t2, t3"):
         load_configuration(folder).turnout("t4")
 
@@ -145,7 +145,7 @@ campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator
 """
 
 
-def test_unsound_campaigns_are_said_and_the_others_used(folder, tmp_path):
+def test_faulty_campaigns_are_reported_and_the_others_are_used(folder, tmp_path):
     from turnout.config.campaign_notes import read_notes
 
     (tmp_path / "raw/t1").mkdir(parents=True)
@@ -158,6 +158,6 @@ def test_unsound_campaigns_are_said_and_the_others_used(folder, tmp_path):
     assert not turnout.campaigns["2031-01-01"].listed
 
 
-def test_no_notes_are_no_error(folder, tmp_path):
+def test_a_turnout_without_campaign_notes_is_no_error(folder, tmp_path):
     turnout = with_raw(load_configuration(folder).turnout("t1"), tmp_path)
     assert len(turnout.campaigns) == 0 and turnout.trains == ()

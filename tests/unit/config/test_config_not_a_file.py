@@ -1,4 +1,4 @@
-"""A name of the configuration that is a folder, or a link to nothing, is said: it is no file that is not there."""
+"""A folder or a broken link in place of a configuration file is reported: it is not treated as a missing file."""
 
 import errno
 import os
@@ -30,8 +30,8 @@ def config(tmp_path, repository, monkeypatch):
     return tmp_path / "config"
 
 
-def put(path, kind):
-    """A share that is not mounted leaves such links: what lies behind them, maintenance above all, must not be lost."""
+def replace_file(path, kind):
+    """Broken links result from a share that is not mounted; the files behind them must not be lost."""
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)
     path.mkdir() if kind == "folder" else path.symlink_to(path.parent / "share" / path.name)
@@ -39,19 +39,19 @@ def put(path, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", ALL)
-def test_it_is_said_by_name_and_nothing_goes_on_without_it(config, capsys, name, kind):
-    put(config / name, kind)
+def test_check_reports_the_name_and_fails(config, capsys, name, kind):
+    replace_file(config / name, kind)
     assert main(["check"]) != 0
-    told = "".join(capsys.readouterr())
-    assert f"config/{name}, line 1" in told and KINDS[kind] in told
+    printed = "".join(capsys.readouterr())
+    assert f"config/{name}, line 1" in printed and KINDS[kind] in printed
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_row_is_not_entered_elsewhere_and_one_sentence_says_why(config, capsys, name, kind):
-    put(config / name, kind)
+def test_a_row_is_not_written_to_another_file_and_one_sentence_states_the_reason(config, capsys, name, kind):
+    replace_file(config / name, kind)
     assert main(COMMANDS[name]) == 2
-    assert f"config/{name}" in (said := capsys.readouterr().err) and KINDS[kind] in said
+    assert f"config/{name}" in (message := capsys.readouterr().err) and KINDS[kind] in message
     assert not (config / "share").exists() and (config / name).is_symlink() == (kind == "link")
 
 
@@ -69,54 +69,54 @@ def test_nobody_is_asked_to_remove_a_file_that_only_cannot_be_opened(code, remed
     assert str(caught.value) == f"config/turnouts.tsv, line 1: cannot be read: {os.strerror(code)}. {remedy}."
 
 
-def test_a_table_that_may_not_be_written_is_one_sentence(config, capsys, monkeypatch):
+def test_a_table_without_write_permission_gives_one_sentence(config, capsys, monkeypatch):
     def reject(path, content):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("turnout.config.table_edits.write_atomic", reject)  # we may be root
+    monkeypatch.setattr("turnout.config.table_edits.write_atomic", reject)  # as root has every permission
     assert main(COMMANDS["events.csv"]) == 2
-    said = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
-    assert capsys.readouterr().err.startswith(said)
+    message = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
+    assert capsys.readouterr().err.startswith(message)
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         ("vehicles: [1\n", "vehicles and trains: "),
         ("vehicles: [1, 2]\ntrains: {}\n", "vehicles and trains: "),
         ("vehicles: \0\n", "the character '\\x00', which no YAML file may hold"),
     ],
 )
-def test_axle_patterns_that_are_no_yaml_or_no_patterns_are_said_by_name(tmp_path, content, said):
+def test_the_error_of_a_file_without_valid_axle_patterns_names_the_file(tmp_path, content, message):
     path = tmp_path / "axles.yaml"
     path.write_text(content)
     with pytest.raises(ConfigError, match=r"axles\.yaml") as caught:
         known_patterns(str(path))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_axle_patterns_that_the_settings_name_and_that_are_not_there_are_said(tmp_path, monkeypatch):
-    """The usual file need not be there: no train has a type then. A path that somebody wrote is a wish."""
+def test_a_missing_file_of_axle_patterns_that_the_settings_name_is_an_error(tmp_path, monkeypatch):
+    """The default file may be absent: then no train has a type. A path that a user wrote must exist."""
     monkeypatch.chdir(tmp_path)
     assert known_patterns(PassageSettings().axle_patterns) == ()
     with pytest.raises(ConfigError, match=r"axels\.yaml, passage.axle_patterns: there is no such file"):
         known_patterns("config/vehicles/axels.yaml")
 
 
-def test_trains_of_a_folder_that_is_not_there_are_rejected(tmp_path, capsys):
+def test_the_command_trains_needs_an_existing_folder(tmp_path, capsys):
     assert main(["trains", "--raw", str(tmp_path / "rawe")]) == 2
     assert "there is no folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["report", "--cores", "0"], ["query", "from modes", "--rows", "-5"]])
-def test_a_count_of_nothing_is_rejected(command, capsys):
+def test_a_count_below_one_is_rejected(command, capsys):
     with pytest.raises(SystemExit):
         main(command)
     assert "is not a whole number of 1 or more" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         ("sources: [paper]\nx: {value: 1, unit: m, source: paper}\n", "line 1, sources: is not a mapping"),
         ("x: {value: 1, unit: m, source: [a, b]}\n", "line 1, x: a number without source"),
@@ -128,15 +128,15 @@ def test_a_count_of_nothing_is_rejected(command, capsys):
         ("x: &whole\n  y: [*whole]\n", "line 1, column 4: it contains itself. Write out what the alias stands for"),
     ],
 )
-def test_sources_and_units_of_another_kind_are_said_with_their_line(tmp_path, content, said):
+def test_sources_units_and_priors_of_a_wrong_kind_are_reported_with_their_line(tmp_path, content, message):
     path = tmp_path / "track.yaml"
     path.write_text(content)
     with pytest.raises(ConfigError) as caught:
         read_parameters(path)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_an_emptied_table_of_sources_is_none(tmp_path):
+def test_an_empty_table_of_sources_is_accepted(tmp_path):
     path = tmp_path / "track.yaml"
     path.write_text("sources:\nx: {value: 2, unit: mm, source: drawing}\n")
     assert read_parameters(path).number("x", "m") == 0.002

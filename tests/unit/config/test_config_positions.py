@@ -1,4 +1,4 @@
-"""Positions in turnouts.tsv that others contradict: remarks of ``turnout check`` that stop nothing."""
+"""Positions in turnouts.tsv that contradict others: ``turnout check`` prints a remark, and no run fails."""
 
 import pytest
 from tests.unit.config.test_config_wrong_input import LAYOUT, configuration
@@ -47,7 +47,7 @@ def test_coordinates_that_fit_only_if_they_are_swapped_are_reported(rows, zone, 
     ("cells", "n"),
     [(("12.4", "13.1", "9100"), 1), (("12.4", "13.1", "210.7"), 0), (("0", "0.1", "8.2"), 0), (("9100", "8200"), 0)],
 )
-def test_a_kilometre_in_metres_is_reported_by_the_others_of_its_line(cells, n, tmp_path):
+def test_a_kilometre_in_metres_is_found_by_comparison_with_the_same_line(cells, n, tmp_path):
     found = remarks(tmp_path, [f"A\t{km}\t\t" for km in (*cells,)] + ["B\t4000\t\t"])
     assert [("km 9100 of t2 seems to be in metres" in r, r.endswith("such as 9.1")) for r in found] == [
         (True, True)
@@ -59,7 +59,7 @@ def test_turnouts_without_a_line_are_not_compared_by_kilometre(tmp_path):
 
 
 @pytest.mark.parametrize("km", ["12,345,678", "12345678", "12345"])
-def test_a_kilometre_that_no_line_has_is_an_error(km, tmp_path):
+def test_a_kilometre_above_10000_is_an_error(km, tmp_path):
     with pytest.raises(ConfigErrors, match=r"km is .*Write a number from 0 to 10000"):
         remarks(tmp_path, [f"A\t{km}\t\t"])
 

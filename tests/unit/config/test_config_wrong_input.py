@@ -1,4 +1,4 @@
-"""Every kind of wrong row or key is said with file, line, column, what stands there and what to write instead."""
+"""Every kind of wrong row or key is reported with file, line, column, the wrong text and the remedy."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -302,7 +302,7 @@ WRONG = {
 }
 
 
-def test_a_section_whose_lines_are_all_comments_is_empty(tmp_path, capsys):
+def test_settings_whose_lines_are_all_comments_are_empty(tmp_path, capsys):
     read = configuration(
         tmp_path, settings="receptance:\n  # gate_level: 0.9\ntrend:\n", override=("t1.yaml", "hammer:\n")
     )
@@ -319,7 +319,7 @@ def test_a_channel_of_a_passage_that_is_ignored_needs_no_section(tmp_path, capsy
     assert dict(passages.sections) == {"web": "A8"}
 
 
-def test_a_byte_that_is_not_utf_8_is_said_with_line_and_column(tmp_path):
+def test_a_byte_that_is_not_utf_8_is_reported_with_line_and_column(tmp_path):
     folder = configuration(tmp_path).folder
     (folder / "config.yaml").write_bytes(b"trend: {}\n# m/s\xb2\n")
     with pytest.raises(ConfigErrors, match=r"config\.yaml, line 2, column 6: a byte that is not UTF-8"):
@@ -327,7 +327,7 @@ def test_a_byte_that_is_not_utf_8_is_said_with_line_and_column(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["add", "t3", "main", "--km", "3,4"], "turnouts.tsv, the new row, which was not written: km is '3,4'. Write"),
         (["add", "t3", "mian"], "turnouts.tsv, the new row, which was not written: no layout 'mian'. Did you mean"),
@@ -335,12 +335,12 @@ def test_a_byte_that_is_not_utf_8_is_said_with_line_and_column(tmp_path):
         (["add", "t1", "main"], "turnouts.tsv, line 2: there is a turnout 't1' already"),
     ],
 )
-def test_an_error_of_a_new_row_names_no_line_that_the_table_lacks(tmp_path, capsys, words, said):
+def test_an_error_of_a_new_row_states_no_line_that_the_table_lacks(tmp_path, capsys, words, message):
     assert main([*words, "--configuration", str(configuration(tmp_path).folder)]) == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
-def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
+def test_every_error_of_an_event_is_reported_with_its_cell(tmp_path):
     with pytest.raises(ConfigErrors) as caught:
         configuration(tmp_path, events='turnout,section,date,kind,resets\n"t1",B1,1.1.2025,taming,ballst\n')
     places = [(e.place, e.problem.split(" is ")[0]) for e in caught.value.errors]
@@ -349,7 +349,7 @@ def test_every_error_of_an_event_is_said_at_its_cell(tmp_path):
     ]  # fmt: skip
 
 
-def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
+def test_different_spellings_of_one_raw_folder_are_the_same_folder(tmp_path):
     path = tmp_path / "turnouts.tsv"
     spelt = {
         "T1": "line_7/T1",
@@ -370,19 +370,19 @@ def test_a_raw_folder_is_one_however_it_is_spelt(tmp_path):
 HEADER = "turnout,section,date,kind\n"
 
 
-def test_a_small_hammer_may_clip_below_the_softest_impact_of_a_large_one(tmp_path):
+def test_the_limit_of_a_small_hammer_may_be_below_the_least_force_of_a_large_one(tmp_path):
     small = LAYOUT.replace("source: force, ", "source: force, limit: 22, ")
     assert configuration(tmp_path, layout=small, settings="receptance: {softest_blow: 0}").ids == ("t1", "t2")
 
 
-def test_a_unit_that_overrules_the_file_is_checked_without_its_mark(tmp_path):
-    """``unit: N!`` is what the reader proposes where file and layout differ."""
-    overruled = LAYOUT.replace("unit: V, sensitivity: 0.23, sensitivity_unit: mV/N", "unit: N!")
+def test_a_unit_that_overrides_the_file_is_checked_without_its_exclamation_mark(tmp_path):
+    """The reader proposes ``unit: N!`` where file and layout differ."""
+    overridden = LAYOUT.replace("unit: V, sensitivity: 0.23, sensitivity_unit: mV/N", "unit: N!")
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-    assert overruled != LAYOUT and configuration(tmp_path / "a", layout=overruled).ids == ("t1", "t2")
+    assert overridden != LAYOUT and configuration(tmp_path / "a", layout=overridden).ids == ("t1", "t2")
     with pytest.raises(ConfigErrors, match="'furlong!'"):
-        configuration(tmp_path / "b", layout=overruled.replace("N!", "furlong!"))
+        configuration(tmp_path / "b", layout=overridden.replace("N!", "furlong!"))
 
 
 def test_a_pattern_matches_names_with_composed_umlauts():
@@ -391,7 +391,7 @@ def test_a_pattern_matches_names_with_composed_umlauts():
     assert compile_pattern(decomposed, "hammer", ("A7",)).fullmatch("hammer/2024-05-13/Pr\u00fcfung_A7_1.uff")
 
 
-def test_an_event_of_another_century_is_said_and_planned_work_is_no_fault(tmp_path, capsys):
+def test_an_event_far_in_the_future_is_reported_and_planned_maintenance_is_no_fault(tmp_path, capsys):
     today = datetime.now(UTC).date()
     soon, tomorrow = today + timedelta(days=40), today + timedelta(days=1)
     events = f"{HEADER}t1,,{tomorrow},tamping\nt2,A8,{soon},grinding\n"
@@ -399,22 +399,25 @@ def test_an_event_of_another_century_is_said_and_planned_work_is_no_fault(tmp_pa
     assert read.warnings == ()
     folder = ["--configuration", str(read.folder)]
     assert main(["check", *folder]) == 0
-    said = capsys.readouterr().out
-    assert f"planned, counts from its day: grinding at t2/A8, {soon} (events.csv)" in said and str(tomorrow) not in said
+    messages = capsys.readouterr().out
+    assert (
+        f"planned, counts from its day: grinding at t2/A8, {soon} (events.csv)" in messages
+        and str(tomorrow) not in messages
+    )
     (read.folder / "events.csv").write_text(f"{events}t1,A7,2205-04-02,tamping\n")
     assert main(["check", *folder]) == 1
-    said = capsys.readouterr().out
+    messages = capsys.readouterr().out
     assert (
         "does not count: config/events.csv, line 4, column 7: date 2205-04-02 is more than a year ahead. Correct"
-        in said
+        in messages
     )
     assert (
-        "planned, counts from its day: grinding at t2/A8" in said
-        and "planned, counts from its day: tamping" not in said
+        "planned, counts from its day: grinding at t2/A8" in messages
+        and "planned, counts from its day: tamping" not in messages
     )
 
 
-def test_without_any_turnout_it_is_said_how_to_add_one(tmp_path, capsys):
+def test_the_error_states_how_to_add_a_turnout_if_there_is_none(tmp_path, capsys):
     read = configuration(tmp_path, table="turnout\tlayout\n", events=f"{HEADER}t1,,2025-01-01,tamping\n")
     (warning,) = map(str, read.warnings)
     none = "There are no turnouts yet: add one with 'turnout add ID LAYOUT'."
@@ -427,15 +430,15 @@ def test_without_any_turnout_it_is_said_how_to_add_one(tmp_path, capsys):
         load_configuration(read.folder)
 
 
-def test_add_names_a_table_without_tabs(tmp_path, capsys):
+def test_add_reports_a_table_without_tabs(tmp_path, capsys):
     folder = configuration(tmp_path).folder
     (folder / "turnouts.tsv").write_text("turnout;layout\n")
     assert main(["add", "t9", "main", "--configuration", str(folder)]) == 2
     assert "turnouts.tsv, line 1, column 1: semicolons between the columns. Put tabs between" in capsys.readouterr().err
 
 
-def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_path, capsys):
-    """Or of one that is misspelt: the fleet goes on, and the row is named. History keeps it."""
+def test_an_event_of_a_turnout_without_a_row_is_reported_and_stops_no_run(tmp_path, capsys):
+    """The turnout was removed or is misspelt: the event stays in the history, and the fleet is computed."""
     events = "turnout,section,date,kind\nt2,,2025-01-01,tamping\nt7,A8,2025-02-01,grinding\n"
     read = configuration(tmp_path, events=events)
     assert [(e.turnout, e.kind) for e in read.events] == [("t2", "tamping"), ("t7", "grinding")]
@@ -448,26 +451,26 @@ def test_an_event_of_a_turnout_that_was_taken_out_stops_nothing_and_is_said(tmp_
     assert main(["events", "t7", "tamping", "2025-03-01", *folder]) == 2
     assert "turnout 't7' has no row in turnouts.tsv" in capsys.readouterr().err
     assert (read.folder / "events.csv").read_bytes() == before
-    with pytest.raises(ConfigErrors, match="Did you mean 'tamping'"):  # what else is wrong in such a row is an error
+    with pytest.raises(ConfigErrors, match="Did you mean 'tamping'"):  # any other fault in such a row is an error
         configuration(tmp_path / "other", events=events.replace("grinding", "tampin"))
 
 
-def test_an_event_of_a_section_that_left_its_layout_stops_nothing_and_is_said(tmp_path, capsys):
+def test_an_event_of_a_section_that_the_layout_no_longer_has_is_reported_and_stops_no_run(tmp_path, capsys):
     read = configuration(tmp_path, events="turnout,section,date,kind\nt1,B1,2025-01-01,tamping\n")
     assert [(e.turnout, e.section, e.kind) for e in read.events] == [("t1", "B1", "tamping")]
     (warning,) = map(str, read.warnings)
     assert warning.startswith("config/events.csv, line 2, column 4: turnout 't1' has no section 'B1'")
     folder = ["--configuration", str(read.folder)]
-    assert main(["events", "t1/B1", "tamping", "2025-03-01", *folder]) == 2  # a new one is a slip
+    assert main(["events", "t1/B1", "tamping", "2025-03-01", *folder]) == 2  # a new event of such a section is an error
     assert "no section 'B1'" in capsys.readouterr().err
 
 
-def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):
+def test_a_faulty_turnouts_table_causes_no_error_of_an_event(tmp_path):
     with pytest.raises(ConfigErrors) as caught:
         events = "turnout,section,date,kind\nt1,,2025-01-01,tamping\nt2,,2025-01-01,taming\n"
         configuration(tmp_path, table="turnout\tlayuot\nt1\tmain\n", events=events)
-    said = [str(e) for e in caught.value.errors]
-    assert not [s for s in said if "has no row" in s] and [s for s in said if "events.csv, line 3" in s]
+    messages = [str(e) for e in caught.value.errors]
+    assert not [s for s in messages if "has no row" in s] and [s for s in messages if "events.csv, line 3" in s]
 
 
 @pytest.mark.parametrize(
@@ -481,7 +484,7 @@ def test_a_broken_table_of_turnouts_accuses_no_event(tmp_path):
         ("2025-01-10,2025-03-10T10:00,3", 12, "is not on the campaign's day 2025-01-10"),
     ],
 )
-def test_a_wrong_campaign_is_said_with_column_value_and_what_to_write(tmp_path, row, column, found):
+def test_a_wrong_campaign_is_reported_with_column_value_and_remedy(tmp_path, row, column, found):
     path = tmp_path / "campaigns.csv"
     path.write_text(f"campaign,started_at_utc,rail_temperature_c\n2025-01-03,2025-01-03T10:00,\n{row}\n", "utf-8")
     campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
@@ -524,7 +527,7 @@ def test_a_share_in_percent_is_recognised(tmp_path):
         ("sender", "a@b.c, d@e.f", "name@host or Name <name@host>"),
     ],
 )
-def test_an_address_to_which_the_night_cannot_send_is_recognised(key, value, words, tmp_path):
+def test_an_address_to_which_the_nightly_run_cannot_send_is_an_error(key, value, words, tmp_path):
     with pytest.raises(ConfigErrors) as caught:
         configuration(tmp_path, settings=f"alerts: {{{key}: '{value}'}}")
     assert f"{key} is {value!r}. Write {words}" in str(caught.value)
@@ -541,12 +544,12 @@ def test_an_address_to_which_the_night_cannot_send_is_recognised(key, value, wor
         ("sender", "Turnout <a@b.c>"),
     ],
 )
-def test_an_address_that_the_night_can_use_is_accepted(key, value, tmp_path):
+def test_an_address_that_the_nightly_run_can_use_is_accepted(key, value, tmp_path):
     assert configuration(tmp_path, settings=f"alerts: {{{key}: '{value}'}}").settings["alerts"] is not None
 
 
 @pytest.mark.parametrize("kind", WRONG)
-def test_it_is_said_where_and_what_to_write(tmp_path, kind):
+def test_each_error_states_its_place_and_the_remedy(tmp_path, kind):
     changes, words = WRONG[kind]
     with pytest.raises(ConfigErrors) as caught:
         configuration(tmp_path, **changes)
@@ -554,7 +557,7 @@ def test_it_is_said_where_and_what_to_write(tmp_path, kind):
     assert len(caught.value.errors) == 1, str(caught.value)
 
 
-def test_all_errors_come_at_once(tmp_path):
+def test_all_errors_are_reported_together(tmp_path):
     with pytest.raises(ConfigErrors) as caught:
         configuration(
             tmp_path, layout=LAYOUT.replace("panel: CP", "panle: CP"), table=TABLE + "t1\tmain\n",
@@ -565,7 +568,7 @@ def test_all_errors_come_at_once(tmp_path):
     assert len(caught.value.errors) == 2 + 1 + 1  # the layout's two sections, the row, the setting
 
 
-def test_the_sound_one_is_accepted(tmp_path):
+def test_a_correct_configuration_is_accepted(tmp_path):
     assert configuration(tmp_path).ids == ("t1", "t2")
 
 
@@ -592,7 +595,7 @@ def test_a_folder_in_place_of_an_override_is_an_error(tmp_path):
         (["check", "--raw", "nothere"], "nothere, --raw: no such folder"),
     ],
 )
-def test_a_wrong_option_is_said(repository, monkeypatch, capsys, command, words):
+def test_a_wrong_option_is_reported(repository, monkeypatch, capsys, command, words):
     from turnout.cli.main import main
 
     monkeypatch.chdir(repository)
@@ -607,7 +610,7 @@ def test_a_file_that_would_not_be_read_is_an_error(tmp_path, parts):
         load_configuration(tmp_path / "config", FORMATS, to_si)
 
 
-def test_what_holds_for_the_fleet_is_not_offered_to_a_layout(repository):
+def test_the_schema_of_a_layout_has_no_settings_of_the_whole_fleet(repository):
     import json
 
     schema = json.loads((repository / "config/schema/override.json").read_text())

@@ -1,4 +1,4 @@
-"""What was found stands beside what is true, and a run prints one line per stage."""
+"""The comparison lists each result beside the true value, and a run prints one line per stage."""
 
 import json
 import sys
@@ -66,7 +66,7 @@ def connection():
     return con
 
 
-def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth):
+def test_every_fault_and_change_has_a_row_with_the_result(connection, truth):
     rows = {row.where: row for row in compare(connection, truth, "listed")}
     drift = rows["W1 A8 ballast"]
     assert drift.truth == "stiffness -15 % by 2026-01-01, from 2025-01-01"
@@ -79,18 +79,20 @@ def test_every_fault_and_change_has_a_row_with_what_was_found(connection, truth)
     assert gap.found.endswith("stiffness about -51 %, from 2025-01-10; diagnosis: a hanging sleeper at 36.0 m")
     diagnosis = rows["W1 ASM diagnosis"]
     assert (diagnosis.truth, diagnosis.found) == (gap.truth, "hanging sleeper or local ballast at 36.0 m")
-    assert rows["W1 A8 diagnosis"].found == "no diagnosis" and "W1 CLP diagnosis" not in rows  # its work is noted
+    assert (
+        rows["W1 A8 diagnosis"].found == "no diagnosis" and "W1 CLP diagnosis" not in rows
+    )  # its maintenance is recorded
     weld = rows["W1 OT trains"]
     assert weld.truth == "weld at -11.7 m dips by 0.32 mm by 2026-01-01, from 2025-11-01"
     assert weld.found == "inspect this week: weekly peak acceleration +31 %, from 2025-11-17"
     assert rows["W1 SP, test 2"].found == "truncated"
     assert rows["W1 OT, test 1"].found == "nothing (another reason)"
-    # A9 is diagnosed together with ASM, where a sleeper hangs; A7 with nothing that has changed
+    # A9 is diagnosed together with ASM, which has a hanging sleeper; A7 only with sections without a change
     assert rows["other charts there and beside"].found == "2 alarms: W1/ASM ballast damping, W1/A9 ballast"
     assert rows["all other sections"].found == "1 alarm: W1/A7 railpad"
 
 
-def test_impacts_of_damaged_files_do_not_count(connection, truth):
+def test_impacts_of_damaged_files_are_not_counted(connection, truth):
     rows = [(r.truth, r.found) for r in compare(connection, truth, "listed") if r.where == "all turnouts"]
     assert rows == [("2 double impacts", "1 rejected"), ("0 overloaded impacts", "0 rejected")]
 
@@ -101,17 +103,17 @@ def test_columns_are_aligned(connection, truth):
     assert lines[0].split() == ["where", "true", "found"] and all(line[start - 1] == " " for line in lines)
 
 
-def test_shards_at_the_same_time_are_one_line():
+def test_shards_that_run_at_the_same_time_are_one_line():
     output = ["rule hammer:", "rule hammer:", "Finished jobid: 3 (Rule: hammer)", "Finished jobid: 4 (Rule: hammer)"]
     output += ["localrule all:", "Finished jobid: 0 (Rule: all)"]
     assert list(stage_lines(output, iter([0.0, 1.0, 90.0]).__next__)) == ["hammer tests: 90 s"]
 
 
-@pytest.mark.parametrize(("code", "said"), [(0, ["   pages: 0 s"]), (3, ["   pages: 0 s", "more"])])
-def test_output_goes_to_the_log_and_a_failure_is_shown(tmp_path, code, said):
+@pytest.mark.parametrize(("code", "expected"), [(0, ["   pages: 0 s"]), (3, ["   pages: 0 s", "more"])])
+def test_output_goes_to_the_log_and_a_failure_is_shown(tmp_path, code, expected):
     script = "print('rule report:\\nFinished jobid: 1 (Rule: report)\\nlast words'); raise SystemExit(" + f"{code})"
-    heard = []
+    printed = []
     log = tmp_path / "logs/run.log"
-    assert run_with_progress([sys.executable, "-c", script], log, heard.append) == code
-    assert "last words" in log.read_text() and heard[0] == said[0]
-    assert len(heard) == (1 if code == 0 else 3) and (code == 0 or "last words" in heard[1])
+    assert run_with_progress([sys.executable, "-c", script], log, printed.append) == code
+    assert "last words" in log.read_text() and printed[0] == expected[0]
+    assert len(printed) == (1 if code == 0 else 3) and (code == 0 or "last words" in printed[1])

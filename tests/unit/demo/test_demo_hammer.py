@@ -1,4 +1,4 @@
-"""Impacts of the demonstration fleet hold the receptance of the track that made them."""
+"""The receptance of the impacts of the demonstration fleet is that of the simulated track."""
 
 import datetime
 
@@ -14,8 +14,8 @@ from turnout.simulate.turnout_track import stretch_of_track
 
 
 @pytest.mark.parametrize("section", ["A8", "SP"])
-def test_receptance_of_the_recordings_is_that_of_the_track(section):
-    """Below the resonances too, where a response that was cut at the impact would show a falling mass."""
+def test_the_receptance_of_the_recordings_equals_that_of_the_track(section):
+    """Below the resonances, too, where a response that is cut at the impact would resemble that of a free mass."""
     impacts, truth = hammer_test(
         simulated_response(section, 1.0, 1.0), 10.0, datetime.date(2025, 1, 1), 1, np.random.default_rng(1), 60
     )

@@ -1,4 +1,4 @@
-"""Impacts and trains of one day meet the same track, with the changes of all of its sections."""
+"""Impacts and trains of one day are simulated on the same track, with the changes of all of its sections."""
 
 import datetime
 
@@ -22,7 +22,7 @@ class _NoScatter:
         return 0.0
 
 
-def test_soft_ballast_of_one_section_is_felt_by_impacts_on_the_next():
+def test_soft_ballast_of_one_section_changes_the_receptance_of_the_next():
     """A8 begins 0.6 m behind A7; its ballast has lost 18 % in 450 days at 15 % a year: 0.85 ** 1.232."""
     as_built = load_track("tommerup")
     soft = unloaded_track_on(SCENARIOS["tommerup_s2"], LAST_DAY, WARM)
@@ -42,7 +42,7 @@ def test_soft_ballast_of_one_section_is_felt_by_impacts_on_the_next():
     assert np.max(np.abs(expected / alone - 1)) > 0.1
 
 
-def test_a_hanging_sleeper_touches_its_ballast_under_trains_alone():
+def test_a_hanging_sleeper_has_ballast_contact_only_under_trains():
     scenario = SCENARIOS["aarup_n4"]
     loaded, unloaded = track_on(scenario, LAST_DAY, WARM), unloaded_track_on(scenario, LAST_DAY, WARM)
     position, route = loaded.locations["ASM"]

@@ -1,4 +1,4 @@
-"""The weekly trains of the demonstration are what a simulation of each train would give, on the days of a timetable."""
+"""The weekly trains of the demonstration equal direct simulations and run on the days of a timetable."""
 
 import json
 from collections import Counter
@@ -31,7 +31,7 @@ def test_every_week_has_five_trains_on_the_main_track():
 
 @pytest.fixture(scope="module")
 def runs():
-    """The locomotive as simulated; the other kinds are silent."""
+    """The locomotive as simulated; the recordings of the other trains are zero."""
     jobs = weekly_jobs(SCENARIO, POSITIONS, date(2026, 7, 25), 70)
     chosen = [job for job in jobs if job[2].vehicle == "locomotive"]
     simulated = {job[3]: simulate_run(job) for job in chosen}
@@ -39,7 +39,7 @@ def runs():
     return simulated, [simulated[job[3]] if job[2].vehicle == "locomotive" else silent for job in jobs]
 
 
-def test_a_dip_at_one_section_is_recorded_there_and_not_ten_metres_away(runs):
+def test_a_dip_changes_the_recording_of_its_section_and_not_that_ten_metres_away(runs):
     simulated, _ = runs
     band = signal.butter(4, [80.0, 800.0], "bandpass", fs=10e3, output="sos")
     peak = {name: np.abs(signal.sosfilt(band, samples)).max(axis=1) for name, samples in simulated.items()}
@@ -48,7 +48,7 @@ def test_a_dip_at_one_section_is_recorded_there_and_not_ten_metres_away(runs):
     assert peak["light"][2] == pytest.approx(0.02 * peak["light"][1], rel=0.6)  # crosstalk from the other track
 
 
-def test_recordings_hold_the_simulated_train_and_the_noise(runs, tmp_path, monkeypatch):
+def test_recordings_are_the_simulated_train_and_noise(runs, tmp_path, monkeypatch):
     """At the speed of the timetable, with the smaller load, before the weld dips: the simulated train itself."""
     simulated, all_runs = runs
     monkeypatch.setattr(weekly_trains, "WEEKDAYS", ((4,),))
@@ -68,7 +68,7 @@ def test_recordings_hold_the_simulated_train_and_the_noise(runs, tmp_path, monke
     assert wide[0]["dip_m"] == pytest.approx(0.4e-3)
 
 
-def test_trains_of_the_list_form_clusters(tmp_path, repository, monkeypatch):
+def test_trains_of_the_timetable_form_clusters(tmp_path, repository, monkeypatch):
     monkeypatch.chdir(tmp_path)
     silent = [np.zeros((3, 400), dtype=np.float32)] * (len(KINDS) * len(RUNS))
     write_weekly_trains(tmp_path / "raw", SCENARIO, POSITIONS, silent, 1, date(2026, 7, 25), 20)
@@ -79,7 +79,7 @@ def test_trains_of_the_list_form_clusters(tmp_path, repository, monkeypatch):
     assert len(stored["clusters"]) == len(clusters.clusters)
 
 
-def test_kinds_are_trains_of_the_templates():
+def test_the_kinds_of_trains_are_those_of_the_templates():
     assert {replace(kind, speed_kmh=1.0, track="main") for kind in KINDS} == {
         TrainKind("ic3", "IC3", 1.0), TrainKind("intercity", "intercity", 1.0),
         TrainKind("locomotive", "locomotive", 1.0),

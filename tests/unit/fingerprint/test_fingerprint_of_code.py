@@ -1,4 +1,4 @@
-"""The fingerprint moves with what is computed, and with nothing else."""
+"""The fingerprint changes with code that affects results, and with nothing else."""
 
 import shutil
 
@@ -53,7 +53,7 @@ def package(tmp_path, monkeypatch):
     fp.clear_caches()
 
 
-def moved(package, module, name, old, new):
+def is_changed(package, module, name, old, new):
     before = fp.fingerprint(module)
     text = (package / name).read_text()
     assert old in text
@@ -75,8 +75,8 @@ def moved(package, module, name, old, new):
         ("turnout.pages.write", "pages/templates/page.html", "<p>", "<b>"),
     ],
 )
-def test_it_moves(package, module, name, old, new):
-    assert moved(package, module, name, old, new)
+def test_a_change_of_code_or_data_changes_the_fingerprint(package, module, name, old, new):
+    assert is_changed(package, module, name, old, new)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +93,14 @@ def test_it_moves(package, module, name, old, new):
         ("turnout.pages.words", "pages/templates/page.html", "<p>", "<b>"),
     ],
 )
-def test_it_stays(package, module, name, old, new):
-    assert not moved(package, module, name, old, new)
+def test_a_change_of_comments_docstrings_or_unused_modules_does_not_change_the_fingerprint(
+    package, module, name, old, new
+):
+    assert not is_changed(package, module, name, old, new)
 
 
-def test_the_meanings_of_reasons_count_only_where_they_are_shown():
-    """Before, a word in one of them made the next night compute every turnout again."""
+def test_the_texts_of_reasons_affect_only_the_fingerprints_of_registry_and_report():
+    """Otherwise, a changed word in one text would make the next nightly run compute every turnout again."""
     assert "turnout.reasons" not in fp.closure("turnout.stages.hammer", "turnout.stages.mismatch")
     assert fp.fingerprint("turnout.errors", "turnout.reasons") != fp.fingerprint("turnout.errors")
     for rule in ("registry", "report"):
@@ -106,12 +108,12 @@ def test_the_meanings_of_reasons_count_only_where_they_are_shown():
         assert f'fingerprint("turnout.{rule}.job", "turnout.reasons")' in text
 
 
-def test_an_unknown_module_is_said(package):
+def test_an_unknown_module_is_an_error(package):
     with pytest.raises(ValueError, match=r"no module turnout\.nothing"):
         fp.fingerprint("turnout.nothing")
 
 
-def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch):
+def test_the_fingerprint_does_not_depend_on_the_folder_of_the_package(package, tmp_path, monkeypatch):
     before = fp.fingerprint("turnout.core")
     shutil.move(package, tmp_path / "elsewhere")
     monkeypatch.setattr(fp, "ROOT", tmp_path / "elsewhere")
@@ -119,7 +121,7 @@ def test_it_is_the_same_wherever_the_package_lies(package, tmp_path, monkeypatch
     assert fp.fingerprint("turnout.core") == before
 
 
-def test_the_hammer_stage_stands_on_its_parts():
+def test_the_fingerprint_of_the_hammer_stage_covers_the_modules_that_it_uses():
     fp.clear_caches()
     found = fp.closure("turnout.stages.hammer")
     assert {"turnout.hammer_test", "turnout.modal", "turnout.readers.uff", "turnout.signal.spectra"} <= found
@@ -128,7 +130,7 @@ def test_the_hammer_stage_stands_on_its_parts():
     }
 
 
-def test_equal_modules_are_parsed_once(package, monkeypatch):
+def test_an_unchanged_module_is_parsed_once(package, monkeypatch):
     first = fp.fingerprint("turnout.core", "turnout.pages.write")
     fp.clear_caches()
     monkeypatch.setattr(fp.ast, "parse", lambda source: pytest.fail("parsed again"))
@@ -136,7 +138,7 @@ def test_equal_modules_are_parsed_once(package, monkeypatch):
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b'{"sha256": "", "modules": []}', None])
-def test_a_damaged_memory_is_no_fingerprint(package, damage):
+def test_a_damaged_cache_is_not_used(package, damage):
     first = fp.fingerprint("turnout.core")
     file = package / "__pycache__" / "fingerprints.cache"
     if damage is None:  # a digest that does not belong to the module
@@ -147,7 +149,7 @@ def test_a_damaged_memory_is_no_fingerprint(package, damage):
     assert fp.fingerprint("turnout.core") == first
 
 
-def test_a_package_that_cannot_be_written_has_a_fingerprint(package, tmp_path, monkeypatch):
+def test_a_package_in_a_read_only_folder_has_a_fingerprint(package, tmp_path, monkeypatch):
     first = fp.fingerprint("turnout.core")
     shutil.rmtree(package / "__pycache__")
     (package / "__pycache__").write_text("")

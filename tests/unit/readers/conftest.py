@@ -1,4 +1,4 @@
-"""A small hammer test and the two ways in which its files are described."""
+"""A small hammer test and two descriptions of its files."""
 
 import sys
 from datetime import datetime
@@ -9,15 +9,20 @@ import pytest
 
 from turnout.records import Channel, RawChannel, RawDescription, Recording
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the modules beside the tests
+sys.path.insert(0, str(Path(__file__).parent))  # so that tests can import the modules of this folder
 
 RATE = 51200.0
-EXTENSION = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat"}  # others are called like their format
+EXTENSION = {
+    "uff58": "uff",
+    "uff58b": "uff",
+    "hdf5": "h5",
+    "mat73": "mat",
+}  # other extensions equal the name of the format
 
 
 @pytest.fixture
 def hammer_test():
-    """Four records of two channels that differ from each other in scale, sign and content."""
+    """Four records of two channels, which differ from each other in scale, sign and content."""
     rng = np.random.default_rng(20240513)
     channels = (Channel("force", "force"), Channel("rail", "acceleration"))
     return [
@@ -34,7 +39,7 @@ def hammer_test():
 
 @pytest.fixture
 def in_si():
-    """The files hold SI under the channels' own names."""
+    """Description of files that contain SI values under the names of the channels."""
     return RawDescription(
         (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")), rate=RATE
     )
@@ -42,7 +47,7 @@ def in_si():
 
 @pytest.fixture
 def in_volts():
-    """The files hold volts of the paper's sensors, the hammer turned around, the order swapped."""
+    """Description of files that contain volts of the sensors of the paper, with reversed force and exchanged order."""
     rail = RawChannel("rail", "a1", "acceleration", unit="mV", sensitivity=35.3, sensitivity_unit="mV/g")
     force = RawChannel("force", "h", "force", unit="V", sensitivity=0.23, sensitivity_unit="mV/N", sign=-1)
     return RawDescription((rail, force), rate=RATE, n_records=4, n_samples=301, time_zone="Europe/Copenhagen")

@@ -1,4 +1,4 @@
-"""A limit of CPU time for work that would never end if it grew without bound; no measure of speed."""
+"""A limit of CPU time for work that might not end. It is no measure of speed."""
 
 import signal
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Small intact files of every format, and copies of them in which one number that states a size is false."""
+"""Small intact files of every format, and copies in which one number that states a size is false."""
 
 import struct
 from datetime import datetime
@@ -13,7 +13,7 @@ ENDINGS = {
     "uff58": "uff", "uff58b": "uff", "tdms": "tdms", "hdf5": "h5", "rcmdx": "rcmdx", "mat": "mat", "mat73": "mat",
     "wav": "wav", "flac": "flac", "csv": "csv", "lvm": "lvm", "npz": "npz", "parquet": "parquet",
 }  # fmt: skip
-N_SAMPLE, RATE = 1237, 5003.0  # primes: what equals them, or 2, 4, 8 times as many bytes, states a size
+N_SAMPLE, RATE = 1237, 5003.0  # primes: a number that equals them, or 2, 4 or 8 times them in bytes, states a size
 CLAIMS = (2**27, 2**30, 2**31 - 1, 2**32 - 2, 2**40, 2**62)
 ACCEPTED = {
     "read",
@@ -29,7 +29,7 @@ INTEGERS = ("<H", ">H", "<I", ">I", "<Q", ">Q")
 
 
 def intact(folder, format):
-    """A file of two channels of noise; its path."""
+    """Write a file of two channels of noise; return its path."""
     samples = np.random.default_rng(5).normal(size=(2, N_SAMPLE))
     path = folder / f"{format}.{ENDINGS[format]}"
     if format == "flac":
@@ -37,7 +37,7 @@ def intact(folder, format):
 
         soundfile.write(path, samples.T / 10.0, int(RATE), subtype="PCM_16")
         return path
-    if format == "mat":  # not packed, so that its numbers can be replaced
+    if format == "mat":  # not compressed, so that its numbers can be replaced
         import scipy.io
 
         scipy.io.savemat(path, {"a": samples[0], "b": samples[1], "fs": RATE})
@@ -48,7 +48,7 @@ def intact(folder, format):
 
 
 def false_claims(content):
-    """Yield (place, content) of each number in the file that states a size, with each claim that fits there."""
+    """Yield (place, content) for each number in the file that states a size, with each claim that fits there."""
     for number in sorted({factor * N_SAMPLE + more for factor in (1, 2, 4, 8, 16) for more in (0, 1, 128)}):
         for form in INTEGERS:
             for claim in CLAIMS:
@@ -73,7 +73,7 @@ def _places(content, old):
 
 
 def layout(format):
-    """The layout of the intact file: channels a and b, which WAV and FLAC number."""
+    """The layout of the intact file: channels a and b, which have numbers in WAV and FLAC."""
     from turnout.records import RawChannel, RawDescription
 
     sources = (0, 1) if format in ("wav", "flac") else ("a", "b")
@@ -81,7 +81,7 @@ def layout(format):
 
 
 def lengths(folder, format):
-    """Numbers of samples of the recordings of the intact file and its errors, read at once and lazily."""
+    """Numbers of samples of the recordings of the intact file and its errors, read completely and lazily."""
     from turnout.readers import read
 
     name = intact(folder, format).name
@@ -93,7 +93,7 @@ LAZILY = ({}, {"max_duration": 1e-3, "max_whole_file_size": 0})
 
 
 def outcomes(folder, format, most=60):
-    """{place: outcome} of the false claims of a format, at most ``most``, spread evenly over the file."""
+    """{place: outcome} of at most ``most`` false claims of a format, evenly distributed over the file."""
     from turnout.errors import ReadError
     from turnout.readers import read
 

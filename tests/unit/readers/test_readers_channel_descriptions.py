@@ -1,4 +1,4 @@
-"""Channels that a layout exchanges: the file's names and descriptions of its sensors say so."""
+"""Channels that a layout exchanges are found by the names and descriptions of the sensors in the file."""
 
 import h5py
 import nptdms
@@ -12,7 +12,7 @@ SAMPLES = np.random.default_rng(7).normal(size=(2, 40)).round(4) * [[900.0], [30
 
 
 def outcome(path, first=0, second=1, unit="N"):
-    """Problem of a layout that takes the first channel for the force, "" if the file is read."""
+    """Message for a layout that uses the first channel as the force, "" if the file is read."""
     sensors = (RawChannel("force", first, "force", unit=unit), RawChannel("rail", second, "acceleration", unit="m/s²"))
     result = read(path.name, path.parent, RawDescription(sensors, rate=1e3))
     assert len(result.recordings) + len(result.errors) == 1
@@ -31,8 +31,8 @@ NAMES = {
 
 
 @pytest.mark.parametrize("names", NAMES)
-def test_names_that_exchange_force_and_response_contradict_a_layout_by_numbers(names, tmp_path):
-    """Before, the response was read as the force without a message."""
+def test_names_of_exchanged_force_and_response_contradict_a_layout_by_numbers(names, tmp_path):
+    """Formerly, the response was read as the force without a message."""
     rows = "".join(f"{f};{a}\n" for f, a in SAMPLES.T)
     (tmp_path / "a.csv").write_text(f"{names}\n{rows}", encoding="utf-8")
     assert bool(outcome(tmp_path / "a.csv")) == NAMES[names]
@@ -48,13 +48,13 @@ HEADS = {
 
 
 @pytest.mark.parametrize("head", HEADS)
-def test_a_table_of_channels_contradicts_a_layout_that_exchanges_them(head, tmp_path):
+def test_a_table_of_channels_contradicts_a_layout_with_exchanged_channels(head, tmp_path):
     rows = "".join(f"{f};{a}\n" for f, a in SAMPLES.T)
     (tmp_path / "a.csv").write_text(f"{head}\nCH1;CH2\n{rows}", encoding="utf-8")
     assert bool(outcome(tmp_path / "a.csv", "CH1", "CH2")) == HEADS[head]
 
 
-def test_two_channels_of_one_quantity_are_not_exchanged(tmp_path):
+def test_two_channels_of_one_quantity_are_not_reported_as_exchanged(tmp_path):
     (tmp_path / "a.csv").write_text("acc 1;acc 2\n" + "".join(f"{a};{b}\n" for a, b in SAMPLES.T))
     sensors = tuple(RawChannel(f"rail{i}", i, "acceleration", "m/s²") for i in (1, 0))
     assert not read("a.csv", tmp_path, RawDescription(sensors, rate=1e3)).errors
@@ -62,7 +62,7 @@ def test_two_channels_of_one_quantity_are_not_exchanged(tmp_path):
 
 @pytest.mark.parametrize("label", ["Sensor;", "Sensor;clock;"])
 @pytest.mark.parametrize("texts", ["Accelerometer;Hammer", "Hammer;Accelerometer"])
-def test_a_line_of_sensors_has_one_for_each_column_or_for_each_but_the_time(label, texts, tmp_path):
+def test_a_line_of_sensors_has_one_entry_per_column_with_or_without_the_time(label, texts, tmp_path):
     rows = "".join(f"{k / 1e3};{f};{a}\n" for k, (f, a) in enumerate(SAMPLES.T))
     (tmp_path / "a.csv").write_text(f"{label}{texts}\ntime [s];CH1;CH2\n{rows}", encoding="utf-8")
     assert bool(outcome(tmp_path / "a.csv", "CH1", "CH2")) == texts.startswith("Acc")
@@ -78,7 +78,7 @@ def test_an_array_of_texts_describes_the_channels(is_bytes, tmp_path):
 
 
 def test_each_record_is_compared_with_its_own_descriptions(tmp_path):
-    """Before, those of the first record counted for all with the same names and units."""
+    """Formerly, those of the first record were used for all records with the same names and units."""
     with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
         for group, texts in (("1", ("hammer", "accelerometer")), ("2", ("accelerometer", "hammer"))):
             channels = zip(("CH1", "CH2"), SAMPLES, texts)
@@ -89,7 +89,7 @@ def test_each_record_is_compared_with_its_own_descriptions(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["description", "NI_ChannelName", "comment", "serial"])
-def test_properties_of_a_channel_describe_it(name, tmp_path):
+def test_properties_of_a_channel_are_used_as_its_description(name, tmp_path):
     for texts in (("accelerometer", "impact hammer"), ("impact hammer", "accelerometer")):
         with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
             properties = [{name: text} for text in texts]

@@ -1,4 +1,4 @@
-"""Structures of MATLAB and groups of HDF5 that hold one channel each."""
+"""Structures of MATLAB and groups of HDF5 with one channel each."""
 
 from dataclasses import replace
 
@@ -27,8 +27,8 @@ def write_group(group, content):
             group.attrs[name] = value
 
 
-def written(path, content):
-    """The file of nested content, in the format of its extension."""
+def write_file(path, content):
+    """Write nested content in the format of the extension; return the path."""
     if path.suffix == ".mat":
         scipy.io.savemat(path, content)
     else:
@@ -43,8 +43,8 @@ def channel(samples, unit, **facts):
 
 @pytest.fixture(params=["a.mat", "a.h5"])
 def outcome(request, tmp_path):
-    """Function: result of nested content that was written and read."""
-    return lambda content: read(written(tmp_path / request.param, content).name, tmp_path, LAYOUT)
+    """Function that writes nested content and returns the result of reading it."""
+    return lambda content: read(write_file(tmp_path / request.param, content).name, tmp_path, LAYOUT)
 
 
 ONE = {"force": channel(FORCE, "kN"), "rail": channel(RAIL, "g")}
@@ -82,14 +82,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_a_group_states_about_its_channel_is_not_lost(outcome, case):
+def test_statements_of_a_group_about_its_channel_are_checked(outcome, case):
     content, words = WRONG[case]
     result = outcome(content)
     assert result.recordings == () and words in str(result.errors[0])
 
 
 def with_headers(ends, facts):
-    """Variables of two channels as catman exports them: a structure and a vector of the same name each."""
+    """Variables of two channels as catman exports them: for each a structure and a vector of the same name."""
     signals = {"force": (np.sin(np.arange(400) / 9), "kN"), "rail": (np.cos(np.arange(400) / 7), "g")}
     variables = {"File_Header": {"SampleFrequency": "1000", "NumberOfChannels": "2"}}
     for k, (name, (samples, unit)) in enumerate(signals.items(), 1):
@@ -101,7 +101,7 @@ def with_headers(ends, facts):
 @pytest.mark.parametrize("facts", [{"SignalName": "name", "Unit": "unit"}, {"Name": "name", "Units": "unit"}])
 @pytest.mark.parametrize("ends", [("Header", "Data"), ("Info", "Values"), ("header", "")])
 @pytest.mark.parametrize("is_swapped", [False, True])
-def test_a_vector_has_the_name_and_the_unit_of_the_structure_beside_it(ends, facts, is_swapped, tmp_path):
+def test_a_vector_gets_the_name_and_the_unit_of_its_header_structure(ends, facts, is_swapped, tmp_path):
     variables, signals = with_headers(ends, facts)
     if is_swapped:
         variables = dict(reversed(variables.items()))
@@ -112,7 +112,7 @@ def test_a_vector_has_the_name_and_the_unit_of_the_structure_beside_it(ends, fac
     np.testing.assert_allclose(recording.signal("rail"), signals["rail"][0] * 9.80665)
 
 
-def test_the_unit_of_a_structure_beside_a_vector_contradicts_the_layout(tmp_path):
+def test_a_unit_of_a_header_structure_that_contradicts_the_layout_is_an_error(tmp_path):
     variables, _ = with_headers(("Header", "Data"), {"Unit": "unit"})
     scipy.io.savemat(tmp_path / "a.mat", variables)
     channels = (
@@ -123,7 +123,7 @@ def test_the_unit_of_a_structure_beside_a_vector_contradicts_the_layout(tmp_path
     assert error.reason == "unit_unknown" and "the file says 'g', the layout 'N'" in str(error)
 
 
-def test_groups_without_a_vector_are_named_with_what_they_hold(tmp_path):
+def test_the_error_of_groups_without_a_vector_lists_their_content(tmp_path):
     signal = {"clock": {"increment": 0.001}, "trace": {"values": np.arange(400.0)}}
     scipy.io.savemat(tmp_path / "a.mat", {"force": signal, "rail": signal})
     error, *_ = read("a.mat", tmp_path, RawDescription((RawChannel("f", "force", "force", "N"),), rate=1000.0)).errors
@@ -145,8 +145,8 @@ VERSIONS = {
         *((f, n) for f in ("h5", "mat") for n in (("raw", "filtered"), ("A", "B"))),
     ],
 )
-def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
-    """Before, each impact counted twice, once as it was measured and once as a program changed it."""
+def test_several_versions_of_one_recording_are_an_error(names, format, tmp_path):
+    """Formerly, each impact was used twice, once as measured and once as processed."""
     samples = np.random.default_rng(5).normal(size=(2, 2, 50))
     groups = {name: dict(zip(("force", "rail"), pair)) for name, pair in zip(names, samples)}
     if format == "h5":
@@ -168,7 +168,7 @@ def test_versions_of_one_recording_are_no_records(names, format, tmp_path):
         read(f"a.{format}", tmp_path, description)
 
 
-DELAYS = {  # name: 12 of its units [s], and 0 for what is no delay of a channel
+DELAYS = {  # name: 12 of its units [s], and 0 for entries that are no delay of a channel
     "delay_samples": 0.012, "latency_us": 12e-6, "Verzögerung [ms]": 0.012, "time shift": 12.0, "group delay": 12.0,
     "start_offset": 12.0, "t0 [ms]": 0.012, "delay (s)": 12.0, "rail_delay_a": 12.0,
     "pre-trigger (samples)": 0.0, "pretrigger level": 0.0, "start_offset [mm]": 0.0, "phase delay (°)": 0.0,
@@ -178,8 +178,8 @@ DELAYS = {  # name: 12 of its units [s], and 0 for what is no delay of a channel
 
 
 @pytest.mark.parametrize("name", DELAYS)
-def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_path):
-    """Before, it was read without a message, and the phase between force and response was wrong."""
+def test_a_delay_of_one_channel_is_an_error_and_a_delay_of_all_channels_is_accepted(name, tmp_path):
+    """Formerly it was read without a message, and the phase between force and response was wrong."""
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     description = RawDescription((*sensors, RawChannel("aux", "aux", "ignored")), rate=1e3)
 
@@ -199,16 +199,16 @@ def test_a_delay_of_one_channel_is_an_error_and_one_of_all_is_none(name, tmp_pat
 
 
 @pytest.mark.parametrize("value", ["2024-05-13 10:00:00", "10:00:00", "13.05.2024", "12 mm", "12 %", "12 °"])
-def test_a_date_and_another_quantity_of_one_channel_are_no_delay(value, tmp_path):
-    """Before, a start as a date on one channel was a delay of 2024 s."""
+def test_a_date_or_another_quantity_of_one_channel_is_not_read_as_a_delay(value, tmp_path):
+    """Formerly, the start date of one channel was read as a delay of 2024 s."""
     np.savez(tmp_path / "a.npz", force=np.arange(50) % 7.0, rail=np.arange(50) % 5.0, rail_t0=np.array(value))
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     assert len(read("a.npz", tmp_path, RawDescription(sensors, rate=1e3)).recordings) == 1
 
 
 @pytest.mark.parametrize(("name", "is_error"), [("rail_start_offset [ms]", False), ("rail_delay [ms]", True)])
-def test_a_start_may_be_half_a_sample_late_and_a_delay_may_not(name, is_error, tmp_path):
-    """Converters that take turns begin within one sample; what a delay states is none of that."""
+def test_a_start_half_a_sample_late_is_accepted_and_such_a_delay_is_an_error(name, is_error, tmp_path):
+    """Multiplexed converters start within one sample; a stated delay has another cause."""
     samples = np.random.default_rng(5).normal(size=(2, 50))
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     np.savez(tmp_path / "a.npz", force=samples[0], rail=samples[1], **{name: 0.4})
@@ -220,7 +220,7 @@ def test_a_start_may_be_half_a_sample_late_and_a_delay_may_not(name, is_error, t
     "text", ["12;24", "0 ms;2 ms", "0;2;ms", "0\t2 samples", "0; 0,002 s", "1e-3 s;0", "0 ms, 2 ms"]
 )
 @pytest.mark.parametrize("format", ["csv", "npz"])
-def test_a_list_of_delays_has_its_units_in_the_cells_or_behind_them(text, format, tmp_path):
+def test_the_units_of_a_list_of_delays_are_in_or_behind_its_cells(text, format, tmp_path):
     values = np.random.default_rng(5).normal(size=(50, 2))
     text = text.replace(", ", ";") if format == "csv" else text
     separator = "\t" if "\t" in text else ";"
@@ -235,8 +235,8 @@ def test_a_list_of_delays_has_its_units_in_the_cells_or_behind_them(text, format
     assert [error.reason for error in result.errors] == ["clock_drift"]
 
 
-def test_pre_triggers_of_two_channels_that_differ_are_an_error(tmp_path):
-    """That of one channel alone is a setting of the one that triggers."""
+def test_different_pre_triggers_of_two_channels_are_an_error(tmp_path):
+    """A pre-trigger of only one channel is a setting of the channel that triggers."""
     samples = np.random.default_rng(5).normal(size=(2, 50))
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     for of_rail, reasons in (({}, []), ({"rail_pretrigger_samples": 12}, ["clock_drift"])):
@@ -255,8 +255,8 @@ OF_NAMES = {  # entries, and whether the channels differ by more than a hundredt
 
 
 @pytest.mark.parametrize("entries", OF_NAMES)
-def test_delays_whose_names_have_a_channel_are_compared_with_each_other(entries, tmp_path):
-    """Before, each name counted as a delay of one channel, and that of the others as none."""
+def test_delays_with_names_of_channels_are_compared_with_each_other(entries, tmp_path):
+    """Formerly, each name was taken as the delay of one channel, with no delay of the others."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["force"], file["rail"] = np.random.default_rng(5).normal(size=(2, 50))
         file.attrs.update(dict(zip(entries[::2], entries[1::2])))
@@ -267,7 +267,7 @@ def test_delays_whose_names_have_a_channel_are_compared_with_each_other(entries,
 
 @pytest.mark.parametrize("name", ["Delay", "Channel delay [samples]", "Start offset", "Time offset [ms]"])
 @pytest.mark.parametrize("has_time", [False, True])
-def test_a_line_of_delays_has_one_for_each_column_or_for_each_but_the_time(name, has_time, tmp_path):
+def test_a_line_of_delays_has_one_entry_per_column_with_or_without_the_time(name, has_time, tmp_path):
     sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="g"))
     rows = [[f"{k / 1e3:.4f}"][: int(has_time)] + [f"{x:.4f}" for x in pair] for k, pair in enumerate(PAIRS)]
     names = [*["time [s]"][: int(has_time)], "force", "rail"]

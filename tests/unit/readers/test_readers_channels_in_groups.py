@@ -1,4 +1,4 @@
-"""Files in which a cell or a group holds one channel of all records, so that numbers in a layout mean impacts."""
+"""Files whose cells or groups contain one channel of all records, so that numbers in a layout could mean impacts."""
 
 import h5py
 import numpy as np
@@ -38,7 +38,7 @@ def test_a_cell_for_each_channel_has_a_vector_for_each_record(tmp_path, sources,
         np.testing.assert_array_equal(recording.samples, [force, rail])
 
 
-def test_a_record_that_a_cell_lacks_costs_that_record(tmp_path):
+def test_a_record_that_one_cell_lacks_is_the_only_record_that_is_lost(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"force": cell(FORCE), "rail": cell(RAIL[:2]), "fs": 5000.0})
     for sources in (("force", "rail"), (0, 1)):
         result = read("a.mat", tmp_path, layout(*sources))
@@ -52,8 +52,8 @@ def test_a_single_cell_with_a_short_vector_is_one_record(tmp_path):
     np.testing.assert_array_equal(recording.samples, [FORCE[0], RAIL[0]])
 
 
-def test_cells_whose_vectors_have_other_lengths_than_those_of_the_other_cells_are_records(tmp_path):
-    """Before, the forces of two records were force and response of one."""
+def test_cells_with_vectors_of_different_lengths_are_records(tmp_path):
+    """Formerly, the forces of two records were read as force and response of one."""
     records = {"north": (FORCE[0], RAIL[0]), "south": (FORCE[2], RAIL[2])}
     cells = {name: cell([*channels, np.arange(2.0, 22.0)]) for name, channels in records.items()}
     scipy.io.savemat(tmp_path / "a.mat", {**cells, "fs": 5000.0})
@@ -62,7 +62,7 @@ def test_cells_whose_vectors_have_other_lengths_than_those_of_the_other_cells_ar
         np.testing.assert_array_equal(recording.samples, channels)
 
 
-def test_cells_whose_names_differ_in_numbers_alone_are_records(tmp_path):
+def test_cells_whose_names_differ_only_in_numbers_are_records(tmp_path):
     cells = {f"run{k}": cell([force, rail, np.arange(2.0, 22.0)]) for k, (force, rail) in enumerate(zip(FORCE, RAIL))}
     scipy.io.savemat(tmp_path / "a.mat", {**cells, "fs": 5000.0})
     recordings = read("a.mat", tmp_path, layout(0, 1)).recordings
@@ -70,7 +70,7 @@ def test_cells_whose_names_differ_in_numbers_alone_are_records(tmp_path):
         np.testing.assert_array_equal(recording.samples, [force, rail])
 
 
-def written(path, groups):
+def write_groups(path, groups):
     if path.suffix == ".h5":
         with h5py.File(path, "w") as file:
             file.attrs["fs"] = 5000.0
@@ -89,19 +89,19 @@ def written(path, groups):
 @pytest.mark.parametrize("name", ["a.h5", "a.mat", "a.tdms"])
 @pytest.mark.parametrize("inner", ["impact_{}", "run{}", "trial_{}"])
 @pytest.mark.parametrize("outer", [("force", "rail"), ("Hammer", "Schwelle"), ("kraft", "beschleunigung")])
-def test_a_group_for_each_channel_is_an_error(tmp_path, name, inner, outer):
+def test_a_group_per_channel_is_an_error(tmp_path, name, inner, outer):
     groups = {g: {inner.format(k): x for k, x in enumerate(v[:2])} for g, v in zip(outer, (FORCE, RAIL))}
     with pytest.raises(ReadError) as caught:
-        read(written(tmp_path / name, groups), tmp_path, layout(0, 1))
+        read(write_groups(tmp_path / name, groups), tmp_path, layout(0, 1))
     assert caught.value.reason == "channel_missing" and "named as channels" in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["a.h5", "a.mat", "a.tdms"])
 @pytest.mark.parametrize("outer", [("hammer1", "hammer2"), ("left", "right"), ("hammer_left", "hammer_right")])
 @pytest.mark.parametrize("inner", [("force", "rail"), ("ch0", "ch1")])
-def test_a_group_for_each_record_is_read(tmp_path, name, outer, inner):
+def test_a_group_per_record_is_read(tmp_path, name, outer, inner):
     groups = {g: dict(zip(inner, pair)) for g, *pair in zip(outer, FORCE, RAIL)}
-    result = read(written(tmp_path / name, groups), tmp_path, layout(*inner))
+    result = read(write_groups(tmp_path / name, groups), tmp_path, layout(*inner))
     assert not result.errors
     for recording, force, rail in zip(result.recordings, FORCE, RAIL):
         np.testing.assert_array_equal(recording.samples, [force, rail])

@@ -1,4 +1,4 @@
-"""A file that claims more than it can hold, or keeps its samples elsewhere, is rejected before memory is allocated."""
+"""A file that states more than it can contain, or stores samples elsewhere, is rejected before memory is allocated."""
 
 import io
 import json
@@ -29,7 +29,7 @@ LVM = f"LabVIEW Measurement\nSeparator\tTab\n{END}\nChannels\t{10**9}\nSamples\t
 
 
 def npy_header(path):
-    """Header of 2 GiB in a member of some bytes."""
+    """A header of 2 GiB in a member of a few bytes."""
     buffer = io.BytesIO()
     np.lib.format.write_array_header_1_0(buffer, {"descr": "<f8", "fortran_order": False, "shape": (HUGE,)})
     with zipfile.ZipFile(path, "w") as archive:
@@ -41,7 +41,7 @@ def npz_zeros(path):
 
 
 def npz_directory(path):
-    """The directory of the archive claims 4 GB."""
+    """The directory of the archive states 4 GB."""
     np.savez(path.open("wb"), a=np.zeros(10), b=np.zeros(10))
     content = bytearray(path.read_bytes())
     at = content.find(b"PK\x01\x02")
@@ -70,7 +70,7 @@ def mat_zeros(path):
 
 
 def parquet_repeated(path):
-    """Repeated values take no space."""
+    """Repeated values need no space."""
     column = pa.array(np.zeros(2**24))
     pq.write_table(pa.table({"a": column, "b": column}), path, use_dictionary=True, compression="zstd")
 
@@ -103,7 +103,7 @@ CASES = [(suffix, bomb) for suffix, bombs in BOMBS.items() for bomb in bombs]
 
 
 @pytest.mark.parametrize(("suffix", "bomb"), CASES, ids=[bomb.__name__ for _, bomb in CASES])
-def test_a_claim_beyond_the_size_of_the_file_is_rejected_by_name(tmp_path, suffix, bomb):
+def test_a_stated_size_beyond_that_of_the_file_is_rejected(tmp_path, suffix, bomb):
     path = tmp_path / f"A7_1.{suffix}"
     bomb(path)
     with pytest.raises(ReadError, match="A7_1") as caught:
@@ -111,8 +111,8 @@ def test_a_claim_beyond_the_size_of_the_file_is_rejected_by_name(tmp_path, suffi
     assert caught.value.reason in ("claims_too_much", "unreadable")
 
 
-def test_no_claim_costs_memory(tmp_path):
-    """All of them in one process, whose address space ends 0.7 GB above that of the program: no MemoryError."""
+def test_no_stated_size_causes_an_allocation_of_memory(tmp_path):
+    """All files in one process whose address space is limited to 0.7 GB above that of the program."""
     for suffix, bomb in CASES:
         bomb(tmp_path / f"{bomb.__name__}.{suffix}")
     code = (
@@ -144,12 +144,12 @@ print(json.dumps({format: outcomes(Path(sys.argv[1]), format) for format in ENDI
 
 
 @pytest.mark.parametrize("format", ENDINGS)
-def test_the_intact_file_whose_sizes_are_changed_is_read(format, tmp_path):
+def test_the_intact_file_of_each_format_is_read(format, tmp_path):
     assert lengths(tmp_path, format) == [[N_SAMPLE], [N_SAMPLE]]
 
 
-def test_a_false_size_anywhere_in_a_file_of_any_format_costs_no_memory_and_gives_no_longer_record(tmp_path):
-    """Each number of an intact file that states a size is replaced by each of six claims from 2**27 to 2**62."""
+def test_a_false_size_in_a_file_of_any_format_needs_no_memory_and_gives_no_longer_record(tmp_path):
+    """Each number that states a size is replaced by each of six claims from 2**27 to 2**62."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])}
     command = [sys.executable, "-c", LIMITED, str(tmp_path)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -190,7 +190,7 @@ def virtual(file, folder):
 
 @pytest.mark.parametrize("place", [link, group_link, storage, virtual], ids=lambda f: f.__name__)
 @pytest.mark.parametrize("suffix", ["h5", "rcmdx", "mat"])
-def test_hdf5_that_keeps_samples_in_another_file_is_rejected_and_the_other_not_opened(tmp_path, place, suffix):
+def test_an_hdf5_file_with_samples_in_another_file_is_rejected_without_opening_the_other(tmp_path, place, suffix):
     path = outside(tmp_path).with_suffix(f".{suffix}")
     with h5py.File(path, "w", userblock_size=512 if suffix == "mat" else 0) as file:
         place(file, tmp_path)
@@ -203,7 +203,7 @@ def test_hdf5_that_keeps_samples_in_another_file_is_rejected_and_the_other_not_o
     assert caught.value.reason == "outside_root"
 
 
-def test_a_virtual_dataset_of_the_file_itself_and_links_within_it_are_read(tmp_path):
+def test_a_virtual_dataset_of_the_same_file_is_read(tmp_path):
     path = tmp_path / "A7_1.h5"
     with h5py.File(path, "w") as file:
         file["a"] = np.sin(np.arange(1000.0))
@@ -215,8 +215,8 @@ def test_a_virtual_dataset_of_the_file_itself_and_links_within_it_are_read(tmp_p
 
 
 @pytest.mark.parametrize("n_sample", [1000, 2**20])
-def test_a_record_that_packs_well_is_read(tmp_path, n_sample):
-    """A quiet sensor: 8 MiB of small whole numbers, packed a hundredfold."""
+def test_a_highly_compressed_record_is_read(tmp_path, n_sample):
+    """A quiet sensor: 8 MiB of small whole numbers, compressed a hundredfold."""
     rows = np.round(np.sin(np.arange(n_sample) / 5000.0) * 3)
     np.savez_compressed(tmp_path / "A7_1.npz", a=rows, b=rows[::-1])
     (recording,) = read("A7_1.npz", tmp_path, DESCRIPTION).recordings

@@ -1,4 +1,4 @@
-"""Times of each sample in further notations: days of the year, weeks, ISO durations, fractions behind a colon."""
+"""Times of samples in other notations: days of the year, weeks, ISO durations, fractions behind a colon."""
 
 from datetime import datetime, timedelta
 
@@ -84,7 +84,7 @@ def test_each_notation_gives_rate_and_start_in_every_format(notation, format, tm
 @pytest.mark.parametrize("separator", [";", " "])
 @pytest.mark.parametrize("day", ["%Y-%j", "%d-%b-%Y", "%G-W%V-%u", "%d.%m.%Y"])
 @pytest.mark.parametrize("start", [START, datetime(2025, 12, 31, 23, 59, 59, 999000)])
-def test_a_day_beside_the_time_of_day_may_have_any_notation(day, separator, start, tmp_path):
+def test_a_column_of_days_can_have_any_notation(day, separator, start, tmp_path):
     stamps = [start + timedelta(microseconds=50 * k) for k in range(N)]
     cells = [[stamp.strftime(day), stamp.strftime("%H:%M:%S.%f")] for stamp in stamps]
     rows = [[*cell, f"{f:.9g}", f"{a:.9g}"] for cell, (f, a) in zip(cells, SAMPLES.T)]
@@ -95,8 +95,8 @@ def test_a_day_beside_the_time_of_day_may_have_any_notation(day, separator, star
 
 
 @pytest.mark.parametrize("format", ["parquet", "h5", "npz", "tdms"])
-def test_a_time_in_unknown_words_is_an_error(format, tmp_path):
-    """Else the rate of the layout would be taken although the file states one."""
+def test_times_in_an_unknown_notation_are_an_error(format, tmp_path):
+    """Otherwise the rate of the layout would be used although the file states one."""
     path = tmp_path / f"a.{format}"
     FORMATS[format](path, [f"07h28m14.{50 * k:06d}" for k in range(N)])
     try:
@@ -108,7 +108,7 @@ def test_a_time_in_unknown_words_is_an_error(format, tmp_path):
 
 @pytest.mark.parametrize("name", ["time", "start_time"])
 @pytest.mark.parametrize("notation", ["%Y-%m-%dT%H:%M:%S", "%d %b %Y %H:%M"])
-def test_a_text_for_each_of_many_records_is_no_time_of_samples(name, notation, tmp_path):
+def test_one_text_per_record_is_not_read_as_the_times_of_samples(name, notation, tmp_path):
     starts = [datetime(2026, 11, 28, 7) + timedelta(minutes=k) for k in range(70)]
     texts = np.array([start.strftime(notation) for start in starts])
     np.savez(tmp_path / "a.npz", data=np.random.default_rng(3).normal(size=(70, 2, N)), **{name: texts})
@@ -124,7 +124,7 @@ def test_a_start_that_is_repeated_in_every_row_is_the_start(format, tmp_path):
     assert outcome(tmp_path / f"a.{format}", 2e4) == START
 
 
-def test_records_of_parquet_begin_where_their_times_do(tmp_path):
+def test_records_of_parquet_start_at_their_first_time(tmp_path):
     table = pa.table(
         {"time": texts_of("usual", 50), "record": [1] * 40 + [2] * 80, "force": SAMPLES[0], "rail": SAMPLES[1]}
     )
@@ -151,6 +151,6 @@ TEXTS = {  # first text, last text, seconds between them
 
 
 @pytest.mark.parametrize("first, last, seconds", TEXTS.values(), ids=TEXTS)
-def test_times_of_one_form_and_of_others_are_read_alike(first, last, seconds):
-    for texts in ([first, last], [first, last, f"{last} "]):  # the blank makes another form of it
+def test_times_of_equal_and_of_mixed_forms_are_read_in_the_same_way(first, last, seconds):
+    for texts in ([first, last], [first, last, f"{last} "]):  # the blank gives it another form
         assert seconds_of_clock(texts)[1] == pytest.approx(seconds, nan_ok=True)

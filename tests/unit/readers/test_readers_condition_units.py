@@ -1,4 +1,4 @@
-"""Temperatures that a file notes are in °C whatever their unit is, and one that cannot be read is reported."""
+"""Temperatures in files are converted to °C from any unit, and a temperature that cannot be read is reported."""
 
 import h5py
 import numpy as np
@@ -41,7 +41,7 @@ TEXTS = {
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_temperature_is_converted_from_its_unit(text, tmp_path):
-    """Before, 54.5 °F were 54.5 °C in the head of a text, and no temperature in other formats: without a message."""
+    """Formerly, 54.5 °F were read as 54.5 °C in texts and not at all in other formats, without a message."""
     number = text.rstrip("°CFK℃deg ")
     unit = text.removeprefix(number).strip()
     heads = [f"rail_temperature: {text}", f"# Rail temperature = {text}", f"rail_temperature [{unit}];{number}"]
@@ -60,8 +60,8 @@ def test_a_temperature_is_converted_from_its_unit(text, tmp_path):
     "unit",
     ["°c", "c", "ºC", "oC", "deg. C", "degrees C", "degrees Celsius", ";°C", ",°C", "± 0.5 °C", "°C (sensor 2)"],
 )
-def test_a_unit_of_temperature_has_many_notations(unit, tmp_path):
-    """Before, a temperature in one of these was lost; the sign of −3 may be a minus sign, too."""
+def test_many_notations_of_the_unit_of_a_temperature_are_read(unit, tmp_path):
+    """Formerly, a temperature in one of these was lost. The sign of −3 may be a typographic minus."""
     for number, value in (("12.5", 12.5), ("\u22123", -3.0)):
         lines = [f"rail_temperature: {number} {unit}"]
         conditions, errors = read_with(tmp_path, "csv", {}, lines)
@@ -78,14 +78,14 @@ NAMES_OF_UNIT = {
 
 
 @pytest.mark.parametrize("name", NAMES_OF_UNIT)
-def test_a_unit_of_all_temperatures_is_that_of_each(name, tmp_path):
-    """Before, 54.5 °F were 54.5 °C without a message."""
+def test_a_common_unit_of_all_temperatures_is_used_for_each(name, tmp_path):
+    """Formerly, 54.5 °F were read as 54.5 °C without a message."""
     conditions, _ = read_with(tmp_path, "h5", {"rail_temperature": 54.5, name: "°F"})
     assert conditions["rail_temperature"] == pytest.approx(NAMES_OF_UNIT[name])
 
 
 @pytest.mark.parametrize("name", ["temperature", "rail_temperature"])
-def test_the_unit_of_a_channel_with_the_name_of_a_condition_is_that_of_the_channel(name, tmp_path):
+def test_a_unit_of_a_channel_that_is_named_like_a_condition_belongs_to_the_channel(name, tmp_path):
     description = RawDescription((RawChannel(name, name, "temperature", "°C"),), rate=1000.0, kind="passage")
     for stated, reasons in (("°C", []), ("°F", ["unit_unknown"])):
         rows = [f"{a}" for a in FORCE]
@@ -100,7 +100,7 @@ def test_a_temperature_that_cannot_be_read_is_reported(text, tmp_path):
         assert [error.reason for error in errors] == ["condition_lost"] and "°C" in errors[0].remedy
 
 
-def test_a_temperature_that_no_record_states_is_reported_once_for_the_first(tmp_path):
+def test_unreadable_temperatures_of_several_records_are_reported_once(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for k in (1, 2):
             file[f"impact_{k}/force"], file[f"impact_{k}/rail"] = FORCE, RAIL * k
@@ -110,7 +110,7 @@ def test_a_temperature_that_no_record_states_is_reported_once_for_the_first(tmp_
 
 
 @pytest.mark.parametrize("text", ["n/a", "n.a.", "-", "---", "?", "", "NaN"])
-def test_no_temperature_is_not_reported(text, tmp_path):
+def test_an_empty_temperature_is_not_reported(text, tmp_path):
     for case in (("csv", {}, [f"rail_temperature: {text}"]), ("h5", {"rail_temperature": text}, ())):
         assert not read_with(tmp_path, *case)[1]
 
@@ -122,8 +122,8 @@ def test_a_speed_is_converted_from_its_unit(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["60 mph", "120 km/t", "fast"])
-def test_a_speed_in_an_unknown_unit_is_reported_and_a_word_is_none(text, tmp_path):
-    """Before, 60 mph were 60 m/s."""
+def test_a_speed_in_an_unknown_unit_is_reported_and_a_word_is_not(text, tmp_path):
+    """Formerly, 60 mph were read as 60 m/s."""
     for case in (("csv", {}, [f"# speed: {text}"]), ("h5", {"speed": text}, ())):
         conditions, errors = read_with(tmp_path, *case)
         assert conditions["speed"] == text

@@ -1,4 +1,4 @@
-"""A condition that a typed format holds as an array is read as the value of its record, or reported; never an array."""
+"""A condition that is an array in a typed format is read as the value of its record, or reported."""
 
 import json
 
@@ -38,7 +38,7 @@ WRITERS = {"a.h5": write_hdf5, "a.npz": write_npz, "a.mat": write_mat, "a.parque
 
 @pytest.mark.parametrize("name", [n for n in WRITERS if n != "a.parquet"])
 @pytest.mark.parametrize("value", [12.5, [12.5], [[12.5]], [12.5, 12.5, 12.5]])
-def test_equal_values_are_one_number(name, value, tmp_path):
+def test_an_array_of_equal_values_is_one_number(name, value, tmp_path):
     WRITERS[name](tmp_path / name, value)
     result = read(name, tmp_path, described(TRUE))
     assert result.errors == () and result.recordings[0].conditions["rail_temperature"] == 12.5
@@ -56,7 +56,7 @@ def test_different_values_are_reported_and_not_used(name, value, tmp_path):
         assert error.reason == "condition_lost" and "rail_temperature is 3 different values" in error.problem
 
 
-def test_the_value_of_one_record_that_lost_its_class_is_reported(tmp_path):
+def test_a_value_of_one_record_with_another_type_is_reported(tmp_path):
     texts = np.empty(3, dtype=object)
     texts[:] = ["IC4", np.array([73, 67, 52], dtype=np.uint16), "IC4"]
     variables = {f"record_{k}": dict(zip(UNITS, SAMPLES * (1 + k))) for k in range(3)}

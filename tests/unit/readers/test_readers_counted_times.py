@@ -1,4 +1,4 @@
-"""Time axes of counts since a known origin: start and rate come from the same count."""
+"""Time axes that count from a known origin give start and rate by the same count."""
 
 from datetime import UTC, datetime
 
@@ -16,7 +16,7 @@ DESCRIPTION = RawDescription(channels=(RawChannel("force", "force", "force", uni
 
 
 def stamps_of(unit):
-    """Whole numbers, but for ms: its half steps need a digit."""
+    """Whole numbers, except for ms, whose half steps need a decimal."""
     steps = np.arange(N_SAMPLE) * PER_SECOND[unit] / RATE
     stamps = steps if unit == "ms" else steps.astype(np.int64)
     return int(START.timestamp()) * PER_SECOND[unit] + stamps
@@ -45,7 +45,7 @@ def test_a_count_since_1970_gives_start_and_rate(name, unit, form, tmp_path):
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 @pytest.mark.parametrize("unit", PER_SECOND)
-def test_such_an_axis_is_checked_as_any_other(unit, form, tmp_path):
+def test_a_counting_axis_is_checked_like_any_other(unit, form, tmp_path):
     gap, backwards, uneven = (stamps_of(unit) for _ in range(3))
     gap[500:] += PER_SECOND[unit] // 10
     backwards[500:] -= PER_SECOND[unit] // 10
@@ -67,7 +67,7 @@ def test_another_rate_in_the_layout_is_reported(form, tmp_path):
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_a_count_of_no_known_origin_stays_without_a_unit(form, tmp_path):
+def test_a_count_without_a_known_origin_has_no_unit(form, tmp_path):
     path = write_table(tmp_path / f"a.{form}", "timestamp", 5_000_000 + np.arange(N_SAMPLE) * 500)
     result = read(path.name, tmp_path, DESCRIPTION)
     assert not result.recordings and [e.reason for e in result.errors] == ["wrong_rate"]

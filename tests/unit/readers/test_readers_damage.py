@@ -1,4 +1,4 @@
-"""Cut and damaged files: an error, or the very same numbers; never others in silence."""
+"""Truncated and damaged files give an error or exactly the same numbers, never other numbers without a message."""
 
 import errno
 import zipfile
@@ -14,14 +14,14 @@ from turnout.readers import read
 from turnout.readers.writing import WRITERS, write
 from turnout.reasons import REASONS
 
-CHECKSUMMED = ("hdf5", "mat", "mat73", "npz", "parquet")  # formats whose writers leave checksums
+CHECKSUMMED = ("hdf5", "mat", "mat73", "npz", "parquet")  # formats whose writers store checksums
 EASY = settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 ANYWHERE = st.floats(min_value=0.0, max_value=1.0, exclude_max=True)
 
 
 @pytest.fixture
 def written(hammer_test, in_si, name_of, tmp_path):
-    """(path, recordings as they are read from the whole file) of a format."""
+    """(path, recordings of the whole file) of a format."""
 
     def make(format):
         path = write(hammer_test[:1] if format == "wav" else hammer_test, tmp_path / name_of(format), format)
@@ -38,15 +38,15 @@ def outcome(path, description):
     return result.recordings, result.errors
 
 
-def assert_sound(recordings, whole):
-    """Each recording is one of the whole file's, bit for bit."""
+def assert_unchanged(recordings, whole):
+    """Each recording equals one of the whole file, bit by bit."""
     for one in recordings:
         assert any(np.array_equal(one.samples, other.samples) for other in whole)
 
 
 @pytest.mark.parametrize("format", WRITERS)
-def test_a_file_cut_anywhere_says_so_and_keeps_only_sound_records(format, written, in_si):
-    """No counts in the description: every format's own evidence is enough for what our writers leave."""
+def test_a_file_truncated_anywhere_gives_an_error_and_only_complete_records(format, written, in_si):
+    """Without counts in the description: the content of every format suffices to find the truncation."""
     path, whole = written(format)
     data = path.read_bytes()
 
@@ -57,14 +57,14 @@ def test_a_file_cut_anywhere_says_so_and_keeps_only_sound_records(format, writte
         path.write_bytes(data[: int(part * len(data))])
         recordings, errors = outcome(path, in_si)
         assert all(e.reason in REASONS and e.path == path.name for e in errors)
-        assert errors or len(recordings) == len(whole)  # whole without its last line break
-        assert_sound(recordings, whole)
+        assert errors or len(recordings) == len(whole)  # complete except for its last line break
+        assert_unchanged(recordings, whole)
 
     cut()
 
 
 @pytest.mark.parametrize("format", CHECKSUMMED)
-def test_a_flipped_bit_is_found_where_there_are_checksums(format, written, in_si):
+def test_a_flipped_bit_is_found_in_formats_with_checksums(format, written, in_si):
     path, whole = written(format)
     data = path.read_bytes()
 
@@ -76,13 +76,13 @@ def test_a_flipped_bit_is_found_where_there_are_checksums(format, written, in_si
         path.write_bytes(damaged)
         recordings, errors = outcome(path, in_si)
         assert errors or len(recordings) == len(whole)
-        assert_sound(recordings, whole)
+        assert_unchanged(recordings, whole)
 
     flip()
 
 
 @pytest.mark.parametrize("format", WRITERS)
-def test_any_damage_is_a_reason_and_never_another_exception(format, written, in_si):
+def test_any_damage_gives_a_known_reason_and_no_other_exception(format, written, in_si):
     path, whole = written(format)
     data = path.read_bytes()
 
@@ -98,7 +98,7 @@ def test_any_damage_is_a_reason_and_never_another_exception(format, written, in_
 
 
 @pytest.mark.parametrize(
-    ("format", "first", "sound"),
+    ("format", "first", "intact"),
     [
         ("uff58b", b"\x00" * 60, 3),
         ("uff58", b"x" * 60, 3),
@@ -107,8 +107,8 @@ def test_any_damage_is_a_reason_and_never_another_exception(format, written, in_
         ("hdf5", b"x" * 60, 3),
     ],
 )
-def test_a_damaged_record_inside_a_sound_file_costs_that_record_only(format, first, sound, written, in_si):
-    """Sixty bytes in the third of four records: in UFF over the header of its second set."""
+def test_a_damaged_record_is_the_only_record_that_is_lost(format, first, intact, written, in_si):
+    """Sixty bytes in the third of four records are changed; in UFF these are the header of its second set."""
     path, whole = written(format)
     data = bytearray(path.read_bytes())
     at = {
@@ -127,7 +127,7 @@ def test_a_damaged_record_inside_a_sound_file_costs_that_record_only(format, fir
         np.testing.assert_array_equal(one.samples, whole[one.record].samples)
 
 
-def test_tdms_names_the_segment_that_is_not_finished(written, in_si):
+def test_the_error_of_tdms_states_the_incomplete_segment(written, in_si):
     path, _ = written("tdms")
     data = path.read_bytes()
     path.write_bytes(data[: len(data) - 100])
@@ -137,8 +137,8 @@ def test_tdms_names_the_segment_that_is_not_finished(written, in_si):
     assert errors[0].reason == "truncated"
 
 
-def test_wav_says_how_much_of_its_chunk_is_there(written, in_si):
-    """libsndfile itself reads this file without a word."""
+def test_the_error_of_wav_states_the_size_of_the_incomplete_chunk(written, in_si):
+    """libsndfile reads this file without a message."""
     path, _ = written("wav")
     data = path.read_bytes()
     at = data.find(b"data")
@@ -158,7 +158,7 @@ def test_wav_says_how_much_of_its_chunk_is_there(written, in_si):
     assert "the chunk of samples was never finished by the logger" in str(error)
 
 
-def test_text_without_its_last_line_break_may_have_a_cut_number(written, in_si):
+def test_a_text_without_its_last_line_break_is_reported_as_truncated(written, in_si):
     for format in ("csv", "lvm"):
         path, _ = written(format)
         path.write_bytes(path.read_bytes().rstrip(b"\n")[:-3])
@@ -166,7 +166,7 @@ def test_text_without_its_last_line_break_may_have_a_cut_number(written, in_si):
         assert "line has no line break" in str(error) and error.reason == "truncated"
 
 
-def test_uff_says_where_its_set_ends(written, in_si):
+def test_the_error_of_uff_states_where_its_set_ends(written, in_si):
     path, _ = written("uff58b")
     path.write_bytes(path.read_bytes()[:-1000])
     recordings, (error,) = outcome(path, in_si)
@@ -187,8 +187,8 @@ def test_uff_says_where_its_set_ends(written, in_si):
     ],
     ids=repr,
 )
-def test_a_fault_of_the_machine_is_no_damage_of_the_file(fault, written, in_si, monkeypatch):
-    """It passes or is repaired: the unit is left for the next run, and nobody copies a sound file again."""
+def test_a_fault_of_the_machine_is_not_reported_as_damage_of_the_file(fault, written, in_si, monkeypatch):
+    """The unit is left for the next run, and no user has to copy an intact file again."""
     path, whole = written("npz")
 
     def failing(*_, **__):
@@ -199,10 +199,10 @@ def test_a_fault_of_the_machine_is_no_damage_of_the_file(fault, written, in_si, 
         read(path.name, path.parent, in_si)
     assert is_infrastructure(caught.value)
     monkeypatch.undo()
-    assert_sound(read(path.name, path.parent, in_si).recordings, whole)
+    assert_unchanged(read(path.name, path.parent, in_si).recordings, whole)
 
 
-def test_a_bad_sector_at_the_begin_of_a_file_is_no_damage_of_it_either(written, in_si, monkeypatch):
+def test_a_bad_sector_at_the_start_of_a_file_is_not_reported_as_damage(written, in_si, monkeypatch):
     path, _ = written("npz")
 
     def failing(*_):
@@ -214,8 +214,8 @@ def test_a_bad_sector_at_the_begin_of_a_file_is_no_damage_of_it_either(written, 
     assert is_infrastructure(caught.value)
 
 
-def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_memory(in_si, tmp_path):
-    """The length in its header is that of 80 TB."""
+def test_an_array_beyond_the_size_of_its_file_is_damage_and_no_lack_of_memory(in_si, tmp_path):
+    """The length in its header means 80 TB."""
     header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 5000000000000), }".ljust(117) + b"\n"
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
         archive.writestr("record_000.npy", b"\x93NUMPY\x01\x00v\x00" + header + bytes(800))
@@ -227,7 +227,7 @@ def test_an_array_that_no_file_of_this_size_can_hold_is_damage_and_no_want_of_me
 
 
 @pytest.mark.parametrize("text", ["errno = 22, error message = 'Invalid argument'", "errno = 2 of the wheel", "errno"])
-def test_what_damaged_bytes_make_a_library_say_stays_damage(text, written, in_si, monkeypatch):
+def test_an_error_of_a_library_because_of_damaged_bytes_is_reported_as_damage(text, written, in_si, monkeypatch):
     path, _ = written("hdf5")
 
     def failing(*_, **__):

@@ -1,4 +1,4 @@
-"""A date without a time of day is no start: midnight would be a guess."""
+"""A date without a time of day is not used as a start, as midnight would be a guess."""
 
 import h5py
 import numpy as np
@@ -32,7 +32,7 @@ FORMS = {"h5": write_hdf5, "npz": write_npz, "csv": write_csv}
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("start", DATES, ids=str)
-def test_a_date_alone_is_reported_and_no_start(start, form, tmp_path):
+def test_a_date_without_a_time_is_reported_and_not_used_as_a_start(start, form, tmp_path):
     FORMS[form](tmp_path / f"a.{form}", start)
     result = read(f"a.{form}", tmp_path, DESCRIPTION)
     assert [r.started_at for r in result.recordings] == [None]
@@ -41,7 +41,7 @@ def test_a_date_alone_is_reported_and_no_start(start, form, tmp_path):
 
 
 @pytest.mark.parametrize("unit", "YMWD")
-def test_a_stamp_in_days_is_no_start(unit, tmp_path):
+def test_a_time_stamp_in_days_is_not_used_as_a_start(unit, tmp_path):
     write_npz(tmp_path / "a.npz", np.datetime64("2024-05-13", unit))
     result = read("a.npz", tmp_path, DESCRIPTION)
     assert [r.started_at for r in result.recordings] == [None]
@@ -50,7 +50,7 @@ def test_a_stamp_in_days_is_no_start(unit, tmp_path):
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("start", ["2024-05-13T00:00:00", "2024-05-13 00:00", "20240513T000000"])
-def test_a_stated_midnight_is_a_start(start, form, tmp_path):
+def test_a_stated_midnight_is_used_as_a_start(start, form, tmp_path):
     FORMS[form](tmp_path / f"a.{form}", start)
     result = read(f"a.{form}", tmp_path, DESCRIPTION)
     assert [str(r.started_at) for r in result.recordings] == ["2024-05-13 00:00:00"] and not result.errors

@@ -1,4 +1,4 @@
-"""Responses that a file states to be measured against an axis: reported unless the layout has their sign."""
+"""Responses that were measured against an axis, as the file states, are reported unless the layout has their sign."""
 
 from dataclasses import replace
 
@@ -81,6 +81,6 @@ def test_a_direction_in_the_name_of_a_channel_is_reported(name, tmp_path):
         "Schiene nicht invertiert",
     ],
 )
-def test_a_hyphen_in_a_name_is_no_minus(name, tmp_path):
+def test_a_hyphen_in_a_name_is_not_read_as_a_minus(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     assert remarks(tmp_path / "a.npz", replace(RAIL, source=name)) == []

@@ -1,4 +1,4 @@
-"""An exponential window that the file states is reported for a hammer test: nothing in the samples shows it."""
+"""A stated exponential window is reported for a hammer test, as the samples do not show it."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_a_stated_exponential_window_is_reported_for_a_hammer_test(name, value, 
         ("Window", "experimental"),
     ],
 )
-def test_another_window_or_one_that_is_off_is_not_reported(name, value, tmp_path):
+def test_another_window_or_a_window_that_is_off_is_not_reported(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
 
 

@@ -1,4 +1,4 @@
-"""Layouts that others write, made here with the libraries that they use."""
+"""Files with the structures of other programs, written here with the libraries that those use."""
 
 from dataclasses import replace
 
@@ -36,42 +36,42 @@ def by_name():
     return RawDescription((RawChannel("force", "Force", "force"), RawChannel("rail", "Acc", "acceleration")), rate=RATE)
 
 
-def both(recording):
+def assert_both(recording):
     np.testing.assert_allclose(recording.signal("force"), FORCE, rtol=1e-14)
     np.testing.assert_allclose(recording.signal("rail"), RAIL, rtol=1e-14)
 
 
-def test_matlab_matrix_of_columns_with_fs(by_index, tmp_path):
+def test_a_matlab_matrix_of_columns_with_fs_is_read(by_index, tmp_path):
     volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
     scipy.io.savemat(tmp_path / "a.mat", {"data": volts, "Fs": RATE, "operator": "NN"})
     (recording,) = read("a.mat", tmp_path, by_index).recordings
-    both(recording)
+    assert_both(recording)
     assert recording.conditions["operator"] == "NN"
     (error,) = read("a.mat", tmp_path, replace(by_index, rate=25600.0)).errors
     assert error.reason == "wrong_rate"
 
 
-def test_matlab_matrix_in_three_dimensions(by_index, tmp_path):
-    """(sample, channel, record), as MATLAB users stack their impacts."""
+def test_a_matlab_matrix_in_three_dimensions_is_read(by_index, tmp_path):
+    """(sample, channel, record): users of MATLAB stack impacts in this way."""
     volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
     scipy.io.savemat(tmp_path / "a.mat", {"y": np.stack([volts, 2 * volts], axis=2), "dt": 1 / RATE})
     first, second = read("a.mat", tmp_path, by_index).recordings
-    both(first)
+    assert_both(first)
     np.testing.assert_allclose(second.signal("rail"), 2 * RAIL, rtol=1e-14)
 
 
-def test_matlab_structure_and_structure_array(by_name, tmp_path):
+def test_matlab_structures_are_read(by_name, tmp_path):
     one = {"Force": FORCE, "Acc": RAIL, "fs": RATE, "units": np.array(["N", "m/s^2"], dtype=object)}
     scipy.io.savemat(tmp_path / "a.mat", {"measurement": one})
     (recording,) = read("a.mat", tmp_path, by_name).recordings
-    both(recording)
+    assert_both(recording)
     scipy.io.savemat(tmp_path / "b.mat", {"hit_1": one, "hit_2": {**one, "Force": -FORCE, "Acc": -RAIL}})
     first, second = read("b.mat", tmp_path, by_name).recordings
-    both(first)
+    assert_both(first)
     np.testing.assert_array_equal(second.signal("force"), -FORCE)
 
 
-def test_a_square_matrix_is_not_guessed_at(by_index, tmp_path):
+def test_a_square_matrix_is_an_error(by_index, tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"data": np.random.default_rng(0).normal(size=(5, 5)), "fs": RATE})
     (error,) = _raised("a.mat", tmp_path, by_index)
     assert "(5, 5) samples do not match 5 channels" in str(error)
@@ -84,22 +84,22 @@ def _raised(name, root, description):
         return (error,)
 
 
-def test_two_matrices_are_not_guessed_at(by_index, tmp_path):
+def test_two_matrices_are_an_error(by_index, tmp_path):
     np.savez(tmp_path / "a.npz", x=np.zeros((2, 9)), y=np.zeros((2, 9)), fs=RATE)
     (error,) = _raised("a.npz", tmp_path, by_index)
     assert "several arrays could be the samples: 'x', 'y'. Export one array or one per record." in str(error)
 
 
-def test_hdf5_with_datasets_at_the_root(by_name, tmp_path):
+def test_hdf5_datasets_at_the_root_are_read(by_name, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name, samples, unit in (("Force", FORCE, "N"), ("Acc", RAIL, "m/s2")):
             file[name] = samples
             file[name].attrs["units"] = unit
             file[name].attrs["sample_rate"] = RATE
-    both(read("a.h5", tmp_path, by_name).recordings[0])
+    assert_both(read("a.h5", tmp_path, by_name).recordings[0])
 
 
-def test_hdf5_with_a_group_per_impact_and_a_time_vector(by_name, tmp_path):
+def test_hdf5_with_a_group_per_impact_and_a_time_vector_is_read(by_name, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for impact in ("Impact 10", "Impact 9"):  # 9 comes before 10
             group = file.create_group(impact)
@@ -107,12 +107,12 @@ def test_hdf5_with_a_group_per_impact_and_a_time_vector(by_name, tmp_path):
             group["Force"], group["Acc"] = np.array([FORCE, RAIL]) * (1 if impact.endswith("9") else 3)
             group["Force"].attrs["unit"], group["Acc"].attrs["unit"] = "N", "m/s²"
     first, second = read("a.h5", tmp_path, by_name).recordings
-    both(first)
+    assert_both(first)
     np.testing.assert_allclose(second.signal("force"), 3 * FORCE)
 
 
 def named_by_a_list(folder, **lists):
-    """Groups of datasets, which HDF5 keeps by the alphabet, below lists in the order in which the logger counts."""
+    """Groups of datasets, which HDF5 sorts by the alphabet, below lists in the order of the logger."""
     with h5py.File(folder / "a.h5", "w") as file:
         file.attrs.update({"rate": RATE, **lists})
         for impact in (1, 2):
@@ -127,8 +127,8 @@ def by_three_names(by_name):
 
 
 @pytest.mark.parametrize("names", [["Sleeper", "Force", "Acc"], ["SLEEPER", "Spare", "Force", "Acc"]])
-def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_names, tmp_path):
-    """By the alphabet "Acc" would be in g and "Sleeper" in m/s², both wrong by 9.8."""
+def test_a_list_of_units_has_the_order_of_the_list_of_names(names, by_three_names, tmp_path):
+    """By the alphabet, "Acc" would be in g and "Sleeper" in m/s², both wrong by a factor of 9.8."""
     units = [{"SLEEPER": "g", "FORCE": "kN", "ACC": "m/s²"}.get(name.upper(), "V") for name in names]
     result = read(named_by_a_list(tmp_path, channels=names, units=units), tmp_path, by_three_names)
     assert result.errors == ()
@@ -139,7 +139,7 @@ def test_a_list_of_units_goes_by_the_list_of_names_beside_it(names, by_three_nam
 
 
 @pytest.mark.parametrize("lists", [{}, {"channels": ["a", "b", "c"]}])
-def test_a_list_of_units_in_no_order_is_not_dealt_out_by_the_alphabet(lists, by_three_names, tmp_path):
+def test_a_list_of_units_without_a_known_order_is_an_error(lists, by_three_names, tmp_path):
     result = read(named_by_a_list(tmp_path, units=["g", "N", "m/s²"], **lists), tmp_path, by_three_names)
     assert [e.reason for e in result.errors] == ["unit_unknown"] * 2
     assert result.errors[1].problem == "nothing says which of the units 'g', 'N', 'm/s²' are whose"
@@ -153,12 +153,12 @@ def test_a_list_of_units_in_no_order_is_not_dealt_out_by_the_alphabet(lists, by_
     np.testing.assert_allclose(same.recordings[0].signal("rail"), 9.80665 * RAIL, rtol=1e-14)
 
 
-def test_a_list_of_units_goes_by_the_order_of_variables_where_the_file_keeps_it(by_name, tmp_path):
-    """Force before Acc: HDF5 that notes the order of its making, MATLAB 5; the alphabet in MATLAB 7.3."""
+def test_a_list_of_units_has_the_order_of_variables_if_the_file_stores_it(by_name, tmp_path):
+    """Force before Acc: in HDF5 with track_order and in MATLAB 5; MATLAB 7.3 sorts by the alphabet."""
     with h5py.File(tmp_path / "a.h5", "w", track_order=True) as file:
         file["Force"], file["Acc"] = FORCE, RAIL
         file.attrs.update({"rate": RATE, "units": ["N", "m/s²"]})
-    both(read("a.h5", tmp_path, by_name).recordings[0])
+    assert_both(read("a.h5", tmp_path, by_name).recordings[0])
     with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
         for name, numbers in (("Force", FORCE), ("Acc", RAIL), ("fs", RATE)):
             mat73._double(file, name, numbers)
@@ -169,8 +169,8 @@ def test_a_list_of_units_goes_by_the_order_of_variables_where_the_file_keeps_it(
     assert error.reason == "unit_unknown" and "which of the units 'N', 'm/s²' are whose" in error.problem
 
 
-def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
-    """LabVIEW stores converter steps and a linear scale: step 0.05 N."""
+def test_tdms_of_one_group_with_scaled_integers_is_read(by_name, tmp_path):
+    """LabVIEW stores converter steps and a linear scale: a step is 0.05 N."""
     steps = np.round(FORCE / 0.05).astype("int16")
     scale = {
         "NI_Number_Of_Scales": 1,
@@ -196,7 +196,7 @@ def test_tdms_of_one_group_with_scaled_integers(by_name, tmp_path):
 
 
 def left_in_hdf5(folder, steps, starts):
-    """Single samples of another rate, which are no channel, come first."""
+    """Write a file whose first dataset has a few samples of another rate and is no channel."""
     with h5py.File(folder / "a.h5", "w") as file:
         file["AMBIENT"] = np.arange(3.0)
         file["AMBIENT"].attrs["rate"] = 1.0
@@ -208,7 +208,7 @@ def left_in_hdf5(folder, steps, starts):
 
 def left_in_tdms(folder, steps, starts):
     with nptdms.TdmsWriter(str(folder / "a.tdms")) as writer:
-        for k in range(2):  # half of what the second begins later by stands in its time stamp
+        for k in range(2):  # half of the delay of the second channel is in its time stamp
             channels = [
                 nptdms.ChannelObject(
                     f"impact {k}",
@@ -260,26 +260,24 @@ LEFT = {"hdf5": left_in_hdf5, "tdms": left_in_tdms, "lvm": left_in_lvm, "uff": l
 
 
 @pytest.mark.parametrize("format", LEFT)
-def test_channels_of_one_record_that_state_different_rates_are_not_put_side_by_side(format, by_name, tmp_path):
-    """Of two records the last, but in HDF5, which has one here."""
+def test_channels_of_one_record_with_different_rates_are_an_error(format, by_name, tmp_path):
+    """The fault is in the last of two records; the HDF5 file has only one record."""
     name = LEFT[format](tmp_path, (1 / RATE, 1 / 20000), (0.0, 0.0))
     (error,) = _raised(name, tmp_path, by_name)
     if format != "hdf5":
-        both(read(name, tmp_path, by_name).recordings[0])
+        assert_both(read(name, tmp_path, by_name).recordings[0])
         assert error.where == "record 2 of 2" + " (group 'impact 1')" * (format == "tdms")
     assert error.reason == "wrong_rate" and ("20000 Hz" in error.problem or "5e-05" in error.problem)
 
 
 @pytest.mark.parametrize("format", ["tdms", "lvm", "uff"])
 @pytest.mark.parametrize("start", [5e-4, -6e-5])
-def test_channels_of_one_record_that_begin_at_different_moments_are_not_put_side_by_side(
-    format, start, by_name, tmp_path
-):
-    """0.5 ms are 72° at 400 Hz. A part of a sample is no matter: converters that take turns are that far apart."""
+def test_channels_of_one_record_with_different_starts_are_an_error(format, start, by_name, tmp_path):
+    """0.5 ms are 72° at 400 Hz. A part of a sample is accepted, as multiplexed converters differ by that."""
     name = LEFT[format](tmp_path, (1 / RATE, 1 / RATE), (1e-3, 1e-3 + start))
     result = read(name, tmp_path, by_name)
     (error,) = result.errors
-    both(result.recordings[0])
+    assert_both(result.recordings[0])
     assert error.reason == "clock_drift" and "record 2 of 2" in error.where
     late, early = ("Acc", "Force") if start > 0 else ("Force", "Acc")
     assert error.problem == f"channel {late!r} begins {abs(start):.6g} s after channel {early!r}"
@@ -287,9 +285,9 @@ def test_channels_of_one_record_that_begin_at_different_moments_are_not_put_side
     assert read(name, tmp_path, by_name).errors == ()
 
 
-def test_hdf5_channels_of_one_rate_may_say_it_each_in_its_own_way(by_name, tmp_path):
+def test_hdf5_channels_can_state_one_rate_in_different_ways(by_name, tmp_path):
     result = read(left_in_hdf5(tmp_path, (1 / RATE, 1 / RATE), (0.0, 0.0)), tmp_path, by_name)
-    both(result.recordings[0])
+    assert_both(result.recordings[0])
 
 
 @pytest.mark.parametrize(
@@ -301,19 +299,19 @@ def test_hdf5_channels_of_one_rate_may_say_it_each_in_its_own_way(by_name, tmp_p
         ("# sampled at site 7\nForce (N)\tAcc (m/s^2)\n", "\t", False),
     ],
 )
-def test_text_with_any_separator_and_decimal_mark(head, separator, comma, by_name, tmp_path):
+def test_text_with_any_separator_and_decimal_mark_is_read(head, separator, comma, by_name, tmp_path):
     rows = "".join(f"{f:.17g}{separator}{a:.17g}\n" for f, a in zip(FORCE, RAIL))
     rows = rows.replace(".", ",") if comma else rows
     (tmp_path / "a.csv").write_text(head + rows, encoding="utf-8")
     named = tuple(replace(c, unit=u) for c, u in zip(by_name.channels, ("N", "m/s²")))
-    both(read("a.csv", tmp_path, replace(by_name, channels=named)).recordings[0])
+    assert_both(read("a.csv", tmp_path, replace(by_name, channels=named)).recordings[0])
 
 
 def test_text_with_a_printed_time_column_gives_the_rate(by_name, tmp_path):
-    """Time in whole microseconds wanders by half of one around the line; the rate is known to 2 * 0.5 us / 5.8 ms."""
+    """A time in whole microseconds deviates by up to half of one: the rate is known to 2 * 0.5 us / 5.8 ms."""
     frame = pd.DataFrame({"time": (np.arange(300) / RATE).round(6), "Force [N]": FORCE, "Acc [m/s²]": RAIL})
     frame.to_csv(tmp_path / "a.csv", index=False)
-    both(read("a.csv", tmp_path, by_name).recordings[0])
+    assert_both(read("a.csv", tmp_path, by_name).recordings[0])
     assert read("a.csv", tmp_path, by_name).recordings[0].rate == RATE
     assert read("a.csv", tmp_path, replace(by_name, rate=51300.0)).errors[0].reason == "wrong_rate"
 
@@ -324,7 +322,7 @@ def test_text_without_names_is_mapped_by_index(by_index, tmp_path):
     np.testing.assert_allclose(recording.signal("force"), FORCE / 0.23e-3, rtol=1e-14)
 
 
-def test_text_with_a_word_among_its_numbers_names_the_place(by_index, tmp_path):
+def test_the_error_of_a_word_among_numbers_states_its_place(by_index, tmp_path):
     np.savetxt(tmp_path / "a.csv", np.column_stack([FORCE, RAIL]), delimiter=",")
     text = (tmp_path / "a.csv").read_text().splitlines()
     text[100] = "overload,0.5"
@@ -334,17 +332,17 @@ def test_text_with_a_word_among_its_numbers_names_the_place(by_index, tmp_path):
     assert str(error).startswith("a.csv, line 101, column '0': 'overload' is no number")
 
 
-def test_parquet_of_a_data_frame_with_time_stamps(by_name, tmp_path):
+def test_parquet_of_a_data_frame_with_time_stamps_is_read(by_name, tmp_path):
     stamps = pd.Timestamp("2024-05-13") + pd.to_timedelta(np.arange(300) / RATE, unit="s")
     pd.DataFrame({"time": stamps, "Force": FORCE, "Acc": RAIL}).to_parquet(tmp_path / "a.parquet")
     named = tuple(replace(c, unit=u) for c, u in zip(by_name.channels, ("N", "m/s²")))
-    both(read("a.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
+    assert_both(read("a.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
     table = pa.table({"Force": FORCE, "Acc": RAIL}).replace_schema_metadata({"rate": "51200.0", "units": "[]"})
     pq.write_table(table, tmp_path / "b.parquet")
-    both(read("b.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
+    assert_both(read("b.parquet", tmp_path, replace(by_name, channels=named)).recordings[0])
 
 
-def test_wav_of_16_bit_and_flac(by_index, tmp_path):
+def test_wav_and_flac_are_read_to_their_resolution(by_index, tmp_path):
     rng = np.random.default_rng(3)
     samples = rng.uniform(-0.9, 0.9, size=(300, 2))
     of_one_volt = replace(by_index, channels=tuple(replace(c, unit="1 V") for c in by_index.channels))
@@ -356,8 +354,8 @@ def test_wav_of_16_bit_and_flac(by_index, tmp_path):
         assert np.abs(recording.signal("rail") * 87.9e-3 / 9.80665 - samples[:, 1]).max() <= half_step
 
 
-def test_the_real_hammer_test_of_five_impacts(shared_data):
-    """Truths printed in the file's own header, and its numbers as they stand there."""
+def test_the_real_hammer_test_of_five_impacts_is_read(shared_data):
+    """The true values are printed in the header of the file; the samples are those in the file."""
     channels = (
         RawChannel("force", "Force (Trigger)", "force"),
         RawChannel("response", "Acceleration (Trigger)", "acceleration"),
@@ -372,8 +370,8 @@ def test_the_real_hammer_test_of_five_impacts(shared_data):
     assert result.sha256 == "473b6380" + result.sha256[8:]
 
 
-def test_an_lvm_row_may_carry_a_comment(shared_data, tmp_path):
-    """Only some rows have the extra field; lvm_read pads, the numbers stay what they are."""
+def test_a_row_of_lvm_may_contain_a_comment(shared_data, tmp_path):
+    """Only some rows have the additional field; lvm_read pads the others, and the numbers do not change."""
     text = (shared_data / "hammer_pyfrf" / "impact2_response0.lvm").read_text().splitlines()[:40]
     text[14] = text[14].replace("51200", "17")
     text[24] += "\tovershoot"
@@ -385,7 +383,7 @@ def test_an_lvm_row_may_carry_a_comment(shared_data, tmp_path):
 
 
 def test_structured_arrays_are_read_by_their_fields(tmp_path):
-    """HDF5 and npz; fields of a time axis and of the channels."""
+    """In HDF5 and npz: fields of a time axis and of channels."""
     x = np.random.default_rng(1).normal(size=(2, 60))
     rows = np.zeros(60, dtype=[("time", "f8"), ("force", "f8"), ("rail", "f4")])
     rows["time"], rows["force"], rows["rail"] = np.arange(60) / 5000, *x
@@ -426,7 +424,7 @@ def test_structure_arrays_and_cells_of_matlab_are_read(kind, tmp_path):
         assert recording.rate == 5000 and np.array_equal(recording.samples, x + k)
 
 
-def test_a_file_without_samples_says_what_it_holds(tmp_path):
+def test_the_error_of_a_file_without_samples_states_its_content(tmp_path):
     np.savez(tmp_path / "a.npz", spectrum=np.ones(50) + 1j)
     pq.write_table(pa.table({"force": [[1.0, None, 3.0]], "rail": [[1.0, 2.0, 3.0]]}), tmp_path / "a.parquet")
     layout = RawDescription((RawChannel("force", "force", "force", "N"),), rate=5000.0)

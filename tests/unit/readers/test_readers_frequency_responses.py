@@ -1,4 +1,4 @@
-"""Frequency responses of files: UFF58 function type 4, text with complex columns or pairs, npz."""
+"""Frequency responses in files: UFF58 function type 4, text with complex columns or pairs, npz."""
 
 import gzip
 
@@ -41,7 +41,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_responses_of_a_text_are_read_to_its_digits(kind, tmp_path):
+def test_frequency_responses_of_a_text_are_read_to_their_digits(kind, tmp_path):
     head, row = TEXTS[kind]
     (tmp_path / "a.txt").write_text(head + "".join(map(row, F, H)))
     found = find_responses("a.txt", tmp_path)
@@ -50,7 +50,7 @@ def test_responses_of_a_text_are_read_to_its_digits(kind, tmp_path):
     assert found.frf.shape == (1, len(F))
 
 
-def test_two_responses_of_a_text_have_their_names_and_units(tmp_path):
+def test_two_frequency_responses_of_a_text_have_their_names_and_units(tmp_path):
     head = "Hz,A Real [g/N],A Imag [g/N],B Real [m/s²/N],B Imag [m/s²/N]\n"
     rows = (",".join((str(f), *cells(h), *cells(2.0 * h))) + "\n" for f, h in zip(F, H))
     (tmp_path / "a.csv").write_text(head + "".join(rows), encoding="utf-8")
@@ -59,13 +59,13 @@ def test_two_responses_of_a_text_have_their_names_and_units(tmp_path):
     assert found.frf == pytest.approx(np.array([H, 2.0 * H]), rel=1e-7)
 
 
-def test_arrays_of_numpy(tmp_path):
+def test_frequency_responses_in_numpy_arrays_are_read(tmp_path):
     np.savez(tmp_path / "a.npz", frequency=F, frf=np.stack([H, 2.0 * H]).T, units="m/N")
     found = find_responses("a.npz", tmp_path)
     assert found.frf == pytest.approx(np.array([H, 2.0 * H])) and found.units == ("m/N", "m/N")
 
 
-def test_the_measured_beam_has_three_accelerances(shared_data, tmp_path):
+def test_three_accelerances_of_a_measured_beam_are_read(shared_data, tmp_path):
     packed = shared_data / "uff58_reader_samples" / "beam.uff.gz"
     (tmp_path / "beam.uff").write_bytes(gzip.decompress(packed.read_bytes()))
     for root, name in ((tmp_path, "beam.uff"), (packed.parent, packed.name)):
@@ -75,13 +75,13 @@ def test_the_measured_beam_has_three_accelerances(shared_data, tmp_path):
 
 
 @pytest.mark.parametrize("file_format", ["uff58", "csv", "npz", "lvm", "hdf5", "tdms"])
-def test_recordings_are_no_responses(file_format, hammer_test, in_si, tmp_path, name_of):
+def test_recordings_are_not_read_as_frequency_responses(file_format, hammer_test, in_si, tmp_path, name_of):
     name = name_of(file_format)
     write(hammer_test, tmp_path / name, file_format, in_si)
     assert find_responses(name, tmp_path) is None
 
 
-def test_a_text_over_time_is_no_response(tmp_path):
+def test_a_text_with_a_time_column_is_not_read_as_a_frequency_response(tmp_path):
     rows = "".join(f"{t},{h.real:.6e},{h.imag:.6e}\n" for t, h in zip(F, H))
     (tmp_path / "a.csv").write_text("time [s],force real,frequency imag\n" + rows)
     assert find_responses("a.csv", tmp_path) is None
@@ -95,7 +95,7 @@ def test_a_text_over_time_is_no_response(tmp_path):
         (F, np.where(F == 7.0, np.nan, H), "'h' is no number at 7 Hz"),
     ],
 )
-def test_responses_that_cannot_be_evaluated_say_why(frequency, frf, words, tmp_path):
+def test_the_error_of_responses_that_cannot_be_evaluated_states_the_reason(frequency, frf, words, tmp_path):
     np.savez(tmp_path / "a.npz", frequency=frequency, h=frf.astype(complex))
     with pytest.raises(ReadError, match=words):
         check_evaluable(find_responses("a.npz", tmp_path), "a.npz")
@@ -118,14 +118,14 @@ TITLES = {"Frequency [Hz] (bin)": 1.0, "Frequency (FFT) [kHz]": 1e-3, "Frequency
 
 
 @pytest.mark.parametrize("title", TITLES)
-def test_a_remark_in_the_title_of_the_frequencies_is_no_unit(title, tmp_path):
+def test_a_remark_in_the_title_of_the_frequencies_is_not_read_as_a_unit(title, tmp_path):
     rows = [";".join((f"{TITLES[title] * f:.12g}", *cells(h))) for f, h in zip(F[:60], H)]
     (tmp_path / "a.csv").write_text("\n".join((f"{title};Real;Imag", *rows)) + "\n")
     assert find_responses("a.csv", tmp_path).frequency == pytest.approx(F[:60], rel=1e-9)
 
 
 @pytest.mark.parametrize("unit", ["ms", "order", "V"])
-def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
+def test_a_column_with_another_unit_is_not_read_as_frequencies(unit, tmp_path):
     rows = [";".join((f"{f}", *cells(h))) for f, h in zip(F[:60], H)]
     (tmp_path / "a.csv").write_text("\n".join((f"Frequency [{unit}];Real;Imag", *rows)) + "\n")
     with pytest.raises(ReadError, match=f"'{unit}' is no unit of a frequency") as error:
@@ -145,8 +145,8 @@ def test_a_column_of_another_unit_holds_no_frequencies(unit, tmp_path):
         ("Frequency [Hz];Magnitude;Phase [rad]", lambda h: (abs(h), np.angle(h))),
     ],
 )
-def test_the_titles_say_which_column_of_a_pair_is_which_and_what_a_phase_is(head, row, tmp_path):
-    """A phase in radians that is continued over several turns is none in degrees."""
+def test_the_titles_determine_the_columns_of_a_pair_and_the_unit_of_a_phase(head, row, tmp_path):
+    """A phase in radians over several turns is not read as degrees."""
     values = H / np.abs(H).max()
     turns = np.arange(len(F)) // 100
     lines = [row(h) for h in values]
@@ -158,7 +158,7 @@ def test_the_titles_say_which_column_of_a_pair_is_which_and_what_a_phase_is(head
 
 
 def write_function(path, abscissa, ordinate, code=1, scale=1.0):
-    """A Universal File of one frequency response, with data set 164 of SI or of mm and mN (5)."""
+    """Write a Universal File of one frequency response, with data set 164 of SI or of mm and mN (5)."""
     step, (size, n) = scale * (F[1] - F[0]), ((1000.0, len(F)) if code == 5 else (1.0, len(F)))
     axes = [(18, abscissa), (12, ordinate), (13, "NONE"), (0, "NONE")]
     lines = [
@@ -190,6 +190,6 @@ def test_frequencies_of_a_universal_file_are_in_the_unit_of_their_label(unit, tm
         (5, "m/s²", "not known: its label says 'm/s²', data set 164 of the file 'mm/s²'"),
     ],
 )  # fmt: skip
-def test_a_label_of_a_frequency_response_that_dataset_164_denies_is_no_unit(code, label, unit, tmp_path):
+def test_a_label_of_a_frequency_response_that_contradicts_dataset_164_is_not_used(code, label, unit, tmp_path):
     write_function(tmp_path / "a.uff", "Hz", label, code)
     assert find_responses("a.uff", tmp_path).units == (unit,)

@@ -1,7 +1,7 @@
-"""Names and notations of loggers that no other test uses: every format reads them right, rejects them or reports them.
+"""Names and notations of loggers that no other test uses are read correctly, rejected or reported in every format.
 
-The samples were taken at 25.6 kHz. An entry of 20 kHz, a scale that nothing says to be applied, and a start time that
-no rule reads must each be reported; entries about other things must not.
+The samples have a rate of 25.6 kHz. An entry of 20 kHz, a scale that may not have been applied, and a start time in an
+unknown notation must be reported; entries about other things must not.
 """
 
 from datetime import datetime
@@ -50,8 +50,8 @@ OTHERS = {
 }  # fmt: skip
 
 
-def written(format, tmp_path, name, value, start=None):
-    """A file with the entry in the first or second place of metadata, None if the format cannot hold it."""
+def write_entry(format, tmp_path, name, value, start=None):
+    """Write a file with the entry as the first or second of the metadata; None if the format cannot store it."""
     write_file, file_name, _ = FORMATS[format]
     if format == "mat":
         if plain(name) != name.replace(" ", "_"):
@@ -65,7 +65,7 @@ def written(format, tmp_path, name, value, start=None):
 
 
 def outcome(path):
-    """(recording, errors) of a file that the layout describes rightly."""
+    """(recording, errors) of a file whose layout is correct."""
     try:
         result = read(path.name, path.parent, described(TRUE))
     except ReadError as error:
@@ -75,19 +75,19 @@ def outcome(path):
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("kind", ["wrong_rate", "scale_unknown"])
-def test_another_rate_or_an_open_scale_under_any_name_is_reported(format, kind, tmp_path):
-    silent = []
+def test_another_rate_or_an_unclear_scale_under_any_name_is_reported(format, kind, tmp_path):
+    unreported = []
     for name, value in (RATES if kind == "wrong_rate" else SCALES).items():
-        if path := written(format, tmp_path, name, value):
+        if path := write_entry(format, tmp_path, name, value):
             _, errors = outcome(path)
-            silent += [] if errors and errors[0].reason in (kind, "entry_unknown") else [name]
-    assert silent == []
+            unreported += [] if errors and errors[0].reason in (kind, "entry_unknown") else [name]
+    assert unreported == []
 
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_entries_about_other_things_are_not_reported(format, tmp_path):
     for name, value in OTHERS.items():
-        if path := written(format, tmp_path, name, value):
+        if path := write_entry(format, tmp_path, name, value):
             recording, errors = outcome(path)
             assert recording is not None and errors == (), (name, value)
 
@@ -95,7 +95,7 @@ def test_entries_about_other_things_are_not_reported(format, tmp_path):
 @pytest.mark.parametrize("format", ["csv", "tdms", "parquet", "hdf5", "npz", "mat", "wav"])
 def test_a_start_under_any_name_is_read_or_reported(format, tmp_path):
     for text in (*STARTS, *READ_STARTS):
-        recording, errors = outcome(written(format, tmp_path, "Recorded", text))
+        recording, errors = outcome(write_entry(format, tmp_path, "Recorded", text))
         if text in READ_STARTS:
             assert recording.started_at.replace(second=0) == datetime(2024, 5, 13, 10) and errors == (), text
         else:
@@ -104,9 +104,9 @@ def test_a_start_under_any_name_is_read_or_reported(format, tmp_path):
 
 @pytest.mark.parametrize("format", sorted(set(FORMATS) - {"uff"}))
 def test_two_start_times_are_reported(format, tmp_path):
-    path = written(format, tmp_path, "Recorded", "2023-01-05 10:00:00", start="2024-05-13T10:00:00")
+    path = write_entry(format, tmp_path, "Recorded", "2023-01-05 10:00:00", start="2024-05-13T10:00:00")
     recording, errors = outcome(path)
     assert recording.started_at == datetime(2024, 5, 13, 10)
     assert errors[0].reason == "start_unknown" and "two start times" in errors[0].problem
-    path = written(format, tmp_path, "Recorded", "2024-05-13 12:00:00", start="2024-05-13T10:00:00")  # another zone
+    path = write_entry(format, tmp_path, "Recorded", "2024-05-13 12:00:00", start="2024-05-13T10:00:00")  # another zone
     assert outcome(path)[1] == ()

@@ -1,4 +1,4 @@
-"""A package that is missing or broken is a fault of the installation: no file is to blame for it."""
+"""A package that is missing or broken is a fault of the installation and of no file."""
 
 import builtins
 import errno
@@ -12,7 +12,7 @@ from turnout.errors import InstallationError, ReadError, installation_error, is_
 from turnout.readers import names_and_units, read
 from turnout.readers.writing import write
 
-# Formats with the package that reads them. The modules of the readers import it anew.
+# Formats with the package that reads them. The modules of the readers import it again.
 PACKAGES = {
     "hdf5": "h5py", "mat73": "h5py", "mat": "scipy.io", "tdms": "nptdms", "wav": "soundfile", "parquet": "pyarrow",
 }  # fmt: skip
@@ -28,7 +28,7 @@ BROKEN = {
 
 @pytest.fixture
 def broken_package(monkeypatch, tmp_path):
-    """Put a package in place of another whose import raises the given exception."""
+    """Function that replaces a package by one whose import raises the given exception."""
 
     def put(name, error):
         package = name.split(".")[0]
@@ -58,7 +58,9 @@ def test_a_broken_package_is_a_fault_of_the_installation(
 
 
 @pytest.mark.parametrize("error", [OSError(errno.EMFILE, "Too many open files"), MemoryError()], ids=repr)
-def test_a_fault_of_the_machine_in_an_import_stays_one(error, hammer_test, in_si, name_of, tmp_path, broken_package):
+def test_a_fault_of_the_machine_during_an_import_is_reported_as_such(
+    error, hammer_test, in_si, name_of, tmp_path, broken_package
+):
     path = write(hammer_test, tmp_path / name_of("tdms"), "tdms")
     broken_package("nptdms", error)
     with pytest.raises(type(error)) as caught:
@@ -92,8 +94,10 @@ def failing_with(error):
     ids=repr,
 )
 @pytest.mark.parametrize("place", ["turnout.readers.npz.np.load", "turnout.readers.npz.read_raw"])
-def test_what_an_exception_is_about(error, expected, place, hammer_test, in_si, name_of, tmp_path, monkeypatch):
-    """Only what damaged bytes can cause says something about the file."""
+def test_an_exception_is_assigned_to_the_installation_the_machine_or_the_file(
+    error, expected, place, hammer_test, in_si, name_of, tmp_path, monkeypatch
+):
+    """Only exceptions that damaged bytes can cause are errors of the file."""
     path = write(hammer_test, tmp_path / name_of("npz"), "npz")
     monkeypatch.setattr(place, failing_with(error))
     with pytest.raises(expected):
@@ -101,7 +105,7 @@ def test_what_an_exception_is_about(error, expected, place, hammer_test, in_si, 
 
 
 @pytest.mark.parametrize("place", ["turnout.readers.npz.np.load", "turnout.readers.npz.read_raw"])
-def test_an_interrupt_that_a_library_turns_into_an_exception_stays_one(
+def test_an_interrupt_that_a_library_converts_to_an_exception_is_raised_as_interrupt(
     place, hammer_test, in_si, name_of, tmp_path, monkeypatch
 ):
     path = write(hammer_test, tmp_path / name_of("npz"), "npz")
@@ -127,11 +131,11 @@ def test_an_interrupt_that_a_library_turns_into_an_exception_stays_one(
         (None, "Install Turnout again"),
     ],
 )
-def test_the_remedy_names_what_to_install(module, words):
+def test_the_remedy_states_what_to_install(module, words):
     assert words in str(installation_error(ImportError("gone", name=module)))
 
 
-def test_the_cause_of_an_exception_counts():
+def test_the_cause_of_an_exception_is_used():
     try:
         try:
             raise ImportError("no h5py", name="h5py")
@@ -142,7 +146,7 @@ def test_the_cause_of_an_exception_counts():
 
 
 @pytest.mark.parametrize("format", ["uff58", "tdms", "mat", "mat73", "hdf5", "wav", "lvm", "npz", "parquet", "csv"])
-def test_too_many_open_files_say_nothing_about_a_file(format, hammer_test, in_si, name_of, tmp_path):
+def test_too_many_open_files_are_no_fault_of_a_file(format, hammer_test, in_si, name_of, tmp_path):
     path = write(hammer_test[:1] if format == "wav" else hammer_test, tmp_path / name_of(format), format)
     n_whole = len(read(path.name, tmp_path, in_si).recordings)
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

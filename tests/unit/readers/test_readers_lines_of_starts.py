@@ -1,4 +1,4 @@
-"""Starts that lines above the numbers state in the words of people: without a mark, in two cells, as a bare number."""
+"""Starts in lines above the numbers as people write them: without a mark, in two cells, as a bare number."""
 
 import pytest
 
@@ -42,7 +42,7 @@ def read_head(head, tmp_path):
     ],
 )
 def test_a_line_states_the_start(head, tmp_path):
-    """Before, "start 2026-05-13 10:20:30" had the value "20:30", which a date in another line made the start."""
+    """Formerly, "start 2026-05-13 10:20:30" had the value "20:30", which was used with another date."""
     assert read_head(head, tmp_path) == (START, ())
 
 
@@ -61,7 +61,7 @@ def test_a_start_that_cannot_be_read_is_reported(head, words, tmp_path):
     assert start is None and error.reason == "start_unknown" and words in error.problem
 
 
-def test_an_abbreviation_that_is_none_of_the_zone_of_the_layout_is_reported(tmp_path):
+def test_an_abbreviation_that_does_not_belong_to_the_zone_of_the_layout_is_reported(tmp_path):
     start, (error,) = read_head("Start: 2026-05-13 10:20:30 CET", tmp_path)
     assert start == START and "time zone 'CET' cannot be read" in error.problem
 
@@ -73,5 +73,5 @@ def test_an_abbreviation_that_is_none_of_the_zone_of_the_layout_is_reported(tmp_
         "Start position: 24.6", "Messdatum: 13.05.2026", "Operator since 13.05.2020",
     ],
 )  # fmt: skip
-def test_other_dates_and_numbers_are_no_start(head, tmp_path):
+def test_other_dates_and_numbers_are_not_read_as_a_start(head, tmp_path):
     assert read_head(head, tmp_path) == (None, ())

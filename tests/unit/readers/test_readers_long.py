@@ -1,4 +1,4 @@
-"""Long records that stay in their file: the same channels, samples and errors as when the file is read whole."""
+"""Long records that are read in parts have the same channels, samples and errors as completely read records."""
 
 from datetime import datetime
 
@@ -13,8 +13,8 @@ from turnout.readers import read
 from turnout.readers.writing import WRITERS, write
 from turnout.records import Channel, LongRecording, RawChannel, RawDescription, Recording
 
-RATE, N = 8000.0, 2**17 + 301  # no multiple of any block, and enough numbers to stay in an HDF5 file
-STAYING = ("uff58b", "tdms", "hdf5", "rcmdx", "mat73", "wav", "csv", "parquet")
+RATE, N = 8000.0, 2**17 + 301  # no multiple of a block, and long enough to be read in parts from HDF5
+READ_IN_PARTS = ("uff58b", "tdms", "hdf5", "rcmdx", "mat73", "wav", "csv", "parquet")
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +26,8 @@ def logged():
     return Recording(samples, RATE, channels, "passage", started_at=datetime(2024, 5, 13, 10, 0, 1))
 
 
-def leave(recording, folder, format):
-    """A file as a logger leaves it: text and Parquet without the column that numbers records."""
+def write_as_logger(recording, folder, format):
+    """Write a file as a logger writes it: text and Parquet without the column that numbers records."""
     path = folder / f"x.{'mat' if format == 'mat73' else format}"
     if format not in ("csv", "parquet"):
         return write([recording], path, format)
@@ -46,7 +46,7 @@ def leave(recording, folder, format):
 
 @pytest.fixture
 def in_another_order():
-    """Two of the channels as accelerations, turned round and the other way about; the third is not wanted."""
+    """Two channels as accelerations in reversed order, one with reversed sign; the third is ignored."""
     return RawDescription(
         (
             RawChannel("sleeper", "sleeper", "acceleration", unit="g!", sign=-1),
@@ -59,8 +59,8 @@ def in_another_order():
 
 
 @pytest.mark.parametrize("format", WRITERS)
-def test_stretches_are_what_whole_reading_gives(format, logged, in_another_order, tmp_path):
-    path = leave(logged, tmp_path, format)
+def test_parts_of_a_record_equal_those_of_a_complete_read(format, logged, in_another_order, tmp_path):
+    path = write_as_logger(logged, tmp_path, format)
     (whole,) = read(path.name, tmp_path, in_another_order).recordings
     result = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0)
     assert result.recordings == () and result.errors == ()
@@ -73,15 +73,15 @@ def test_stretches_are_what_whole_reading_gives(format, logged, in_another_order
         assert np.array_equal(long.read(start, stop), whole.samples[:, start:stop])
 
 
-@pytest.mark.parametrize("format", STAYING)
-def test_samples_stay_in_files_of_formats_that_allow_it(format, logged, in_another_order, tmp_path):
-    path = leave(logged, tmp_path, format)
+@pytest.mark.parametrize("format", READ_IN_PARTS)
+def test_samples_are_read_in_parts_from_formats_that_allow_it(format, logged, in_another_order, tmp_path):
+    path = write_as_logger(logged, tmp_path, format)
     (long,) = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0).long_recordings
     assert not any(isinstance(x, np.ndarray) for x in long.read.record.samples)
 
 
 @pytest.mark.parametrize(("shape", "chunks"), [((3, N), (3, 4096)), ((N, 3), (4096, 3)), ((3, N), None)])
-def test_a_matrix_stays_whichever_way_it_lies(shape, chunks, logged, tmp_path):
+def test_a_matrix_of_either_orientation_is_read_in_parts(shape, chunks, logged, tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         data = logged.samples if shape[0] == 3 else logged.samples.T
         file.create_dataset("data", data=data, chunks=chunks)
@@ -93,7 +93,7 @@ def test_a_matrix_stays_whichever_way_it_lies(shape, chunks, logged, tmp_path):
     assert np.array_equal(long.read(5000, 9001), logged.samples[:, 5000:9001])
 
 
-def test_short_records_and_small_files_are_read_as_ever(logged, in_another_order, tmp_path):
+def test_short_records_and_small_files_are_read_completely(logged, in_another_order, tmp_path):
     path = write([logged], tmp_path / "x.h5", "hdf5")
     duration = N / RATE
     for longest, held in ((None, 0), (duration + 1.0, 0), (1.0, 10**9)):
@@ -102,17 +102,17 @@ def test_short_records_and_small_files_are_read_as_ever(logged, in_another_order
 
 
 @pytest.mark.parametrize("format", ["hdf5", "tdms", "parquet"])
-def test_a_channel_that_is_dead_or_not_finite_costs_itself_only_and_says_the_same(
+def test_only_a_dead_or_not_finite_channel_of_a_long_record_is_lost_with_the_same_message(
     format, logged, in_another_order, tmp_path
 ):
     samples = logged.samples.copy()
     samples[0] = 3.25
     samples[2, [5, 99_000, N - 1]] = np.nan
-    spoiled = Recording(samples, RATE, logged.channels, "passage")
+    damaged = Recording(samples, RATE, logged.channels, "passage")
     three = RawDescription(
         tuple(RawChannel(c.name, c.name, "acceleration") for c in logged.channels), kind="passage", rate=RATE
     )
-    path = leave(spoiled, tmp_path, format)
+    path = write_as_logger(damaged, tmp_path, format)
     whole = read(path.name, tmp_path, three)
     long = read(path.name, tmp_path, three, max_duration=10.0, max_whole_file_size=0)
     assert [str(e) for e in long.errors] == [str(e) for e in whole.errors] and len(whole.errors) == 2
@@ -120,7 +120,7 @@ def test_a_channel_that_is_dead_or_not_finite_costs_itself_only_and_says_the_sam
     assert np.array_equal(long.long_recordings[0].read(0, N), whole.recordings[0].samples)
 
 
-def test_a_file_that_changes_between_the_stretches_is_an_error_with_its_place(logged, in_another_order, tmp_path):
+def test_a_file_that_changes_between_two_parts_is_an_error_with_its_place(logged, in_another_order, tmp_path):
     path = write([logged], tmp_path / "x.wav", "wav")
     (long,) = read(path.name, tmp_path, in_another_order, max_duration=10.0, max_whole_file_size=0).long_recordings
     long.read(0, 100)
@@ -130,15 +130,15 @@ def test_a_file_that_changes_between_the_stretches_is_an_error_with_its_place(lo
         long.read(100, 200)
 
 
-def test_a_hammer_test_is_never_long(logged, in_another_order, tmp_path):
+def test_a_hammer_test_is_never_read_in_parts(logged, in_another_order, tmp_path):
     path = write([logged], tmp_path / "x.h5", "hdf5")
     hammer = RawDescription(in_another_order.channels, kind="hammer", rate=RATE)
     result = read(path.name, tmp_path, hammer, max_duration=1.0, max_whole_file_size=0)
     assert isinstance(result.recordings[0], Recording) and not isinstance(result.recordings[0], LongRecording)
 
 
-def test_marks_for_thousands_are_found_in_a_long_file_too(tmp_path):
-    """Whole numbers in mm/s² with commas between thousands, as a spreadsheet writes them behind tabs."""
+def test_separators_of_thousands_are_found_in_a_long_file(tmp_path):
+    """Whole numbers in mm/s² with commas between thousands, as a spreadsheet writes them with tabs."""
     numbers = np.round(np.random.default_rng(3).normal(size=2000) * 900.0).astype(int)
     (tmp_path / "x.txt").write_text("nr\tleft [mm/s²]\n" + "".join(f"{i}\t{n:,d}\n" for i, n in enumerate(numbers)))
     channels = RawChannel("left", "left", "acceleration"), RawChannel("nr", "nr", "ignored")
@@ -163,7 +163,7 @@ ENDS_OF_TEXT = {
 
 @pytest.mark.parametrize("line_break", ["\n", "\r\n", "\r"], ids=["lf", "crlf", "cr"])
 @pytest.mark.parametrize("end", ENDS_OF_TEXT.values(), ids=ENDS_OF_TEXT)
-def test_a_long_text_ends_as_a_short_one(end, line_break, tmp_path):
+def test_the_end_of_a_long_text_is_read_like_that_of_a_short_text(end, line_break, tmp_path):
     numbers = np.random.default_rng(9).normal(size=(2000, 2))
     rows = "".join(f"{a:.4f}\t{b:.4f}\n" for a, b in numbers)
     text = f"rate\t8000 Hz\nleft [m/s²]\tright [m/s²]\n{rows}{end}"

@@ -1,4 +1,4 @@
-"""Objects of MATLAB classes: never numbers of a recording, and each reported with the way to store its content."""
+"""Objects of MATLAB classes are never read as numbers, and each is reported with a way to store its content."""
 
 import struct
 
@@ -65,7 +65,7 @@ def write_73(path, plain, objects, nested):
 
 @pytest.fixture(params=VERSIONS)
 def result_of(request, tmp_path):
-    """Reads a file of plain variables and objects."""
+    """Function that reads a file of plain variables and objects."""
 
     def result(objects, plain=PLAIN, nested=False, description=None):
         write = write_5 if request.param == "5" else write_73
@@ -85,7 +85,7 @@ def only_remark(result):
 
 
 @pytest.mark.parametrize("nested", [False, True])
-def test_a_start_time_that_is_an_object_is_reported_and_no_number_of_it_is_a_time(result_of, nested):
+def test_a_start_time_that_is_an_object_is_reported_and_not_read_as_a_time(result_of, nested):
     error = only_remark(result_of({"start_time": "datetime"}, nested=nested))
     assert error.reason == "start_unknown"
     assert "'object of the MATLAB class datetime' cannot be read. Store it as text, in MATLAB by char(x" in str(error)
@@ -124,7 +124,7 @@ def test_an_object_that_the_layout_declares_checked_is_not_reported(result_of):
     ],
 )
 @pytest.mark.parametrize("nested", [False, True])
-def test_an_object_that_decides_how_samples_are_read_rejects_the_file(result_of, name, kind, statement, nested):
+def test_an_object_that_determines_the_reading_of_samples_is_an_error(result_of, name, kind, statement, nested):
     plain = {"force": FORCE, "rail": RAIL}
     path, variable = ("data/", "data.") if nested else ("", "")
     with pytest.raises(ReadError) as caught:
@@ -145,9 +145,7 @@ def test_an_object_that_decides_how_samples_are_read_rejects_the_file(result_of,
     ],
 )
 @pytest.mark.parametrize("nested", [False, True])
-def test_samples_in_an_object_reject_the_file_and_the_message_states_how_to_store_them(
-    result_of, kind, statement, nested
-):
+def test_samples_in_an_object_are_an_error_that_states_how_to_store_them(result_of, kind, statement, nested):
     with pytest.raises(ReadError) as caught:
         result_of({"meas": kind}, {"fs": RATE}, nested)
     variable = "data.meas" if nested else "meas"
@@ -158,7 +156,7 @@ def test_samples_in_an_object_reject_the_file_and_the_message_states_how_to_stor
     )
 
 
-def test_a_unit_of_a_channel_that_is_an_object_is_not_lost(tmp_path):
+def test_a_unit_of_a_channel_that_is_an_object_is_an_error(tmp_path):
     """Each channel is a structure with its samples and its unit."""
     path = tmp_path / "A7_1.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -173,7 +171,7 @@ def test_a_unit_of_a_channel_that_is_an_object_is_not_lost(tmp_path):
         read(path.name, tmp_path, layout("N", "m/s²"))
 
 
-def test_the_reference_to_an_object_in_a_cell_of_version_73_is_no_number(tmp_path):
+def test_the_reference_to_an_object_in_a_cell_of_version_73_is_not_read_as_a_number(tmp_path):
     path = tmp_path / "A7_1.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name, value in PLAIN.items():

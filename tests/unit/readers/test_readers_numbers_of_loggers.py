@@ -1,4 +1,4 @@
-"""Whole numbers of audio files, tables of data loggers, and binary files with the name of a text."""
+"""Whole numbers of audio files, tables of data loggers, and binary files with the extension of a text."""
 
 import logging
 from datetime import datetime, timedelta
@@ -34,7 +34,7 @@ def test_whole_numbers_of_audio_need_the_value_of_full_scale(tmp_path, name, sub
         np.testing.assert_allclose(recording.samples, X.T * [[5000.0], [900.0]], atol=5000.0 / 2**14)
 
 
-def test_floating_numbers_of_audio_may_be_in_the_unit_itself(tmp_path):
+def test_floating_point_numbers_of_audio_can_be_in_the_unit_itself(tmp_path):
     soundfile.write(tmp_path / "a.wav", X * 1e3, int(RATE), "DOUBLE")
     (recording,) = read("a.wav", tmp_path, of_units("N", "m/s²")).recordings
     np.testing.assert_array_equal(recording.samples, X.T * 1e3)
@@ -49,7 +49,7 @@ def rows(first, n=50):
 @pytest.mark.parametrize("title", ["TIMESTAMP", "Zeitstempel", "Horodatage", "Time"])
 @pytest.mark.parametrize("below", ['"","","Smp","Smp"\n', ""])
 @pytest.mark.parametrize("above", ['"TOA5","X","CR1000","1"\n', "Campbell TOA5\n\n"])
-def test_lines_between_the_units_of_a_table_and_its_numbers_hide_no_unit(tmp_path, title, below, above):
+def test_units_are_found_above_further_lines_of_a_table(tmp_path, title, below, above):
     head = f'{above}"{title}","RECORD","force","rail"\n"TS","RN","kN","m/s^2"\n{below}'
     (tmp_path / "a.dat").write_text(head + rows(7), encoding="utf-8")
     counted = RawDescription((*NAMED.channels, RawChannel("count", "RECORD", "ignored")), rate=RATE)
@@ -59,8 +59,8 @@ def test_lines_between_the_units_of_a_table_and_its_numbers_hide_no_unit(tmp_pat
     np.testing.assert_allclose(recording.samples, X[:50].T * [[1e3], [1.0]], rtol=1e-12)
 
 
-def test_a_column_that_numbers_each_row_is_no_number_of_a_record(tmp_path):
-    """With a number that stays for some rows, each run of rows is a record."""
+def test_a_column_that_numbers_each_row_is_not_read_as_the_number_of_a_record(tmp_path):
+    """Successive rows with the same number are a record."""
     table = "".join(f"{k};{a};{b}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text("record;force [N];rail [m/s²]\n" + table, encoding="utf-8")
     (recording,) = read("a.csv", tmp_path, NAMED).recordings
@@ -72,9 +72,9 @@ def test_a_column_that_numbers_each_row_is_no_number_of_a_record(tmp_path):
 
 @pytest.mark.parametrize("start", [b"DIAEXTENDED\x00\x00", b'"a",\r\x01', b"\x1b", b"note\n\x00"])
 @pytest.mark.parametrize("name", ["a.csv", "a.dat"])
-def test_a_binary_file_with_the_name_of_a_text_is_no_text(tmp_path, caplog, start, name):
+def test_a_binary_file_with_the_extension_of_a_text_is_rejected(tmp_path, caplog, start, name):
     (tmp_path / name).write_bytes(start + np.random.default_rng(1).bytes(5000) + b'\n"x",\r,"\n')
     with caplog.at_level(logging.WARNING), pytest.raises(ReadError) as caught:
         read(name, tmp_path, NAMED)
     assert "is no text. Copy the file again from the logger; if the logger writes binary numbers" in str(caught.value)
-    assert not caplog.records  # a traceback is for those who ask for it
+    assert not caplog.records  # no traceback is logged by default

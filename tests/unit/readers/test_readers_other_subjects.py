@@ -1,4 +1,4 @@
-"""Every format x entries whose subject is not the recording x the true statements that they resemble.
+"""Every format with entries about something other than the recording, and with similar true statements.
 
 A frequency is the sampling rate, and a scale that of the samples, only if its words concern the record or its channels.
 The samples were taken at 25.6 kHz.
@@ -49,7 +49,7 @@ TRUE_SCALES = [
 
 
 def outcome(format, folder, *entries, rate=TRUE):
-    """(recording, errors) of a file with these entries, beside its rate where the format states none."""
+    """(recording, errors) of a file with these entries, and with its rate if the format states none."""
     write_file, name, states_rate = FORMATS[format]
     entries = [(plain(name) if format == "mat" else name, value) for name, value in entries]
     write_file(folder / name, entries if states_rate or rate else [("rate", TRUE), *entries])
@@ -61,14 +61,14 @@ def outcome(format, folder, *entries, rate=TRUE):
 
 
 def can_hold(format, *texts):
-    """Text of a Universal File is ASCII, and names of MATLAB are."""
+    """Whether the format can store the texts: texts of Universal Files and names of MATLAB are ASCII."""
     return format not in ("uff", "mat") or all(text.isascii() for text in texts)
 
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("rate", [TRUE, None])
-def test_a_frequency_of_something_else_is_no_rate(format, rate, tmp_path):
-    """Whether the layout states the rate or only the file."""
+def test_a_frequency_of_something_else_is_not_read_as_the_rate(format, rate, tmp_path):
+    """The layout states the rate, or only the file states it."""
     for name in FREQUENCIES:
         if can_hold(format, name) and len(name) < MAX_NAME:
             recording, errors = outcome(format, tmp_path, (name, "12 kHz"), rate=rate)
@@ -89,7 +89,7 @@ def test_a_frequency_of_the_recording_that_is_not_its_rate_is_reported(format, t
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_the_scale_of_a_drawing_and_what_is_switched_off_change_no_sample(format, tmp_path):
+def test_the_scale_of_a_drawing_and_disabled_settings_change_no_sample(format, tmp_path):
     for name, value in NO_SCALES:
         if can_hold(format, name):
             recording, errors = outcome(format, tmp_path, (name, value))
@@ -98,14 +98,14 @@ def test_the_scale_of_a_drawing_and_what_is_switched_off_change_no_sample(format
 
 
 @pytest.mark.parametrize("format", sorted(set(FORMATS) - {"uff"}))
-def test_a_scale_of_the_samples_beside_such_words_is_rejected_by_name(format, tmp_path):
+def test_a_scale_of_the_samples_with_such_words_is_rejected(format, tmp_path):
     """A Universal File has free text only, in which a word without its number is no entry."""
     for name, value in TRUE_SCALES:
         recording, errors = outcome(format, tmp_path, (name, value))
         assert recording is None and errors[0].reason == "scale_unknown", (name, value)
 
 
-def test_a_ratio_that_stands_at_a_channel_is_no_scale_of_a_drawing(tmp_path):
+def test_a_ratio_of_a_channel_is_not_read_as_the_scale_of_a_drawing(tmp_path):
     recording, errors = outcome("hdf5", tmp_path, ("operator", "mj"), ("Scale", "1:500"))  # of the force's dataset
     assert recording is None and errors[0].reason == "scale_unknown" and "1:500" in errors[0].problem
     channels = [nptdms.ChannelObject("impact", n, x, {"Scale": "1:500"}) for n, x in zip(UNITS, SAMPLES)]
@@ -116,7 +116,7 @@ def test_a_ratio_that_stands_at_a_channel_is_no_scale_of_a_drawing(tmp_path):
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_a_scale_of_the_samples_is_found_behind_one_of_a_map(format, tmp_path):
+def test_a_scale_of_the_samples_is_found_behind_the_scale_of_a_map(format, tmp_path):
     recording, errors = outcome(format, tmp_path, ("Scale", "1:500 map"), ("gain", 10))
     assert recording is None and errors[0].reason == "scale_unknown" and "10" in errors[0].problem
 
@@ -128,7 +128,7 @@ def test_a_name_without_a_word_of_frequency_keeps_its_meaning():
 
 
 @pytest.mark.parametrize("text", [" " * 9000, " " * 4500 + ":" + " " * 4499, "a" + " " * 8995 + "1:1x9", "a: " * 3000])
-def test_a_comment_of_many_blanks_is_searched_quickly(text):
+def test_a_comment_with_many_blanks_is_searched_fast(text):
     """A search that tries every division of the blanks takes minutes."""
     with ended_after(60.0):
         assert len(list(entries_of_text(text, "comment"))) <= 1
@@ -141,7 +141,7 @@ COMMENTS = (
 
 
 @pytest.mark.parametrize("comment", COMMENTS)
-def test_a_number_of_channels_in_the_comment_of_a_wav_file_is_no_name(comment, tmp_path):
+def test_a_number_of_channels_in_the_comment_of_a_wav_file_is_not_read_as_a_name(comment, tmp_path):
     for n in (1, 2):
         with soundfile.SoundFile(tmp_path / "a.wav", "w", int(TRUE), n, "DOUBLE") as file:
             file.comment = comment.replace("2", "1") if n == 1 and "Channels" in comment else comment
@@ -153,7 +153,7 @@ def test_a_number_of_channels_in_the_comment_of_a_wav_file_is_no_name(comment, t
 
 
 @pytest.mark.parametrize("count", [2, 2.0, np.int32(2), "2"])
-def test_a_number_of_channels_beside_a_matrix_is_no_name(count, tmp_path):
+def test_a_number_of_channels_beside_a_matrix_is_not_read_as_a_name(count, tmp_path):
     np.savez(tmp_path / "a.npz", data=SAMPLES, channels=np.array(count), fs=TRUE)
     sensors = tuple(replace(s, source=i) for i, s in enumerate(SENSORS))
     result = read("a.npz", tmp_path, RawDescription(sensors))

@@ -1,4 +1,4 @@
-"""An overload that the logger noted in the file is reported, whatever the samples look like."""
+"""An overload that the logger recorded in the file is reported, whatever the samples are."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_an_overload_that_the_file_states_is_reported(name, value, tmp_path):
     ("name", "value"),
     [("Overload", False), ("Overload", 0), ("Overload", "no"), ("overload_level", 10.0), ("clipping_detection", True)],
 )
-def test_no_overload_is_reported_where_the_file_states_none(name, value, tmp_path):
+def test_no_overload_is_reported_if_the_file_states_none(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
 
 
@@ -85,11 +85,11 @@ def test_an_overload_of_a_channel_and_one_in_a_value_are_reported(name, value, t
         ("Comment", "the sensor that showed an overload last year was replaced"),
     ],
 )
-def test_a_text_that_denies_an_overload_or_is_about_another_one_is_no_statement(name, value, tmp_path):
+def test_a_text_that_denies_an_overload_or_concerns_something_else_is_not_reported(name, value, tmp_path):
     assert not remarks(tmp_path, name, value)
 
 
-def test_a_number_or_no_value_is_none_of_a_channel_with_that_name():
+def test_a_number_or_a_missing_value_is_not_read_as_the_name_of_a_channel():
     for value, names in (("0", ("0", "1")), ("0;0", ("0", "1")), ("n/a", ("n", "a"))):
         assert not list(overload_entries([Entry("head", "Overload", value)], names))
 

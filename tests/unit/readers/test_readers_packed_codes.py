@@ -1,4 +1,4 @@
-"""A usual code for a missing sample is one in packed numbers, too: unpacked, it looks like a measured value."""
+"""Usual codes for missing samples are found in packed numbers, although they look like measured values."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def test_packed_numbers_without_a_code_are_read(tmp_path):
 
 @pytest.mark.parametrize("shape", ["vector", "columns", "rows"])
 @pytest.mark.parametrize("is_in_file", [False, True])
-def test_a_code_is_found_in_each_shape_and_in_a_record_that_stays_in_the_file(shape, is_in_file, tmp_path):
+def test_a_code_is_found_in_each_shape_and_in_a_record_that_is_read_in_parts(shape, is_in_file, tmp_path):
     n = 300_000
     rng = np.random.default_rng(1)
     rail, other = np.round(rng.normal(0.0, 100.0, (2, n))).astype("i2")
@@ -69,7 +69,7 @@ def test_a_code_is_found_in_each_shape_and_in_a_record_that_stays_in_the_file(sh
 
 
 @pytest.mark.parametrize("shape", [(2, 400), (400, 2), (1, 400), (400,)])
-def test_the_unit_of_a_matrix_is_that_of_its_channels(shape, tmp_path):
+def test_the_unit_of_a_matrix_is_used_for_its_channels(shape, tmp_path):
     names = ["rail", "other"]
     samples = np.random.default_rng(1).normal(size=(2, 400))
     with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -98,7 +98,7 @@ def test_the_unit_of_a_matrix_is_that_of_its_channels(shape, tmp_path):
         ("i2", {"valid_range": [-750.0, 750.0]}),  # floating-point numbers beside whole ones are unpacked ones
     ],
 )
-def test_a_sample_outside_the_valid_range_is_missing(type, facts, is_in_file, tmp_path):
+def test_a_sample_outside_the_valid_range_is_reported_as_missing(type, facts, is_in_file, tmp_path):
     factor = 0.5 if type == "i2" else 1.0
     numbers = np.resize(SMOOTH, 80_000).astype(type)
     for is_outside in (False, True):

@@ -1,6 +1,6 @@
-"""Every format x every way to state rate, step, time axis or start time x right, wrong, missing, contradictory.
+"""Every format with every way to state rate, step, time axis or start time: right, wrong, missing, contradictory.
 
-The true rate is 25600 Hz. Each file is read at the true rate or rejected by name; nothing is misread without a message.
+The true rate is 25600 Hz. Each file is read at the true rate or rejected; nothing is misread without a message.
 """
 
 import json
@@ -227,7 +227,7 @@ def is_rejected(found, *words):
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_way_to_state_the_rate_is_understood_in_every_format(format, tmp_path):
-    """Seven combinations for each way; the message on a contradiction names both rates."""
+    """Seven combinations for each way; the message about a contradiction states both rates."""
     write_file, name, states_rate = FORMATS[format]
     path, failures = tmp_path / name, []
     for i, (way, value_at) in enumerate(WAYS.items()):
@@ -253,7 +253,7 @@ def test_every_way_to_state_the_rate_is_understood_in_every_format(format, tmp_p
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_without_a_statement_the_layout_tells_the_rate(format, tmp_path):
+def test_without_a_statement_the_rate_of_the_layout_is_used(format, tmp_path):
     write_file, name, states_rate = FORMATS[format]
     write_file(tmp_path / name, [])
     assert is_true(outcome(tmp_path / name, described(TRUE)))
@@ -270,7 +270,7 @@ AXES = {
 
 
 @pytest.mark.parametrize("format", ["csv", "tdms", "parquet", "hdf5", "npz"])
-def test_a_time_axis_is_compared_under_any_name_also_if_the_layout_ignores_it(format, tmp_path):
+def test_a_time_axis_under_any_name_is_compared_even_if_the_layout_ignores_it(format, tmp_path):
     """Right, wrong layout, contradictory entry, a gap of eight samples."""
     write_file, name, _ = FORMATS[format]
     path, failures = tmp_path / name, []
@@ -291,7 +291,7 @@ def test_a_time_axis_is_compared_under_any_name_also_if_the_layout_ignores_it(fo
     assert failures == []
 
 
-def test_an_index_of_pandas_is_a_time_axis(tmp_path):
+def test_an_index_of_pandas_is_read_as_a_time_axis(tmp_path):
     """Unnamed and named, of dates, durations and numbers; a gap is found."""
     steps = np.arange(N_SAMPLE) / TRUE
     dates = pd.Timestamp("2026-05-13T08:30:12Z") + pd.to_timedelta(np.round(steps * 1e9).astype("int64"), unit="ns")
@@ -329,13 +329,13 @@ def test_a_printed_step_is_known_to_half_a_unit_of_its_last_digit(text, tmp_path
     write([recording()], tmp_path / "a.uff", "uff58")
     content = (tmp_path / "a.uff").read_text()
     (tmp_path / "a.uff").write_text(content.replace(f"{1 / TRUE:13.5e}", f"{text:>13}"))
-    for promised, expected in STEPS[text].items():
-        rate, error = outcome(tmp_path / "a.uff", described(promised))
-        assert rate == expected and (error is None) == (expected is not None), promised
+    for layout_rate, expected in STEPS[text].items():
+        rate, error = outcome(tmp_path / "a.uff", described(layout_rate))
+        assert rate == expected and (error is None) == (expected is not None), layout_rate
 
 
 def test_the_x_column_of_lvm_is_more_precise_than_a_step_with_six_decimals(tmp_path):
-    """51.2 kHz, Delta_X printed as 0.000020: the X column tells the rate, and contradicts another one."""
+    """51.2 kHz with Delta_X printed as 0.000020: the X column gives the rate."""
     head = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\t\n\t\n"
     for true in (51200.0, 44000.0):
         repeated = np.tile(SAMPLES, 20)
@@ -345,12 +345,12 @@ def test_the_x_column_of_lvm_is_more_precise_than_a_step_with_six_decimals(tmp_p
         )
         segment += "X0\t0.0\t0.0\nDelta_X\t0.000020\t0.000020\n***End_of_Header***\t\t\nX_Value\tforce\trail\tComment\n"
         (tmp_path / "a.lvm").write_text(head + segment + rows + "\n", encoding="utf-8")
-        for promised in (true, None, 25600.0, 50000.0):
-            rate, error = outcome(tmp_path / "a.lvm", described(promised))
-            if true == 51200.0 and promised in (true, None):
+        for layout_rate in (true, None, 25600.0, 50000.0):
+            rate, error = outcome(tmp_path / "a.lvm", described(layout_rate))
+            if true == 51200.0 and layout_rate in (true, None):
                 assert rate == pytest.approx(true, rel=1e-4) and error is None, error
             else:
-                assert rate is None and error.reason == "wrong_rate", (true, promised)
+                assert rate is None and error.reason == "wrong_rate", (true, layout_rate)
 
 
 STARTS = {
@@ -366,8 +366,8 @@ STARTS = {
 
 @pytest.mark.parametrize("start", STARTS)
 @pytest.mark.parametrize("format", [f for f in FORMATS if f != "rcmdx"])
-def test_a_start_time_that_tells_no_moment_is_reported_in_every_format(format, start, tmp_path):
-    """The record stays; a time stamp in RCM-DX is a number since 1970 in UTC."""
+def test_an_impossible_or_ambiguous_start_time_is_reported_in_every_format(format, start, tmp_path):
+    """The record is kept; a time stamp of RCM-DX is a number since 1970 in UTC."""
     write_file, name, _ = FORMATS[format]
     write_file(tmp_path / name, [("rate", TRUE)], start=start)
     description = replace(described(TRUE), time_zone="Europe/Copenhagen")
@@ -385,14 +385,14 @@ def test_a_start_time_that_tells_no_moment_is_reported_in_every_format(format, s
 @pytest.mark.parametrize("name", ["Filter rate", "calibration period", "Number of averages", "trigger frequency",
                                   "Low pass [Hz]", "Baud rate", "max. sampling rate", "FFT interval"])  # fmt: skip
 @pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz"])
-def test_other_rates_and_periods_of_a_logger_state_nothing(format, name, tmp_path):
+def test_other_rates_and_periods_of_a_logger_are_not_read_as_the_rate(format, name, tmp_path):
     write_file, file_name, _ = FORMATS[format]
     write_file(tmp_path / file_name, [(name, 4000.0)])
     assert is_true(outcome(tmp_path / file_name, described(TRUE)))
 
 
-def test_a_column_with_a_unit_of_the_layout_is_no_time_axis(tmp_path):
-    """A distance that rises evenly, as an odometer at constant speed."""
+def test_a_column_with_a_unit_in_the_layout_is_not_read_as_a_time_axis(tmp_path):
+    """A distance that increases evenly, like that of an odometer at constant speed."""
     write_csv(tmp_path / "a.csv", [("rate", TRUE)], {"odometer": np.arange(N_SAMPLE) * 0.0137})
     assert is_rejected(outcome(tmp_path / "a.csv", described(TRUE, "odometer")), "may be a time axis", "unit")
     distance = RawChannel("odometer", "odometer", "ignored", unit="m")
@@ -407,8 +407,8 @@ HEADS = {
 
 
 @pytest.mark.parametrize("head", HEADS)
-def test_a_head_in_other_forms_is_compared_with_the_layout(head, tmp_path):
-    """A number that may have several units tells the rate only beside a layout."""
+def test_a_header_in_other_forms_is_compared_with_the_layout(head, tmp_path):
+    """A number that may have several units gives the rate only together with a layout."""
     rows = "\n".join(";".join(f"{x:.12g}" for x in row) for row in SAMPLES.T)
     (tmp_path / "a.csv").write_text(f"{head}\nforce [N];rail [m/s²]\n{rows}\n", encoding="utf-8")
     assert is_true(outcome(tmp_path / "a.csv", described(TRUE)))
@@ -417,7 +417,7 @@ def test_a_head_in_other_forms_is_compared_with_the_layout(head, tmp_path):
     assert is_true(found) if HEADS[head] else is_true(found) or is_rejected(found)
 
 
-def test_a_channel_of_time_stamps_in_tdms_is_a_time_axis(tmp_path):
+def test_a_channel_of_time_stamps_in_tdms_is_read_as_a_time_axis(tmp_path):
     stamps = np.datetime64("2026-05-13T08:30:12") + np.round(np.arange(N_SAMPLE) / TRUE * 1e6).astype("timedelta64[us]")
     write_tdms(tmp_path / "a.tdms", [], {"moment": stamps})
     assert is_true(outcome(tmp_path / "a.tdms", described(TRUE, "moment")))
@@ -436,7 +436,7 @@ STEP_NAMES = (
 
 
 @pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz", "parquet", "mat"])
-def test_what_may_be_a_rate_or_a_step_is_compared_with_the_layout(format, tmp_path):
+def test_entries_that_may_be_a_rate_or_a_step_are_compared_with_the_layout(format, tmp_path):
     write_file, name, _ = FORMATS[format]
     failures = []
     ways = [(n, TRUE) for n in RATE_NAMES] + [(f"{n} [µs]", 1e6 / TRUE) for n in STEP_NAMES if n != "T_s"]
@@ -460,14 +460,14 @@ DURATIONS = (
 
 
 @pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz"])
-def test_other_durations_of_a_logger_state_nothing(format, tmp_path):
+def test_other_durations_of_a_logger_are_not_read_as_the_step(format, tmp_path):
     write_file, name, _ = FORMATS[format]
     for way in DURATIONS:
         write_file(tmp_path / name, [(way, 1715587200.0 if way == "ts" else 1.5)])
         assert is_true(outcome(tmp_path / name, described(TRUE))), way
 
 
-def test_a_time_in_an_unknown_unit_tells_no_implausible_rate(tmp_path):
+def test_a_time_in_an_unknown_unit_gives_no_implausible_rate(tmp_path):
     write_csv(tmp_path / "a.csv", [], {"Zeit": np.arange(N_SAMPLE) * 1e6 / TRUE})
     assert is_true(outcome(tmp_path / "a.csv", described(TRUE)))
     assert is_rejected(outcome(tmp_path / "a.csv", described(None)), "may mean")
@@ -497,7 +497,7 @@ OTHER_TIMES = ("Calibration date", "End time", "Exported on", "Letzte Wartung", 
 
 @pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "npz", "parquet", "mat"])
 def test_a_start_time_under_any_name_is_read_or_reported(format, tmp_path):
-    """That of another event is none; one of no calendar, and two that differ, are reported."""
+    """The time of another event is not used; impossible dates and two different starts are reported."""
     write_file, name, _ = FORMATS[format]
     expected = datetime(2026, 5, 13, 10)
     for entry in (*START_ENTRIES, *OTHER_TIMES):
@@ -515,7 +515,7 @@ def test_a_start_time_under_any_name_is_read_or_reported(format, tmp_path):
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("name", ["Decimation", "Downsampling factor", "Unterabtastung", "Facteur de décimation"])
 def test_a_reduction_beside_a_rate_is_applied_or_reported(format, name, tmp_path):
-    """The file states twice the true rate and a reduction by two; a format that states the true rate decides."""
+    """The file states twice the true rate and a reduction by two; a true rate in the format is used."""
     write_file, file_name, states_rate = FORMATS[format]
     if format == "uff" and not name.isascii():
         pytest.skip("the text is in ASCII")
@@ -533,7 +533,7 @@ def test_a_reduction_beside_a_rate_is_applied_or_reported(format, name, tmp_path
     assert is_true(outcome(path, described(None)))
 
 
-def test_a_reduced_rate_beside_the_one_before_decides(tmp_path):
+def test_a_stated_reduced_rate_is_used(tmp_path):
     for entries in ([("Sample rate", 2 * TRUE), ("Decimated rate", "25600 Hz")], [("Rate", TRUE), ("dt", 1 / TRUE)]):
         write_csv(tmp_path / "a.csv", [*entries, ("Decimation", 2)])
         assert is_true(outcome(tmp_path / "a.csv", described(TRUE))) == (len(entries[0][0]) > 4)
@@ -542,8 +542,8 @@ def test_a_reduced_rate_beside_the_one_before_decides(tmp_path):
 
 
 @pytest.mark.parametrize("format", ["mat", "npz"])
-def test_a_variable_that_is_called_t_in_upper_case_is_a_channel_or_an_axis(format, tmp_path):
-    """It vanished: "t" is the time and "T" a temperature, so it was neither samples nor metadata."""
+def test_a_variable_with_the_name_t_in_upper_case_is_read_as_a_channel_or_an_axis(format, tmp_path):
+    """Formerly, it was lost: "t" is the time and "T" a temperature."""
     n = 500
     samples = {s.source: np.random.default_rng(i).normal(size=n) for i, s in enumerate(SENSORS)}
     for values, is_right in (
@@ -562,8 +562,8 @@ def test_a_variable_that_is_called_t_in_upper_case_is_a_channel_or_an_axis(forma
 
 
 @pytest.mark.parametrize("text", ["50 m", "0.05m", "20q", "25k6", "20 kk"])
-def test_a_letter_that_is_no_prefix_of_the_unit_is_not_understood(text, tmp_path):
-    """A step of 0.05 m is one along the track."""
+def test_a_letter_that_is_no_prefix_of_the_unit_is_an_error(text, tmp_path):
+    """A step of 0.05 m is a distance along the track."""
     write_npz(tmp_path / "a.npz", [("sampling interval", text)])
     result = read("a.npz", tmp_path, described(TRUE))
     assert [error.reason for error in result.errors] == ["wrong_rate"] and "not understood" in str(result.errors[0])

@@ -1,4 +1,4 @@
-"""RCM-DX by its specification 2.0.2: what is written has its groups and types, what others write is read."""
+"""RCM-DX by its specification 2.0.2: written files have its groups and types; files of other programs are read."""
 
 import h5py
 import numpy as np
@@ -82,7 +82,7 @@ def test_a_file_of_a_later_release_is_read(tmp_path):
     assert f"{recording.started_at:%Y-%m-%d %H:%M:%S.%f}" == "2024-05-13 10:00:01.250000"
 
 
-def test_unsigned_time_stamps_that_run_backwards_are_said(tmp_path):
+def test_unsigned_time_stamps_that_run_backwards_are_an_error(tmp_path):
     stamps = START + 1_000_000 * np.arange(50)
     stamps[30:] -= 40_000_000
     file_of_others(tmp_path / "a.rcmdx", stamps)

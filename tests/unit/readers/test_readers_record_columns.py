@@ -1,4 +1,4 @@
-"""Records that a file numbers, in a column, a group or a set: their names, and numbers that are missing."""
+"""Records that a file numbers in a column, a group or a set: names of the numbers, and missing numbers."""
 
 import h5py
 import nptdms
@@ -43,7 +43,7 @@ def test_a_missing_number_is_reported_and_the_other_impacts_are_read(format, nam
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
 @pytest.mark.parametrize("numbers", [(0, 1, 2), (4, 5, 6), (10, 20, 30), (1, 3, 5, 7), (3, 2, 1), (101, 214, 388)])
-def test_numbers_of_another_counter_are_no_missing_records(format, numbers, tmp_path):
+def test_numbers_of_another_counter_are_not_reported_as_missing_records(format, numbers, tmp_path):
     assert outcome(tmp_path, format, "record", numbers) == ([N] * len(numbers), [])
 
 
@@ -52,7 +52,7 @@ def test_numbers_of_another_counter_are_no_missing_records(format, numbers, tmp_
     "name, numbers, n_record", [("record", (1, 2, 1, 2), 4), ("record", (3, 2, 1), 3), ("hit", (2, 1), 0)]
 )
 def test_numbers_that_fall_keep_all_records_in_the_order_of_the_file(kind, name, numbers, n_record, tmp_path):
-    """Also numbers without a sign, whose step from 2 to 1 is 255."""
+    """Also for unsigned numbers, whose step from 2 to 1 is 255."""
     number = np.repeat(numbers, N).astype(kind)
     samples = np.arange(2.0 * len(number)).reshape(2, -1)
     pq.write_table(pa.table({"force": samples[0], "rail": samples[1], name: number}), tmp_path / "a.parquet")
@@ -73,20 +73,20 @@ def test_numbers_that_fall_keep_all_records_in_the_order_of_the_file(kind, name,
         ((0.5, 1.5), (9, 9)),
     ],
 )
-def test_a_flag_of_the_contact_does_not_cut_a_record(format, numbers, lengths, tmp_path):
+def test_a_flag_of_the_contact_does_not_divide_a_record(format, numbers, lengths, tmp_path):
     assert outcome(tmp_path, format, "hit", numbers, lengths) == ([], [("record 1 of 1", "channel_unknown")])
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
 @pytest.mark.parametrize("name", ["Impact No", "hit_nr", "Record #"])
-def test_the_number_of_a_single_impact_is_no_channel(format, name, tmp_path):
-    """The channels of a layout that counts them are the same in files of one impact and of several."""
+def test_the_number_of_a_single_impact_is_not_read_as_a_channel(format, name, tmp_path):
+    """Channel numbers of a layout are then equal for files of one impact and of several impacts."""
     assert outcome(tmp_path, format, name, (7,)) == ([N], [])
 
 
 @pytest.mark.parametrize("first", ["time", "Impact No"])
 def test_a_layout_that_counts_a_column_that_is_no_channel_is_an_error(first, tmp_path):
-    """Before, the last channel was ignored and missing, and each other one had the samples of its neighbour."""
+    """Formerly, the last channel was missing; each other channel had the samples of its neighbour."""
     numbers = np.repeat([1, 2], N) if first == "Impact No" else np.arange(2 * N) / 2e4
     rows = "".join(f"{number:g};{k % 7};{k % 5};{k % 3}\n" for k, number in enumerate(numbers))
     (tmp_path / "a.csv").write_text(f"{first};force;rail;web\n{rows}")
@@ -100,7 +100,7 @@ def test_a_layout_that_counts_a_column_that_is_no_channel_is_an_error(first, tmp
 
 
 def test_records_that_texts_number_are_an_error_in_parquet(tmp_path):
-    """Else two records would be one, with a jump in the middle."""
+    """Otherwise two records would be read as one with a jump."""
     table = pa.table({"force": np.arange(60.0), "rail": np.arange(60.0), "Record": ["1"] * 30 + ["2"] * 30})
     pq.write_table(table, tmp_path / "a.parquet")
     with pytest.raises(ReadError, match=r"column 'Record': it holds text or objects, such as '1'"):
@@ -140,7 +140,7 @@ def write_groups(path, format, numbers):
         ((1, 2, 8), []),
     ],
 )
-def test_the_same_rule_holds_for_groups_and_sets(format, numbers, lost, tmp_path):
+def test_missing_numbers_of_groups_and_sets_are_reported_in_the_same_way(format, numbers, lost, tmp_path):
     write_groups(tmp_path / f"a.{format}", format, numbers)
     result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=2e4))
     assert len(result.recordings) == len(numbers)

@@ -1,4 +1,4 @@
-"""A channel of a lower rate whose samples are repeated up to that of the file is no channel of that rate."""
+"""Samples of a channel of a lower rate that are repeated up to the rate of the file are an error."""
 
 import numpy as np
 import pytest
@@ -31,20 +31,20 @@ def test_a_channel_with_repeated_samples_is_left_out_of_a_passage(tmp_path, hold
     assert reasons(tmp_path, rail, kind="hammer") == ([], [("wrong_rate", "'rail'")])
 
 
-def test_a_force_with_repeated_samples_costs_the_record(tmp_path):
+def test_a_force_with_repeated_samples_is_an_error_of_the_record(tmp_path):
     force = np.repeat(RNG.normal(size=3000), 2)
     np.savez(tmp_path / "a.npz", force=force, rail=RNG.normal(size=6000), rate=1000.0)
     result = read("a.npz", tmp_path, RawDescription(CHANNELS[:2], rate=1000.0, kind="hammer"))
     assert not result.recordings and [error.reason for error in result.errors] == ["wrong_rate"]
 
 
-def test_repeated_samples_are_found_in_a_long_record_that_stays_in_the_file(tmp_path):
+def test_repeated_samples_are_found_in_a_record_that_is_read_in_parts(tmp_path):
     n = BLOCK_SIZE + 5000
     rail = np.repeat(RNG.normal(size=n // 4 + 1), 4)[:n]
     assert reasons(tmp_path, rail, n, max_duration=1.0, max_whole_file_size=0)[1] == [("wrong_rate", "'rail'")]
 
 
-def test_coarse_numbers_and_a_quiet_channel_are_no_repeated_samples(tmp_path):
+def test_coarse_numbers_and_a_quiet_channel_are_not_reported_as_repeated_samples(tmp_path):
     x = RNG.normal(size=6000)
     x[:4500] = np.repeat(x[:1500], 3)  # then at the rate of the file
     quiet = np.zeros(6000)

@@ -1,4 +1,4 @@
-"""Samples that a file holds twice are measured once: blocks of a record, and channels of records recorded at once."""
+"""Samples that a file contains twice were measured once: blocks of a record, and channels of simultaneous records."""
 
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -29,8 +29,8 @@ def with_copy(samples, start, at, n):
     return np.hstack([samples[:, :at], samples[:, start : start + n], samples[:, at:]])
 
 
-def written(path, samples):
-    """A file of force and rail in the format that the name of the path tells."""
+def write_samples(path, samples):
+    """Write force and rail in the format of the extension; return the name."""
     if path.suffix == ".csv":
         np.savetxt(path, samples.T, fmt="%.2f", delimiter=";", header="force [N];rail [m/s²]", comments="")
     elif path.suffix == ".npz":
@@ -45,8 +45,8 @@ def written(path, samples):
 @pytest.mark.parametrize("name", ["a.csv", "a.npz", "a.tdms"])
 @pytest.mark.parametrize("start, at, n", [(0, 4000, 4000), (0, 4000, 1000), (700, 2100, 128), (1000, 1300, 300)])
 @pytest.mark.parametrize("description", [HAMMER, RawDescription((FORCE, RAIL), "passage", rate=RATE)])
-def test_a_block_of_samples_that_is_there_twice_costs_the_record(tmp_path, name, start, at, n, description):
-    result = read(written(tmp_path / name, with_copy(noise(4000), start, at, n)), tmp_path, description)
+def test_a_repeated_block_of_samples_is_an_error_of_the_record(tmp_path, name, start, at, n, description):
+    result = read(write_samples(tmp_path / name, with_copy(noise(4000), start, at, n)), tmp_path, description)
     (error,) = result.errors
     assert not result.recordings and error.reason == "duplicate"
     assert f"its samples {at} to {at + n - 1} repeat the samples {start} to {start + n - 1}" in str(error)
@@ -63,7 +63,7 @@ def test_every_block_from_128_samples_on_is_found():
         assert block is not None and block[1] - block[0] == at - start and block[2] >= 128
 
 
-def test_coarse_noise_tones_pulses_and_silence_repeat_no_block():
+def test_noise_tones_pulses_and_silence_are_not_reported_as_repeated_blocks():
     t = np.arange(20000) / RATE
     pulses = np.zeros((2, 20000))
     pulses[:, 1000::2000] = 5.0
@@ -85,7 +85,7 @@ def with_groups(path, groups, starts=()):
 
 
 @pytest.mark.parametrize("names", [("left", "right"), ("links", "rechts"), ("rail_1", "rail_2"), ("A7", "A8")])
-def test_records_with_the_same_force_and_other_responses_were_recorded_at_once(tmp_path, names):
+def test_simultaneous_records_with_the_same_force_are_an_error(tmp_path, names):
     force, *rails = noise(2000, n_channel=3)
     groups = {name: {"force": force, "rail": rail} for name, rail in zip(names, rails)}
     result = read(with_groups(tmp_path / "a.h5", groups), tmp_path, HAMMER)
@@ -95,7 +95,7 @@ def test_records_with_the_same_force_and_other_responses_were_recorded_at_once(t
     assert [e.reason for e in errors_without_layout(raw, source)] == ["duplicate"] * 2
 
 
-def test_other_records_of_the_file_stay(tmp_path):
+def test_other_records_of_the_file_are_kept(tmp_path):
     force, *rails = noise(2000, n_channel=3)
     groups = {f"hit_{k}": dict(zip(("force", "rail"), noise(2000, 5 + k))) for k in (1, 2)}
     groups |= {f"hit_{3 + k}": {"force": force, "rail": rail} for k, rail in enumerate(rails)}
@@ -103,8 +103,8 @@ def test_other_records_of_the_file_stay(tmp_path):
     assert [r.record for r in result.recordings] == [0, 1] and len(result.errors) == 2
 
 
-def test_a_record_that_repeats_another_counts_once(tmp_path):
-    """The hammer test rejects the impact itself, and names the earlier one."""
+def test_a_record_that_repeats_another_is_used_once(tmp_path):
+    """The hammer test rejects the impact and states the earlier one."""
     samples = dict(zip(("force", "rail"), noise(2000)))
     path = with_groups(tmp_path / "a.h5", {"hit_1": samples, "hit_2": samples}, (NOON, NOON + timedelta(seconds=60)))
     assert not read(path, tmp_path, HAMMER).errors
@@ -122,7 +122,7 @@ PULSE[100:110] = 1000.0 * np.hanning(10)
 
 
 @pytest.mark.parametrize("force", [PULSE, *(np.cos(np.arange(2000) / x) for x in (2.0, 3.0, 7.0, 50.0))])
-def test_the_same_pulse_or_tone_without_noise_is_no_shared_force(tmp_path, force):
+def test_equal_pulses_or_tones_without_noise_are_accepted(tmp_path, force):
     groups = {f"hit_{k}": {"force": force, "rail": noise(2000, k)[0]} for k in (1, 2)}
     assert not read(with_groups(tmp_path / "a.h5", groups), tmp_path, HAMMER).errors
 
@@ -136,7 +136,7 @@ def test_the_same_pulse_or_tone_without_noise_is_no_shared_force(tmp_path, force
         ((NOON, NOON + timedelta(seconds=0.9)), 2),
     ],
 )
-def test_records_of_trains_follow_each_other_by_their_starts(tmp_path, starts, n_record):
+def test_records_of_trains_must_not_overlap_by_their_starts(tmp_path, starts, n_record):
     groups = {name: {"rail": noise(2000, k)[0]} for k, name in enumerate(("left", "right"))}
     result = read(with_groups(tmp_path / "a.h5", groups, starts), tmp_path, TRAIN)
     assert len(result.recordings) == n_record

@@ -1,4 +1,4 @@
-"""What is written is read again, in every format, as physical numbers and as volts."""
+"""Written recordings are read again in every format, as physical values and as volts."""
 
 from dataclasses import replace
 from hashlib import sha256
@@ -12,19 +12,19 @@ from turnout.simulate.parameters import load_vehicle
 
 # Numbers that go through text with fewer digits than a double has: UFF58's E20.12 keeps 13.
 PRINTED = {"uff58": 1e-12}
-# The second of UFF's ID line 3 is a whole one.
+# The seconds in ID line 3 of UFF are whole numbers.
 WHOLE_SECONDS = {"uff58", "uff58b"}
 
 
 def as_written(format, recordings, description):
-    """A WAV file holds one record."""
+    """The recordings that the format can contain: a WAV file contains only one record."""
     if format != "wav":
         return recordings, description
     return recordings[:1], replace(description, n_records=description.n_records and 1)
 
 
 @pytest.mark.parametrize("format", WRITERS)
-def test_si_comes_back_bit_for_bit(format, hammer_test, in_si, name_of, tmp_path):
+def test_si_values_are_read_exactly_as_written(format, hammer_test, in_si, name_of, tmp_path):
     recordings, description = as_written(format, hammer_test, in_si)
     path = write(recordings, tmp_path / name_of(format), format)
     result = read(path.name, tmp_path, description)
@@ -42,7 +42,7 @@ def test_si_comes_back_bit_for_bit(format, hammer_test, in_si, name_of, tmp_path
 
 
 @pytest.mark.parametrize("format", WRITERS)
-def test_volts_come_back_with_sensitivity_sign_and_order(format, hammer_test, in_volts, name_of, tmp_path):
+def test_volts_are_read_with_sensitivity_sign_and_order(format, hammer_test, in_volts, name_of, tmp_path):
     recordings, description = as_written(format, hammer_test, in_volts)
     path = write(recordings, tmp_path / name_of(format), format, description)
     result = read(path.name, tmp_path, description)
@@ -65,7 +65,7 @@ def test_single_precision_keeps_every_bit_of_a_float32(format, hammer_test, in_s
 
 
 @pytest.mark.parametrize("format", [f for f in WRITERS if f != "csv"])
-def test_the_content_tells_the_format_where_the_extension_lies(format, hammer_test, in_si, tmp_path):
+def test_the_format_is_identified_by_content_if_the_extension_is_wrong(format, hammer_test, in_si, tmp_path):
     recordings, description = as_written(format, hammer_test, in_si)
     write(recordings, tmp_path / "A7_1.raw", format)
     got = read("A7_1.raw", tmp_path, description).recordings[0]
@@ -79,7 +79,7 @@ def test_a_decimal_comma_is_read(format, hammer_test, in_si, name_of, tmp_path):
     np.testing.assert_array_equal(read(path.name, tmp_path, in_si).recordings[3].samples, hammer_test[3].samples)
 
 
-def test_one_channel_and_one_record_are_no_special_case(hammer_test, in_si, name_of, tmp_path):
+def test_a_single_channel_of_a_single_record_is_read(hammer_test, in_si, name_of, tmp_path):
     alone = [replace(hammer_test[0], samples=hammer_test[0].samples[:1], channels=hammer_test[0].channels[:1])]
     for format in WRITERS:
         path = write(alone, tmp_path / name_of(format), format)
@@ -87,7 +87,7 @@ def test_one_channel_and_one_record_are_no_special_case(hammer_test, in_si, name
         np.testing.assert_allclose(got.samples, alone[0].samples, rtol=PRINTED.get(format, 0.0), err_msg=format)
 
 
-def test_a_24_bit_wav_is_a_part_of_full_scale(hammer_test, in_volts, tmp_path):
+def test_samples_of_a_24_bit_wav_are_fractions_of_full_scale(hammer_test, in_volts, tmp_path):
     """10 V full scale: one step is 10 V / 2^23, half of it the largest error."""
     description = replace(in_volts, n_records=1, channels=tuple(replace(c, unit="V") for c in in_volts.channels))
     path = write(hammer_test[:1], tmp_path / "p.wav", "wav", description, subtype="PCM_24", full_scale=10.0)
@@ -105,7 +105,7 @@ def test_a_wav_file_rejects_a_second_record(hammer_test, tmp_path):
         write(hammer_test, tmp_path / "a.wav", "wav")
 
 
-def test_the_writer_names_what_it_cannot_do(hammer_test, tmp_path):
+def test_the_writer_reports_unknown_formats_and_missing_recordings(hammer_test, tmp_path):
     with pytest.raises(ValueError, match="no writer for the format 'xls'; there are uff58, "):
         write(hammer_test, tmp_path / "a", "xls")
     with pytest.raises(ValueError, match="there is no recording to write"):
@@ -115,7 +115,7 @@ def test_the_writer_names_what_it_cannot_do(hammer_test, tmp_path):
 @pytest.mark.parametrize("n_units", [1, 3])
 @pytest.mark.parametrize("load", [0.5, 1.0])
 @pytest.mark.parametrize("format", WRITERS)
-def test_what_the_simulator_states_of_a_train_is_read_without_a_remark(
+def test_the_conditions_of_a_simulated_train_are_read_without_a_remark(
     format, load, n_units, hammer_test, in_si, name_of, tmp_path, repository
 ):
     vehicle = load_vehicle("ic3", load, repository / "config/vehicles", n_units)

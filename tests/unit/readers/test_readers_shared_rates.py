@@ -1,4 +1,4 @@
-"""Files of the shared inputs that state their rate or their start in a place or with digits that were misread."""
+"""Files of the shared inputs whose rate or start was misread because of its position or its number of digits."""
 
 import runpy
 import shutil
@@ -33,7 +33,7 @@ RATES = {
 
 @pytest.fixture
 def make(shared_recordings, tmp_path, monkeypatch):
-    """Function: name of an input -> folder with its files."""
+    """Function that creates the files of an input and returns their folder."""
 
     def run(name):
         shutil.copy(shared_recordings / "gen.py", tmp_path)
@@ -49,7 +49,7 @@ def make(shared_recordings, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", RATES)
-def test_files_are_read_at_their_rate_and_rejected_at_another_one(name, make):
+def test_files_are_read_at_their_rate_and_rejected_at_another_rate(name, make):
     folder = make(name)
     for stem, rate in RATES[name].items():
         (path,) = folder.glob(f"{stem}.*")

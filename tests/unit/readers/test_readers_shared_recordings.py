@@ -1,6 +1,6 @@
-"""Every recording by others that was readable stays readable: the same records, and nothing is rejected.
+"""Every recording of other authors remains readable with the same records and without a rejection.
 
-Rates and counts are those of ORIGIN.md and of the heads of the files. The quantities serve the reading only.
+ORIGIN.md and the headers of the files state the rates and counts. The quantities are only needed for reading.
 """
 
 import gzip
@@ -28,7 +28,7 @@ RECORDINGS = {
 }  # fmt: skip
 # File -> number of its frequency responses and of their lines.
 RESPONSES = {"uff58_reader_samples/beam.uff.gz": (3, 64_000)}
-# Files of the formats of recordings without any: tables of results, curves of programs, headers alone.
+# Files in formats of recordings that contain none: tables of results, curves of programs, only headers.
 WITHOUT_RECORDINGS = {
     "uff58_reader_samples": {"TestLab 161 164 18 15 82.uff", "dataset_milestone_in_header.uff", "non_ascii_header.uff"},
 }  # fmt: skip
@@ -37,7 +37,7 @@ EXTENSIONS = (".uff", ".gz", ".lvm", ".csv", ".tdms", ".h5", ".mat", ".npz", ".w
 
 
 def test_every_recording_of_the_folder_is_compared(shared_data):
-    """A further file must be added to a list above."""
+    """Each new file must be added to a list above."""
     files = {str(p.relative_to(shared_data)) for name in FOLDERS for p in (shared_data / name).iterdir()
              if p.suffix.lower() in EXTENSIONS}  # fmt: skip
     without = {f"{folder}/{name}" for folder, names in WITHOUT_RECORDINGS.items() for name in names}
@@ -46,8 +46,8 @@ def test_every_recording_of_the_folder_is_compared(shared_data):
 
 @pytest.mark.parametrize("path", RECORDINGS)
 @pytest.mark.parametrize("states_rate", [True, False])
-def test_a_recording_of_others_is_read_without_a_rejection(path, states_rate, shared_data):
-    """With the rate in the layout, and by the file alone where it states one."""
+def test_a_recording_of_other_authors_is_read_without_a_rejection(path, states_rate, shared_data):
+    """With the rate in the layout, and without it if the file states the rate."""
     rate, n_records, n_samples, channels = RECORDINGS[path]
     if not states_rate and path.endswith(".csv"):
         pytest.skip("the file states no rate")
@@ -61,14 +61,14 @@ def test_a_recording_of_others_is_read_without_a_rejection(path, states_rate, sh
 
 
 @pytest.mark.parametrize("path", RECORDINGS)
-def test_inspect_shows_a_recording_of_others_without_a_problem(path, shared_data):
+def test_inspect_shows_a_recording_of_other_authors_without_a_problem(path, shared_data):
     contents = file_contents(shared_data / path)
     n_records, n_samples = RECORDINGS[path][1:3]
     assert (contents.n_records, contents.n_samples, contents.problems) == (n_records, (n_samples, n_samples), ())
 
 
 @pytest.mark.parametrize("path", RESPONSES)
-def test_frequency_responses_of_others_are_read_without_a_problem(path, shared_data, tmp_path):
+def test_frequency_responses_of_other_authors_are_read_without_a_problem(path, shared_data, tmp_path):
     folder = (shared_data / path).parent
     (tmp_path / "a.uff").write_bytes(gzip.decompress((shared_data / path).read_bytes()))
     for root, name in ((folder, (shared_data / path).name), (tmp_path, "a.uff")):

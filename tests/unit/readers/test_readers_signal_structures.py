@@ -1,4 +1,4 @@
-"""Structures of a signal with an axis each for x and y, as Simcenter Testlab exports them; sparse matrices."""
+"""Structures of a signal with one axis each for x and y, as Simcenter Testlab exports them; sparse matrices."""
 
 import h5py
 import numpy as np
@@ -15,7 +15,7 @@ N_SAMPLE = 400
 
 
 def signals() -> dict[str, tuple[np.ndarray, str, float]]:
-    """Name -> (samples as they are in the file, their unit, SI per unit)."""
+    """Name -> (samples as stored in the file, their unit, SI value of one unit)."""
     rng = np.random.default_rng(1)
     return {
         "force": (rng.normal(size=N_SAMPLE), "kN", 1e3),
@@ -60,7 +60,7 @@ def test_the_step_and_the_units_of_the_axes_are_read(time_unit, per_second, star
     assert_right(tmp_path)
 
 
-def test_a_matrix_takes_the_names_of_its_function_record(tmp_path):
+def test_the_columns_of_a_matrix_have_the_names_of_its_function_record(tmp_path):
     samples = np.column_stack([s for s, _, _ in signals().values()])
     labels = np.array([unit for _, unit, _ in signals().values()], dtype=object)
     one = structure(samples[:, 0], labels)
@@ -70,7 +70,7 @@ def test_a_matrix_takes_the_names_of_its_function_record(tmp_path):
     assert_right(tmp_path)
 
 
-def test_a_structure_per_record_holds_the_structures_of_its_signals(tmp_path):
+def test_a_structure_per_record_contains_the_structures_of_its_signals(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {f"run_{k}": structures() for k in range(3)})
     assert_right(tmp_path, n_record=3)
 
@@ -84,7 +84,7 @@ def test_groups_of_hdf5_in_the_same_form_are_read(tmp_path):
     assert_right(tmp_path, "a.h5")
 
 
-def test_a_group_per_record_holds_a_group_per_channel(tmp_path):
+def test_a_group_per_record_contains_a_group_per_channel(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for k in range(3):
             for name, (samples, unit, _) in signals().items():
@@ -111,7 +111,7 @@ def test_an_axis_that_contradicts_the_samples_is_an_error(changes, reason, text,
     assert error.reason == reason and text in str(error)
 
 
-def test_signals_that_begin_apart_are_an_error(tmp_path):
+def test_signals_with_different_starts_are_an_error(tmp_path):
     variables = structures()
     variables["rail"]["x_values"]["start_value"] = 0.01
     scipy.io.savemat(tmp_path / "a.mat", variables)
@@ -120,7 +120,7 @@ def test_signals_that_begin_apart_are_an_error(tmp_path):
     assert raised.value.reason == "clock_drift"
 
 
-def test_a_factor_of_the_unit_that_may_be_applied_or_not_is_an_error(tmp_path):
+def test_a_factor_of_the_unit_that_may_not_have_been_applied_is_an_error(tmp_path):
     variables = structures()
     variables["rail"]["y_values"]["quantity"]["unit_transformation"]["factor"] = 9.81
     scipy.io.savemat(tmp_path / "a.mat", variables)
@@ -128,7 +128,7 @@ def test_a_factor_of_the_unit_that_may_be_applied_or_not_is_an_error(tmp_path):
     assert "channel 'rail'" in str(error) and "factor = 9.81" in str(error)
 
 
-def test_a_sparse_matrix_is_named_as_one(tmp_path):
+def test_a_sparse_matrix_is_an_error_that_states_its_type(tmp_path):
     force, rail = (samples for samples, _, _ in signals().values())
     channels = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
     sparse = scipy.sparse.csc_matrix(force[:, None])

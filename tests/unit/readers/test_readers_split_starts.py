@@ -1,4 +1,4 @@
-"""Starts whose day and time of day are two entries, and starts of files of several records."""
+"""Starts whose date and time of day are two entries, and starts of files with several records."""
 
 from datetime import UTC, datetime
 
@@ -61,12 +61,12 @@ def starts(path, description=HAMMER):
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("entries", PAIRS, ids=lambda e: " ".join(e)[:40])
-def test_a_day_and_a_time_of_day_in_two_entries_are_a_start(entries, form, tmp_path):
+def test_a_date_and_a_time_of_day_in_two_entries_are_read_as_a_start(entries, form, tmp_path):
     FORMS[form](tmp_path / f"a.{form}", entries)
     assert starts(tmp_path / f"a.{form}") == ([START], [])
 
 
-def test_comments_of_an_audio_file_hold_day_and_time_of_day(tmp_path):
+def test_date_and_time_of_day_in_the_comment_of_an_audio_file_are_read(tmp_path):
     with soundfile.SoundFile(tmp_path / "a.wav", "w", 1000, 1, "DOUBLE") as file:
         file.comment = '{"channels": ["force"], "units": ["N"], "Date": "2026-05-13", "Time": "10:00:05"}'
         file.write(FORCE[0] / 10)
@@ -84,7 +84,7 @@ def test_a_pair_that_cannot_be_read_is_reported(form, tmp_path):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_zone_in_the_name_of_the_time_of_day_is_that_of_the_start(form, tmp_path):
+def test_a_zone_in_the_name_of_the_time_of_day_is_used_for_the_start(form, tmp_path):
     FORMS[form](tmp_path / f"a.{form}", {"Date": "2026-05-13", "Time (UTC+2)": "12:00:05"})
     assert starts(tmp_path / f"a.{form}") == ([START], [])
 
@@ -110,14 +110,14 @@ def test_every_record_has_the_start_that_its_group_states(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_start_of_the_file_counts_for_all_its_records(name, tmp_path):
+def test_a_start_of_the_file_is_used_for_all_its_records(name, tmp_path):
     rows = "".join(f"{k};{x}\n" for k in range(3) for x in FORCE[k])
     (tmp_path / "a.csv").write_text(f"{name};2026-05-13T10:00:05\nRate;1000 Hz\nrecord;force\n{rows}")
     assert starts(tmp_path / "a.csv") == ([START] * 3, [])
 
 
 @pytest.mark.parametrize("name", ["Start Time", "start_time"])
-def test_a_list_of_starts_has_one_for_each_record(name, tmp_path):
+def test_each_record_has_its_start_from_a_list_of_starts(name, tmp_path):
     np.savez(
         tmp_path / "a.npz", **{"samples": FORCE[:, None], "channels": ["force"], "fs": 1000.0, name: np.array(BEGINS)}
     )
@@ -125,7 +125,7 @@ def test_a_list_of_starts_has_one_for_each_record(name, tmp_path):
     assert starts(tmp_path / "a.npz") == (expected, [])
 
 
-def test_a_start_of_the_file_does_not_fill_a_gap_between_those_of_records(tmp_path):
+def test_a_start_of_the_file_does_not_replace_a_missing_start_of_a_record(tmp_path):
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
         file.write_segment([nptdms.RootObject({"Recorded on": "2026-05-12T08:00:00"})])
         for k, begin in enumerate(BEGINS):
@@ -138,7 +138,7 @@ def test_a_start_of_the_file_does_not_fill_a_gap_between_those_of_records(tmp_pa
     assert [e.problem for e in remarks] == ["it lacks the start time that the other records have"]
 
 
-def test_records_without_an_entry_of_a_start_are_not_copied():
+def test_records_without_a_start_entry_are_not_copied():
     entry = Entry("the file", "Operator", "M. Jensen")
     records = [RawRecord(("force",), (row,), entries=(entry,)) for row in FORCE]
     assert all(out is record for out, record in zip(with_stated_starts(records), records, strict=True))

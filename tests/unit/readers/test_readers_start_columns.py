@@ -1,4 +1,4 @@
-"""The start of a recording in the first row of a text table: dates, times of day, counts since 1970."""
+"""The start of a recording in the first row of a text table: dates, times of day, and counts since 1970."""
 
 from datetime import UTC, datetime
 
@@ -30,7 +30,7 @@ DATES = {
 
 @pytest.mark.parametrize("date", DATES)
 @pytest.mark.parametrize("columns", ["Time", "Date;Clock"])
-def test_a_date_beside_the_time_of_day_is_the_start_and_is_never_guessed(tmp_path, date, columns):
+def test_a_date_with_the_time_of_day_is_the_start_and_an_ambiguous_date_is_reported(tmp_path, date, columns):
     separator = ";" if ";" in columns else " "
     raw = record(tmp_path, [f"{columns};force [N];rail [m/s2]"], [f"{date}{separator}{clock}" for clock in CLOCKS])
     assert raw.started_at == DATES[date]
@@ -42,7 +42,7 @@ ZONES = {"Z": 10, " UTC": 10, "+02:00": 8, " -0500": 15, "+05:45": None, "+02:07
 
 
 @pytest.mark.parametrize("zone", ZONES)
-def test_a_zone_of_the_cell_is_that_of_the_start(tmp_path, zone):
+def test_a_zone_in_the_cell_is_used_for_the_start(tmp_path, zone):
     raw = record(tmp_path, ["Time;force [N];rail [m/s2]"], [f"2026-05-13 {clock}{zone}" for clock in CLOCKS])
     if zone == "+02:07":
         assert raw.started_at is None and raw.unread_start
@@ -51,20 +51,20 @@ def test_a_zone_of_the_cell_is_that_of_the_start(tmp_path, zone):
         assert raw.started_at == expected
 
 
-def test_the_afternoon_is_read(tmp_path):
+def test_a_time_of_day_in_the_afternoon_is_read(tmp_path):
     raw = record(tmp_path, ["Time;force [N];rail [m/s2]"], [f"05/13/2026 {clock} PM" for clock in CLOCKS])
     assert raw.started_at == datetime(2026, 5, 13, 22)
 
 
 @pytest.mark.parametrize("unit, size", [("s", 1.0), ("", 1.0), ("ms", 1e-3), ("", 1e-3), ("", 1e-6), ("", 1e-9)])
-def test_a_count_since_1970_is_a_start_in_utc(tmp_path, unit, size):
+def test_a_count_since_1970_is_read_as_a_start_in_utc(tmp_path, unit, size):
     first = int(START.replace(tzinfo=UTC).timestamp())
     times = [f"{first}.{k:03d}" if size == 1.0 else str(round((first * 1000 + k) * 1e-3 / size)) for k in range(N)]
     name = f"time [{unit}]" if unit else "time"
     assert record(tmp_path, [f"{name};force [N];rail [m/s2]"], times).started_at == START.replace(tzinfo=UTC)
 
 
-DAYS = {  # unit of the column, first number, and the start or what is asked
+DAYS = {  # unit of the column, first number, and the start or the reported question
     ("d", 46155.5): "days since 1899-12-30 or days since 1904-01-01?",
     ("days", 740115.5): datetime(2026, 5, 13, 12),
     ("days since 1899-12-30", 46155.5): datetime(2026, 5, 13, 12, tzinfo=UTC),
@@ -74,8 +74,8 @@ DAYS = {  # unit of the column, first number, and the start or what is asked
 
 
 @pytest.mark.parametrize("unit, first", DAYS)
-def test_a_column_of_days_counts_days_and_no_seconds_of_another_origin(tmp_path, unit, first):
-    """46155 days are as many seconds as LabVIEW counts in 2030: that was the start, without a message."""
+def test_a_column_of_days_is_not_read_as_seconds(tmp_path, unit, first):
+    """Formerly, the start was in 2030 without a message: LabVIEW counts 46155 s then."""
     size = 24.0 if unit.startswith("h") else 1.0
     times = [f"{first + k * size / 86_400_000.0:.14f}" for k in range(N)]
     raw = record(tmp_path, [f"Time [{unit}];force [N];rail [m/s2]"], times)
@@ -87,26 +87,26 @@ def test_a_column_of_days_counts_days_and_no_seconds_of_another_origin(tmp_path,
 
 
 @pytest.mark.parametrize("first, step", [(0.0, 0.001), (12.5, 0.001), (7e8, 50.0), (3.0e9, 50.0)])
-def test_a_count_from_another_origin_is_no_start(tmp_path, first, step):
+def test_a_count_from_another_origin_is_not_read_as_a_start(tmp_path, first, step):
     times = [f"{first + step * k:.3f}" for k in range(N)]
     raw = record(tmp_path, ["time;force [N];rail [m/s2]"], times)
     assert raw.started_at is None and not raw.unread_start
 
 
-def test_the_head_comes_first_and_another_day_is_reported(tmp_path):
+def test_the_start_in_the_header_is_used_and_another_day_in_the_column_is_reported(tmp_path):
     head = ["# started_at: 2026-05-13T10:00:00", "Time;force [N];rail [m/s2]"]
     assert record(tmp_path, head, [f"13.05.2026 {c}" for c in CLOCKS]).unread_start == ""
     raw = record(tmp_path, head, [f"19.05.2026 {c}" for c in CLOCKS], "b.csv")
     assert raw.started_at == START and raw.unread_start.startswith("2026-05-19")
 
 
-def test_the_date_of_another_event_is_no_start(tmp_path):
+def test_the_date_of_another_event_is_not_read_as_a_start(tmp_path):
     raw = record(tmp_path, ["Exported;force [N];rail [m/s2]"], [f"13.05.2026 {c}" for c in CLOCKS])
     assert raw.started_at is None
 
 
 @pytest.mark.parametrize("name", ["Time (UTC)", "UTC", "Timestamp UTC", "Zeit [UTC]"])
-def test_a_zone_in_the_name_of_the_column_is_that_of_the_start(tmp_path, name):
+def test_a_zone_in_the_name_of_the_column_is_used_for_the_start(tmp_path, name):
     raw = record(tmp_path, [f"{name};force [N];rail [m/s2]"], [f"2026-05-13 {clock}" for clock in CLOCKS])
     assert raw.started_at == START.replace(tzinfo=UTC)
 
@@ -115,7 +115,7 @@ REMARKS = ("note", "Remark", "Bemerkung", "Comment", "Kommentar zur Messung", "R
 
 
 @pytest.mark.parametrize("name", REMARKS)
-def test_a_dated_remark_is_no_start(tmp_path, name):
+def test_the_date_of_a_remark_is_not_read_as_a_start(tmp_path, name):
     head = [f"{name};2026-05-12 09:00:00", "time;force [N];rail [m/s2]"]
     raw = record(tmp_path, head, [f"{k / RATE}" for k in range(N)])
     assert raw.started_at is None and not raw.unread_start
@@ -125,7 +125,7 @@ def test_a_dated_remark_is_no_start(tmp_path, name):
     assert raw.started_at is None and not raw.unread_start
 
 
-def test_a_time_stamp_is_no_remark(tmp_path):
-    """Its word contains that for tamping."""
+def test_a_time_stamp_is_not_read_as_a_remark(tmp_path):
+    """The word "Timestamp" contains the letters of "tamp"."""
     head = ["Timestamp;2026-05-12 09:00:00", "time;force [N];rail [m/s2]"]
     assert record(tmp_path, head, [f"{k / RATE}" for k in range(N)]).started_at == datetime(2026, 5, 12, 9)

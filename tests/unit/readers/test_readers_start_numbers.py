@@ -1,4 +1,4 @@
-"""Start times stated as numbers, time stamps and with time zones: every format by every way of stating the time."""
+"""Start times stated as numbers, as time stamps and with time zones, in every format."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -108,7 +108,7 @@ def assert_start(record, expected):
 
 @pytest.mark.parametrize("way", NUMBERS)
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
-def test_a_number_is_a_start_if_one_count_explains_it_and_else_reported(tmp_path, form, way):
+def test_a_number_is_read_as_a_start_if_exactly_one_count_fits_and_is_reported_otherwise(tmp_path, form, way):
     name, number, expected = NUMBERS[way]
     (record,) = read_unconverted(form(tmp_path, {name: number, "rate": RATE}, {}), tmp_path)[2].records
     assert_start(record, expected)
@@ -148,18 +148,18 @@ STAMPS = np.datetime64(START, "us") + MICROSECONDS.astype("timedelta64[us]")
 
 @pytest.mark.parametrize("form, is_utc", [(npz, False), (parquet, False), (tdms, True)])
 @pytest.mark.parametrize("name", ["time", "logged"])
-def test_time_stamps_are_in_utc_where_the_format_says_so(tmp_path, form, is_utc, name):
+def test_time_stamps_are_in_utc_if_the_format_specifies_it(tmp_path, form, is_utc, name):
     (record,) = read_unconverted(form(tmp_path, {}, {name: STAMPS}), tmp_path)[2].records
     assert_start(record, IN_UTC if is_utc else START)
 
 
-def test_time_stamps_with_a_zone_are_in_it(tmp_path):
+def test_time_stamps_with_a_zone_are_converted_from_it(tmp_path):
     column = pa.array(STAMPS).cast(pa.timestamp("us", "Europe/Zurich"))
     (record,) = read_unconverted(parquet(tmp_path, {}, {"time": column}), tmp_path)[2].records
     assert_start(record, IN_UTC)
 
 
-def test_one_time_stamp_is_a_start(tmp_path):
+def test_a_single_time_stamp_is_read_as_a_start(tmp_path):
     for form, expected in ((npz, START), (tdms, IN_UTC)):
         for name in ("started_at", "recorded on"):
             path = form(tmp_path, {name: np.datetime64(START, "us")}, {})
@@ -177,7 +177,7 @@ def test_one_time_stamp_is_a_start(tmp_path):
         ("s since power on", UNIX, ""),
     ],
 )
-def test_the_unit_of_a_dataset_declares_the_origin(tmp_path, unit, first, expected):
+def test_the_unit_of_a_dataset_states_the_origin(tmp_path, unit, first, expected):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name, values in SAMPLES.items():
             file[name] = values
@@ -186,7 +186,7 @@ def test_the_unit_of_a_dataset_declares_the_origin(tmp_path, unit, first, expect
     assert_start(read_unconverted("a.h5", tmp_path)[2].records[0], expected)
 
 
-def test_each_record_of_a_table_begins_at_its_own_time(tmp_path):
+def test_each_record_of_a_table_has_its_own_start(tmp_path):
     numbers = np.repeat([1, 2], N // 2)
     times = STAMPS + (numbers - 1) * np.timedelta64(60, "s")
     records = read_unconverted(parquet(tmp_path, {}, {"record": numbers, "time": times}), tmp_path)[2].records
@@ -200,7 +200,7 @@ ZONES = {
 
 @pytest.mark.parametrize("zone", ZONES)
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
-def test_the_time_zone_of_the_file_is_that_of_its_start(tmp_path, form, zone):
+def test_the_time_zone_of_the_file_is_used_for_its_start(tmp_path, form, zone):
     path = form(tmp_path, {"started_at": "2026-05-13T10:00:00", "utc_offset": zone, "rate": RATE}, {})
     (record,) = read_unconverted(path, tmp_path)[2].records
     assert record.started_at.astimezone(UTC) == datetime(
@@ -232,7 +232,7 @@ NAMES_IN_BRACKETS = {
 
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
-def test_a_zone_in_the_name_of_the_start_is_its_zone(tmp_path, form):
+def test_a_zone_in_the_name_of_the_start_is_used(tmp_path, form):
     for name, hour in (NAMES_WITH_ZONE if form is mat else NAMES_WITH_ZONE | NAMES_IN_BRACKETS).items():
         if form is mat and " " in name:
             continue
@@ -243,7 +243,7 @@ def test_a_zone_in_the_name_of_the_start_is_its_zone(tmp_path, form):
         assert (record.started_at, record.unread_zone) == (expected, ""), name
 
 
-def test_a_zone_in_the_name_counts_more_than_one_beside_it_and_an_abbreviation_is_reported(tmp_path):
+def test_a_zone_in_the_name_has_priority_over_another_entry_and_an_abbreviation_is_reported(tmp_path):
     for name, started_at in (("Start time (UTC)", START), ("Start time (CET)", START - timedelta(hours=2))):
         path = text(tmp_path, {name: "2026-05-13 10:00:00", "rate": RATE}, {})
         result = read(path, tmp_path, RawDescription(SENSORS, rate=RATE, time_zone="Europe/Zurich"))
@@ -255,20 +255,20 @@ def test_a_zone_in_the_name_counts_more_than_one_beside_it_and_an_abbreviation_i
 
 @pytest.mark.parametrize("name", ["time_utc", "Timestamp (UTC)"])
 @pytest.mark.parametrize("form", [parquet, tdms], ids=lambda form: form.__name__)
-def test_a_zone_in_the_name_of_a_time_axis_is_that_of_its_start(tmp_path, form, name):
+def test_a_zone_in_the_name_of_a_time_axis_is_used_for_its_start(tmp_path, form, name):
     (record,) = read_unconverted(form(tmp_path, {}, {name: STAMPS}), tmp_path)[2].records
     assert record.started_at == IN_UTC
 
 
 @pytest.mark.parametrize("stamp", ["2026-05-13 10:00:00 UTC", "13.05.2026 10:00:00 (UTC)", "2026-05-13T10:00 GMT"])
-def test_a_zone_behind_a_time_is_its_zone(tmp_path, stamp):
+def test_a_zone_after_a_time_is_used(tmp_path, stamp):
     (record,) = read_unconverted(text(tmp_path, {"started_at": stamp, "rate": RATE}, {}), tmp_path)[2].records
     assert record.started_at == IN_UTC
 
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.__name__)
-def test_a_number_that_was_read_as_the_start_needs_no_explanation(tmp_path, form):
-    """Days of MATLAB have a fraction, as a scale has."""
+def test_a_number_that_was_read_as_the_start_is_not_reported(tmp_path, form):
+    """Days of MATLAB have a fraction, like a scale."""
     path = form(tmp_path, {"start_time": DAYS + 719529.0, "rate": RATE}, {})
     result = read(path, tmp_path, RawDescription(SENSORS, rate=RATE))
     assert (result.recordings[0].started_at, result.errors) == (START, ())

@@ -1,4 +1,4 @@
-"""A number of samples in the metadata of any format, names of a sampling rate in further languages, broken scales."""
+"""Number of samples in the metadata of any format, names of the rate in further languages, incomplete scales."""
 
 import json
 from dataclasses import replace
@@ -57,7 +57,7 @@ def result_of(tmp_path, name):
 
 @pytest.mark.parametrize("name", ["n_samples", "Number of samples", "Samples", "Anzahl Messwerte"])
 @pytest.mark.parametrize("extension", FORMATS)
-def test_a_file_with_fewer_samples_than_it_states_was_cut_off(extension, name, tmp_path):
+def test_a_file_with_fewer_samples_than_it_states_is_reported_as_truncated(extension, name, tmp_path):
     entry = name.replace(" ", "_") if extension in ("npz", "mat") else name
     FORMATS[extension](tmp_path / f"a.{extension}", **{entry: 500})
     (error,) = result_of(tmp_path, f"a.{extension}").errors
@@ -71,15 +71,15 @@ def test_a_file_with_as_many_samples_as_it_states_is_read(extension, count, tmp_
     assert len(result_of(tmp_path, f"a.{extension}").recordings) == 1
 
 
-@pytest.mark.parametrize("promised, n_recording", [(1200, 3), (400, 3), (1201, 0)])
-def test_the_number_may_count_the_samples_of_all_records(promised, n_recording, tmp_path):
+@pytest.mark.parametrize("stated, n_recording", [(1200, 3), (400, 3), (1201, 0)])
+def test_the_number_may_count_the_samples_of_all_records(stated, n_recording, tmp_path):
     records = {f"record_{k:03d}": SAMPLES.T + k for k in range(3)}
-    np.savez(tmp_path / "a.npz", **records, channels=np.array(["force", "rail"]), number_of_samples=promised)
+    np.savez(tmp_path / "a.npz", **records, channels=np.array(["force", "rail"]), number_of_samples=stated)
     assert len(result_of(tmp_path, "a.npz").recordings) == n_recording
 
 
 @pytest.mark.parametrize("text", ["force, rail", "force;rail", "force\trail", "force|rail"])
-def test_names_in_one_text_are_those_of_the_columns(text, tmp_path):
+def test_names_in_one_text_are_used_for_the_columns(text, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["data"] = SAMPLES
         file["data"].attrs.update(channel_names=text, units="N, m/s²", sample_rate=RATE)
@@ -97,7 +97,7 @@ def test_names_in_one_text_are_those_of_the_columns(text, tmp_path):
         ("サンプリング間隔", True), ("Συχνότητα δειγματοληψίας", False), ("Frekvencija uzorkovanja", False),
     ],
 )  # fmt: skip
-def test_a_rate_or_a_step_is_known_in_further_languages(name, is_step):
+def test_a_rate_or_a_step_is_identified_in_further_languages(name, is_step):
     assert (meaning := name_meaning(name)).certainty == CERTAIN and meaning.is_step == is_step
     (statement,) = statements_of_value(name, 1 / 25600 if is_step else 25600.0, "float")
     assert statement.usual.rate == pytest.approx(25600.0)
@@ -107,7 +107,7 @@ def test_a_rate_or_a_step_is_known_in_further_languages(name, is_step):
     "name",
     ["Počet vzorků", "Liczba próbek", "Taajuus", "Częstotliwość graniczna", "Частота среза", "截止频率", "Okres"],
 )
-def test_another_frequency_period_or_count_is_no_rate(name):
+def test_another_frequency_period_or_count_is_not_read_as_the_rate(name):
     assert name_meaning(name).certainty != CERTAIN
 
 
@@ -119,7 +119,7 @@ def test_another_frequency_period_or_count_is_no_rate(name):
         ({"NI_Scale[0]_Linear_Slope": 2.0}, "its scale without a type cannot be applied"),
     ],
 )
-def test_a_scale_without_its_properties_is_named(properties, words, tmp_path):
+def test_a_scale_without_its_properties_is_an_error(properties, words, tmp_path):
     scale = {"NI_Number_Of_Scales": 1, "NI_Scaling_Status": "unscaled", **properties}
     with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
         codes = (SAMPLES * 1000).astype("int16").T
@@ -133,7 +133,7 @@ def test_a_scale_without_its_properties_is_named(properties, words, tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"\xef\xbb\xbf", b"\xef\xbb\xbf  ", b" \t "])
-def test_a_text_without_any_character_is_empty(content, tmp_path):
+def test_a_text_without_any_character_is_reported_as_empty(content, tmp_path):
     (tmp_path / "a.csv").write_bytes(content)
     with pytest.raises(ReadError, match="there is no text") as raised:
         result_of(tmp_path, "a.csv")
@@ -149,8 +149,8 @@ VALID = {
 
 
 @pytest.mark.parametrize(("format", "name"), [("hdf5", "valid_samples"), *(("npz", name) for name in VALID)])
-def test_a_buffer_that_was_not_filled_is_no_recording(format, name, tmp_path):
-    """Before, the zeros behind the last measured sample were read as samples."""
+def test_a_partly_filled_buffer_is_reported(format, name, tmp_path):
+    """Formerly, the zeros after the last measured sample were read as samples."""
     samples = np.random.default_rng(3).normal(size=(2, 60))
     samples[:, 45:] = 0.0
 
@@ -180,7 +180,7 @@ COUNTS = {"n_valid": (2, 3), "valid_count": (2, 3), "valid_samples": (None, 2)} 
 
 
 @pytest.mark.parametrize("name", COUNTS)
-def test_a_number_of_valid_ones_in_a_file_of_several_records_may_be_that_of_records(name, tmp_path):
+def test_a_number_of_valid_items_may_be_a_number_of_records_in_a_file_of_several_records(name, tmp_path):
     def problems(number):
         with h5py.File(tmp_path / "a.hdf5", "w") as file:
             for k in range(2):
@@ -202,10 +202,9 @@ ENDS = {  # name and time of the end of a record of 1 s from 10:00:00.25, and wh
 
 @pytest.mark.parametrize(("name", "time"), ENDS)
 def test_the_duration_between_start_and_end_is_compared_with_the_samples(name, time, tmp_path):
-    """An end that is hours later is that of the session, and a short time is known to a few steps of the clock only.
+    """An end hours later is the end of the session. A short duration has an error of a few steps of the clock.
 
-    An end without a fraction or without seconds was rounded.
-    """
+    An end without a fraction or without seconds was rounded."""
     n_row = 25 if time == "10:00:00.27" else 500
     rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(1).normal(size=(n_row, 2)).round(4))
     head = f"Start: 2026-05-13 10:00:00.25\n{name}: 2026-05-13 {time}\nforce;rail\n"
@@ -215,7 +214,7 @@ def test_the_duration_between_start_and_end_is_compared_with_the_samples(name, t
     assert [f"duration until {name}" in str(e) for e in result.errors] == [True] * ENDS[name, time]
 
 
-def test_an_end_of_several_records_or_in_another_zone_and_two_ends_state_no_duration(tmp_path):
+def test_ends_of_several_records_in_another_zone_or_two_ends_give_no_duration(tmp_path):
     start, end, other = "2026-05-13 10:00:00.25", "2026-05-13 10:00:02.25", "2026-05-13 10:00:02.75"
 
     def problems(n_record, **entries):

@@ -1,4 +1,4 @@
-"""Numbers as people print them: decimal commas, rounded steps, units of time, one separator too many."""
+"""Numbers as programs print them: decimal commas, rounded steps, units of time, superfluous separators."""
 
 import re
 from dataclasses import replace
@@ -19,12 +19,12 @@ NAMED = RawDescription(
 )
 
 
-def comma(value):
+def with_comma(value):
     return f"{value:.4f}".replace(".", ",")
 
 
-def sound(root, name, text, description=NAMED, rate=20000.0):
-    """The only recording of a text file, with the numbers that were printed and the rate."""
+def checked_recording(root, name, text, description=NAMED, rate=20000.0):
+    """The only recording of a text file, after a check of its numbers and rate."""
     (root / name).write_text(text, encoding="utf-8")
     result = read(name, root, description)
     assert result.errors == ()
@@ -36,18 +36,18 @@ def sound(root, name, text, description=NAMED, rate=20000.0):
 
 @pytest.mark.parametrize("separator", [";", "\t"])
 @pytest.mark.parametrize("end", ["", ";"])
-def test_a_decimal_comma_is_no_separator(separator, end, tmp_path):
-    """Numbers with four digits behind the comma, so that every line holds more commas than separators."""
+def test_a_decimal_comma_is_not_read_as_a_separator(separator, end, tmp_path):
+    """Every line has more decimal commas than separators."""
     end = separator if end else ""
-    rows = "".join(f"{comma(a)}{separator}{comma(b)}{end}\n" for a, b in X)
+    rows = "".join(f"{with_comma(a)}{separator}{with_comma(b)}{end}\n" for a, b in X)
     head = f"# rate: 20000,0\nforce{separator}acc{end}\n"
-    sound(tmp_path, "a.csv", head + rows)
-    sound(tmp_path, "a.csv", head + rows, replace(NAMED, rate=20000.0))
+    checked_recording(tmp_path, "a.csv", head + rows)
+    checked_recording(tmp_path, "a.csv", head + rows, replace(NAMED, rate=20000.0))
 
 
-def test_a_decimal_comma_behind_a_long_silence_is_one(tmp_path):
+def test_a_decimal_comma_after_many_zeros_is_identified(tmp_path):
     silence = "0;0\n" * 2000
-    rows = "".join(f"{comma(a)};{comma(b)}\n" for a, b in X)
+    rows = "".join(f"{with_comma(a)};{with_comma(b)}\n" for a, b in X)
     (tmp_path / "a.csv").write_text("rate: 20000\nforce;acc\n" + silence + rows)
     (recording,) = read("a.csv", tmp_path, NAMED).recordings
     np.testing.assert_allclose(recording.samples[:, 2000:], X.T.round(4), atol=1e-12)
@@ -58,19 +58,21 @@ def test_a_decimal_comma_behind_a_long_silence_is_one(tmp_path):
     ["rate: 12.8 kHz", "fs: 12,8 kHz", "rate: 12800 Hz", "dt: 78.125 µs", "rate; 12800", "Sampling rate [kHz];12,8"],
 )
 def test_a_rate_is_read_with_its_unit(head, tmp_path):
-    sound(tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0)
+    checked_recording(
+        tmp_path, "a.csv", f"{head}\nforce;acc\n" + "".join(f"{a:.4f};{b:.4f}\n" for a, b in X), rate=12800.0
+    )
 
 
 @pytest.mark.parametrize(
     "head",
     ["rail_temperature: -2.5", "# rail_temperature: -2.5 °C", "rail_temperature [°C];-2,5", "Rail temperature;-2,5"],
 )
-def test_the_rail_temperature_of_a_head_reaches_the_recording(head, tmp_path):
-    recording = sound(tmp_path, "a.csv", f"rate: 12800\n{head}\nforce;acc\n{ROWS}", rate=12800.0)
+def test_the_rail_temperature_in_a_header_is_a_condition_of_the_recording(head, tmp_path):
+    recording = checked_recording(tmp_path, "a.csv", f"rate: 12800\n{head}\nforce;acc\n{ROWS}", rate=12800.0)
     assert recording.conditions["rail_temperature"] == -2.5
 
 
-def test_a_column_that_is_called_as_a_temperature_is_a_column(tmp_path):
+def test_a_column_with_the_name_of_a_temperature_is_read_as_a_channel(tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 12800\nrail_temperature;acc\n{ROWS}")
     warm = RawDescription((RawChannel("force", "rail_temperature", "force", unit="N"), NAMED.channels[1]))
     (recording,) = read("a.csv", tmp_path, warm).recordings
@@ -83,9 +85,9 @@ ROWS = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
 
 
 @pytest.mark.parametrize("word", WORDS)
-def test_a_rate_in_another_language_is_read_and_held_against_the_layout(word, tmp_path):
+def test_a_rate_in_another_language_is_read_and_compared_with_the_layout(word, tmp_path):
     text = f"{word}: 10000 Hz\nforce;acc\n{ROWS}"
-    sound(tmp_path, "a.csv", text, rate=10000.0)
+    checked_recording(tmp_path, "a.csv", text, rate=10000.0)
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
     assert error.reason == "wrong_rate" and "10000 Hz instead of 20000 Hz" in error.problem
 
@@ -105,14 +107,14 @@ STARTS = {
 
 
 @pytest.mark.parametrize("head", STARTS)
-def test_the_start_in_the_head_is_read_in_the_words_and_dates_of_its_country(head, tmp_path):
-    recording = sound(tmp_path, "a.csv", f"rate: 20000\n{head}\nforce;acc\n{ROWS}")
+def test_the_start_in_the_header_is_read_in_several_languages_and_date_formats(head, tmp_path):
+    recording = checked_recording(tmp_path, "a.csv", f"rate: 20000\n{head}\nforce;acc\n{ROWS}")
     assert recording.started_at.isoformat() == f"2024-05-13T{STARTS[head]}"
 
 
 @pytest.mark.parametrize("stamp", ["04/05/2024 08:30", "31.02.2024 08:30", "13.05.2024", "08:30:12"])
-def test_a_start_that_is_not_clear_is_none_and_is_reported(stamp, tmp_path):
-    """Nobody can tell the 4th of May from the 5th of April; a day or a clock alone is no moment."""
+def test_an_ambiguous_or_incomplete_start_is_not_used_and_is_reported(stamp, tmp_path):
+    """04/05 may be 4 May or 5 April; a date without time, or a time without date, is incomplete."""
     (tmp_path / "a.csv").write_text(f"rate: 20000\nStartzeit;{stamp}\nforce;acc\n{ROWS}")
     result = read("a.csv", tmp_path, NAMED)
     assert result.recordings[0].started_at is None
@@ -123,8 +125,8 @@ def test_a_start_that_is_not_clear_is_none_and_is_reported(stamp, tmp_path):
 
 @pytest.mark.parametrize("head", ["Startzeit;{} 10:00:00\nforce;acc\n", "force;acc;Uhr\n"])
 @pytest.mark.parametrize("date", ["05/13/2024", "04/05/2024", "4-5-2024", "13.05.24", "13/05/24"])
-def test_the_remedy_for_a_date_in_no_clear_order_is_another_order(date, head, tmp_path):
-    """Before, the logger's clock was blamed. A date that only one order allows is read."""
+def test_the_remedy_for_an_ambiguous_date_is_another_order(date, head, tmp_path):
+    """Formerly, the message named the clock of the logger. A date with only one possible order is read."""
     rows = ROWS if "{}" in head else ROWS.replace("\n", f";{date} 10:00:00\n")
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{head.format(date)}{rows}")
     result = read("a.csv", tmp_path, NAMED)
@@ -136,7 +138,7 @@ def test_the_remedy_for_a_date_in_no_clear_order_is_another_order(date, head, tm
 
 
 @pytest.mark.parametrize("stamp", ["31.02.2024 10:00", "2024-13-05 10:00:00"])
-def test_the_remedy_for_a_date_that_does_not_exist_is_the_clock(stamp, tmp_path):
+def test_the_remedy_for_a_date_that_does_not_exist_concerns_the_clock(stamp, tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\nstart: {stamp}\nforce;acc\n{ROWS}")
     (error,) = read("a.csv", tmp_path, NAMED).errors
     assert error.reason == "start_unknown" and "clock" in error.remedy
@@ -147,24 +149,24 @@ COUNTS = ("Anzahl Messwerte", "# Anzahl Werte", "Number of samples", "Nombre d'�
 
 
 @pytest.mark.parametrize("word", COUNTS)
-def test_a_table_shorter_than_its_head_promises_is_cut(word, tmp_path):
+def test_a_table_with_fewer_samples_than_its_header_states_is_reported_as_truncated(word, tmp_path):
     text = f"rate: 20000\n{word};{{}}\nforce;acc\n{ROWS}"
-    for whole in ("50", "50 Werte", "49", "0"):
-        sound(tmp_path, "a.csv", text.format(whole))
-    for promised, number in (("60", 60), ("1.200", 1200), ("60 000", 60000)):
-        (tmp_path / "a.csv").write_text(text.format(promised))
+    for accepted in ("50", "50 Werte", "49", "0"):
+        checked_recording(tmp_path, "a.csv", text.format(accepted))
+    for stated, number in (("60", 60), ("1.200", 1200), ("60 000", 60000)):
+        (tmp_path / "a.csv").write_text(text.format(stated))
         (error,) = read("a.csv", tmp_path, NAMED).errors
         assert error.reason == "truncated"
         assert error.problem == f"has 50 of the {number} samples that its header states"
 
 
-def test_a_record_longer_than_its_header_states_is_no_copy_that_was_cut_off(tmp_path):
+def test_a_record_longer_than_its_header_states_is_not_reported_as_truncated(tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\nn_samples: 4\nforce;acc\n{ROWS}")
     (error,) = read("a.csv", tmp_path, NAMED).errors
     assert error.reason == "wrong_length" and error.problem == "has 50 samples, and its header states 4"
 
 
-def test_decimal_commas_between_commas_are_explained(tmp_path):
+def test_the_error_of_decimal_commas_between_commas_states_the_cause(tmp_path):
     rows = "".join(f"{a:.4f},{b:.4f}\n" for a, b in X)
     (tmp_path / "a.csv").write_text("rate: 20000\nforce,acc\n1,1\n" + rows.replace(".", ","))
     with pytest.raises(ReadError, match="4 cells instead of 2") as caught:
@@ -172,7 +174,7 @@ def test_decimal_commas_between_commas_are_explained(tmp_path):
     assert "where the decimal mark is a comma, export with semicolons or tabs between columns" in str(caught.value)
 
 
-def test_decimal_commas_between_commas_are_explained_where_all_numbers_have_them(tmp_path):
+def test_the_error_of_decimal_commas_in_all_numbers_between_commas_states_the_cause(tmp_path):
     rows = "".join(f"{k / 20000:.5f},{a:.4f},{b:.4f}\n".replace(".", ",") for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text("time [s],force [N],acc [m/s²]\n" + rows, encoding="utf-8")
     with pytest.raises(
@@ -182,23 +184,23 @@ def test_decimal_commas_between_commas_are_explained_where_all_numbers_have_them
     assert "semicolons or tabs" in caught.value.remedy
 
 
-def test_a_count_of_all_rows_does_not_cut_the_records_of_a_file(tmp_path):
+def test_a_count_of_all_rows_is_not_compared_with_the_single_records(tmp_path):
     rows = "".join(f"{1 + k // 20};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text(f"rate: 20000\nAnzahl Messwerte: 50\nrecord;force;acc\n{rows}")
     result = read("a.csv", tmp_path, NAMED)
     assert result.errors == () and [r.n_sample for r in result.recordings] == [20, 20, 10]
 
 
-def test_a_column_that_is_called_as_a_count_is_a_column(tmp_path):
+def test_a_column_with_the_name_of_a_count_is_read_as_a_channel(tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 12800\nMesswerte;acc\n{ROWS}")
     called = RawDescription((RawChannel("force", "Messwerte", "force", unit="N"), NAMED.channels[1]))
     assert read("a.csv", tmp_path, called).recordings[0].samples.shape == X.T.shape
 
 
 @pytest.mark.parametrize("line", ["# taktning [Hz];10000", "Mintavétel 10000 Hz"])
-def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line, tmp_path):
+def test_a_frequency_in_unknown_words_that_differs_from_the_layout_is_reported(line, tmp_path):
     text = f"{line}\nforce;acc\n{ROWS}"
-    sound(tmp_path, "a.csv", text, replace(NAMED, rate=10000.0), rate=10000.0)
+    checked_recording(tmp_path, "a.csv", text, replace(NAMED, rate=10000.0), rate=10000.0)
     (error,) = read("a.csv", tmp_path, replace(NAMED, rate=20000.0)).errors
     assert error.reason == "wrong_rate" and "10" in error.problem and "20000 Hz" in error.problem
     assert line.split()[-2].strip("#")[:8].rstrip(":") in error.problem and "in line 1" in error.problem
@@ -210,18 +212,20 @@ def test_a_frequency_that_nobody_understood_is_no_licence_for_another_rate(line,
 
 
 @pytest.mark.parametrize("line", ["Tiefpass: 8000 Hz", "Filter 10 kHz", "sensor: 0.5-10000 Hz", "Bandbreite: 8 kHz"])
-def test_the_frequency_of_a_filter_is_no_rate(line, tmp_path):
-    sound(tmp_path, "a.csv", f"{line}\nforce;acc\n{ROWS}", replace(NAMED, rate=20000.0))
+def test_the_frequency_of_a_filter_is_not_read_as_the_rate(line, tmp_path):
+    checked_recording(tmp_path, "a.csv", f"{line}\nforce;acc\n{ROWS}", replace(NAMED, rate=20000.0))
 
 
 @pytest.mark.parametrize("names", ["force;acc\n", "force;acc;\n", ""])
-def test_a_separator_behind_the_last_number_is_no_channel(names, tmp_path):
+def test_a_separator_after_the_last_number_is_not_read_as_a_channel(names, tmp_path):
     by_index = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))
     rows = "".join(f"{a:.4f};{b:.4f};\n" for a, b in X)
-    sound(tmp_path, "a.csv", "rate: 20000\n" + names + rows, NAMED if names else replace(NAMED, channels=by_index))
+    checked_recording(
+        tmp_path, "a.csv", "rate: 20000\n" + names + rows, NAMED if names else replace(NAMED, channels=by_index)
+    )
 
 
-def test_an_unnamed_column_with_numbers_is_still_a_channel_that_the_layout_does_not_know(tmp_path):
+def test_an_unnamed_column_with_numbers_is_a_channel_unknown_to_the_layout(tmp_path):
     rows = "".join(f"{a:.4f};{b:.4f};{7 if k == 30 else ''}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text("rate: 20000\nforce;acc;\n" + rows)
     (error,) = read("a.csv", tmp_path, NAMED).errors
@@ -245,13 +249,13 @@ HEADS = {
 
 
 @pytest.mark.parametrize("head", HEADS)
-def test_the_names_are_those_above_the_numbers_and_their_units(head, tmp_path):
-    """Whatever stands further up may have as many cells as there are columns."""
+def test_the_names_are_read_from_the_line_above_the_numbers_and_their_units(head, tmp_path):
+    """Lines further up may have as many cells as there are columns."""
     rows = "".join(f"{k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
-    sound(tmp_path, "a.csv", HEADS[head] + rows)
+    checked_recording(tmp_path, "a.csv", HEADS[head] + rows)
 
 
-def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
+def test_an_unknown_unit_in_a_row_of_units_is_an_error(tmp_path):
     by_index = replace(NAMED, channels=tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels)))
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\nN;furlong\n{ROWS}")
     (error,) = read("a.csv", tmp_path, by_index).errors
@@ -276,15 +280,15 @@ def test_a_unit_that_is_not_known_is_still_one_of_a_row_of_units(tmp_path):
 )
 def test_a_time_column_in_its_unit_gives_the_rate(unit, second, tmp_path):
     rows = "".join(f"{second * k / 20000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
-    sound(tmp_path, "a.csv", f"time [{unit}];force;acc\n" + rows)
-    sound(tmp_path, "a.csv", f"t;force;acc\n({unit});(N);(m/s²)\n" + rows, replace(NAMED, rate=20000.0))
+    checked_recording(tmp_path, "a.csv", f"time [{unit}];force;acc\n" + rows)
+    checked_recording(tmp_path, "a.csv", f"t;force;acc\n({unit});(N);(m/s²)\n" + rows, replace(NAMED, rate=20000.0))
 
 
 @pytest.mark.parametrize("title", ["Zeit", "Zeit [s]", "Tid (s)", "temps", "idő [s]"])
-def test_a_time_column_of_another_language_is_held_against_the_promised_rate(title, tmp_path):
-    """Ignored as a channel, it would let a test of half the promised rate pass with all frequencies doubled."""
+def test_a_time_column_in_another_language_is_compared_with_the_rate_of_the_layout(title, tmp_path):
+    """Without the comparison, a record of half the rate would pass with doubled frequencies."""
     rows = "".join(f"{k / 10000:.9g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
-    sound(tmp_path, "a.csv", f"{title};force;acc\n" + rows, rate=10000.0)
+    checked_recording(tmp_path, "a.csv", f"{title};force;acc\n" + rows, rate=10000.0)
     name = title.split(" ")[0]
     ignored = replace(NAMED, rate=20000.0, channels=(*NAMED.channels, RawChannel("time", name, "ignored")))
     for description in (ignored, replace(NAMED, rate=20000.0)):
@@ -303,8 +307,8 @@ def test_a_time_column_of_another_language_is_held_against_the_promised_rate(tit
         ),
     ],
 )
-def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, what, remedy, tmp_path):
-    """A clock of another form, another separator: the copy is whole, another one will not help."""
+def test_the_error_of_a_table_without_a_line_of_numbers_quotes_the_last_line(row, what, remedy, tmp_path):
+    """The copy is complete, so the remedy is not another copy."""
     (tmp_path / "a.csv").write_text("force;acc\n" + f"{row}\n" * 50)
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
@@ -312,13 +316,13 @@ def test_a_table_in_which_no_line_is_numbers_alone_is_quoted(row, what, remedy, 
     assert str(caught.value) == f"a.csv, the file: {problem}. {remedy}."
 
 
-COMMAS = "".join(f"{comma(a)};{comma(b)}\n" for a, b in X)
+COMMAS = "".join(f"{with_comma(a)};{with_comma(b)}\n" for a, b in X)
 
 
 @pytest.mark.parametrize("cell", ["1.234,56", "-1 234,5", "1'234,5", "12\u00a0345,5", "1.234.567"])
 @pytest.mark.parametrize("above", [COMMAS, ""])
-def test_a_mark_for_thousands_is_named_with_its_line_and_column(cell, above, tmp_path):
-    """Also in the first row, which is no line of names; the copy is whole, another one will not help."""
+def test_the_error_of_a_separator_of_thousands_states_line_and_column(cell, above, tmp_path):
+    """Also in the first row, which is no line of names. The copy is complete."""
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{above}0,5;{cell}\n{COMMAS}", encoding="utf-8")
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
@@ -331,7 +335,7 @@ def test_a_mark_for_thousands_is_named_with_its_line_and_column(cell, above, tmp
 
 @pytest.mark.parametrize("cell", ["#NV", "#N/A", "NaN", "#DIV/0!", ""])
 @pytest.mark.parametrize("where", [0, 30])
-def test_a_missing_value_is_counted_with_its_place_and_costs_its_channel_alone(cell, where, tmp_path):
+def test_missing_values_are_reported_with_their_place_and_only_their_channel_is_lost(cell, where, tmp_path):
     rows = COMMAS.splitlines()
     rows[where] = rows[where].split(";")[0] + f";{cell}"
     (tmp_path / "a.csv").write_text("force;acc\n" + "\n".join(rows) + "\n")
@@ -343,7 +347,7 @@ def test_a_missing_value_is_counted_with_its_place_and_costs_its_channel_alone(c
     np.testing.assert_allclose(result.recordings[0].samples, X.T[:1].round(4), atol=1e-12)
 
 
-def test_a_word_among_the_numbers_is_said_with_its_line_and_column(tmp_path):
+def test_the_error_of_a_word_among_the_numbers_states_line_and_column(tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{COMMAS}overload;0,5\n")
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
@@ -362,12 +366,12 @@ SHEETS = {
 
 @pytest.mark.parametrize("kind", SHEETS)
 @pytest.mark.parametrize(("name", "format"), [("a.csv", "auto"), ("a.csv", "csv"), ("a.xlsx", "auto")])
-def test_a_spreadsheet_is_named_whatever_it_is_called(kind, name, format, tmp_path):
+def test_a_spreadsheet_file_is_identified_under_any_file_name(kind, name, format, tmp_path):
     (tmp_path / name).write_bytes(SHEETS[kind])
     with pytest.raises(ReadError) as caught:
         read(name, tmp_path, replace(NAMED, format=format))
-    said = "it is a spreadsheet's own file. Save it from the spreadsheet as CSV, text with separated columns"
-    assert str(caught.value) == f"{name}, byte 0: {said}." and caught.value.reason == "unreadable"
+    message = "it is a spreadsheet's own file. Save it from the spreadsheet as CSV, text with separated columns"
+    assert str(caught.value) == f"{name}, byte 0: {message}." and caught.value.reason == "unreadable"
 
 
 def test_a_time_column_in_another_unit_is_rejected(tmp_path):
@@ -409,14 +413,14 @@ def clock_rows(stamp, n=50, step=timedelta(microseconds=50), start=MONDAY_NOON):
 )
 @pytest.mark.parametrize("start", [MONDAY_NOON, MONDAY_NOON - timedelta(microseconds=1500)])
 def test_a_time_of_day_gives_the_rate(stamp, start, tmp_path):
-    sound(tmp_path, "a.csv", clock_rows(stamp, start=start))
+    checked_recording(tmp_path, "a.csv", clock_rows(stamp, start=start))
 
 
 @pytest.mark.parametrize("start", [datetime(2026, 5, 4, 23, 59, 59, 999000), datetime(2026, 5, 31, 23, 59, 59, 999000)])
 @pytest.mark.parametrize("date", ["%Y-%m-%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d.%m.%y"])
 @pytest.mark.parametrize("separator", [" ", ";"])
-def test_midnight_is_no_gap_and_a_day_is_one(start, date, separator, tmp_path):
-    """A date counts in whatever order it is written, in the cell of the time of day and in one of its own."""
+def test_midnight_is_accepted_and_a_jump_of_days_is_an_error(start, date, separator, tmp_path):
+    """The date may have any order and may have a cell of its own."""
     head = "date;time" if separator == ";" else "time"
     text = clock_rows(lambda time, k: f"{time:{date}}{separator}{time:%H:%M:%S.%f}", start=start)
     (tmp_path / "a.csv").write_text(text.replace("time", head, 1))
@@ -433,24 +437,24 @@ def test_midnight_is_no_gap_and_a_day_is_one(start, date, separator, tmp_path):
 
 
 @pytest.mark.parametrize("stamp", ["10:61:00.5", "24:00:00+01:00", "13:00:00 PM", "10:00:61.5"])
-def test_a_time_that_no_clock_shows_is_an_error(stamp, tmp_path):
+def test_an_impossible_time_of_day_is_an_error(stamp, tmp_path):
     (tmp_path / "a.csv").write_text(clock_rows(lambda time, k: f"{time:%H:%M:%S.%f}" if k != 9 else stamp))
     with pytest.raises(ReadError, match=f"sample 9 is '{re.escape(stamp)}'"):
         read("a.csv", tmp_path, NAMED)
 
 
 @pytest.mark.parametrize("rate", RATES)
-@pytest.mark.parametrize("promised", [True, False])
-def test_a_step_printed_with_seven_digits_is_the_whole_rate(rate, promised, tmp_path):
-    """Its last digit is worth up to 5e-7 of it: 44100 Hz reads as 44099.9957."""
-    wanted = replace(NAMED, rate=float(rate)) if promised else NAMED
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_step_printed_with_seven_digits_gives_the_whole_number_of_the_rate(rate, stated, tmp_path):
+    """The relative error of the step is up to 5e-7: 44100 Hz is printed as 44099.9957 Hz."""
+    layout = replace(NAMED, rate=float(rate)) if stated else NAMED
     rows = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
-    sound(tmp_path, "a.csv", f"dt = {1 / rate:.6E}\nforce;acc\n" + rows, wanted, rate)
-    sound(tmp_path, "a.lvm", lvm(f"{1 / rate:.6E}"), wanted, rate)
+    checked_recording(tmp_path, "a.csv", f"dt = {1 / rate:.6E}\nforce;acc\n" + rows, layout, rate)
+    checked_recording(tmp_path, "a.lvm", lvm(f"{1 / rate:.6E}"), layout, rate)
     np.savez(tmp_path / "a.npz", force=X[:, 0], acc=X[:, 1], dt=np.float32(1 / rate))
-    assert read("a.npz", tmp_path, wanted).recordings[0].rate == rate
+    assert read("a.npz", tmp_path, layout).recordings[0].rate == rate
     np.savez(tmp_path / "b.npz", force=X[:, 0], acc=X[:, 1], fs=np.float32(rate))
-    assert read("b.npz", tmp_path, wanted).recordings[0].rate == rate
+    assert read("b.npz", tmp_path, layout).recordings[0].rate == rate
 
 
 def lvm(step):
@@ -462,7 +466,7 @@ def lvm(step):
 
 
 @pytest.mark.parametrize("step", ["5E-05", "5.000000E-05", "0.00005"])
-def test_a_round_step_is_not_taken_for_another_cut_off(step, tmp_path):
+def test_a_round_step_is_not_read_as_a_rounded_step_of_another_rate(step, tmp_path):
     rows = "".join(f"{a:.4f};{b:.4f}\n" for a, b in X)
     (tmp_path / "a.csv").write_text(f"dt = {step}\nforce;acc\n" + rows)
     for rate, errors in ((20000.0, 0), (20001.0, 1), (17000.0, 1)):
@@ -470,8 +474,10 @@ def test_a_round_step_is_not_taken_for_another_cut_off(step, tmp_path):
 
 
 def test_tdms_of_several_writes_counts_the_samples_of_the_last_one(tmp_path):
-    """LabVIEW writes a waveform per loop; its properties are those of the last. Steps of one rate may differ by
-    rounding, and be of single precision."""
+    """LabVIEW writes a waveform per loop; its properties are those of the last waveform.
+
+    Steps of one rate may differ by rounding and may be in single precision.
+    """
     steps = {"force": float(np.float32(1 / 44100)), "acc": 1 / 44100}
     with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
         for part in np.split(X, 5):
@@ -488,7 +494,7 @@ def test_tdms_of_several_writes_counts_the_samples_of_the_last_one(tmp_path):
     assert error.reason == "wrong_rate"
 
 
-def test_what_a_reader_did_not_foresee_names_its_file(tmp_path, monkeypatch):
+def test_an_unexpected_exception_of_a_reader_is_an_error_with_the_name_of_the_file(tmp_path, monkeypatch):
     (tmp_path / "a.csv").write_text("force;acc\n1.5;2.5\n")
     monkeypatch.setattr(type(FORMATS["csv"]), "read_raw", lambda *_: [][3])
     with pytest.raises(ReadError) as caught:
@@ -499,11 +505,11 @@ def test_what_a_reader_did_not_foresee_names_its_file(tmp_path, monkeypatch):
         read("a.csv", tmp_path, NAMED)
 
 
-def test_the_hour_that_comes_twice_in_autumn_is_told_by_the_order_of_the_records(tmp_path):
+def test_the_order_of_the_records_determines_times_in_the_repeated_hour_in_autumn(tmp_path):
     """Summer time ends in Copenhagen on 2024-10-27 at 01:00 UTC: 02:05 after 02:55 is ten minutes later."""
-    told = ("02:30", "02:55", "02:05", "02:20", "03:10")
+    local_times = ("02:30", "02:55", "02:05", "02:20", "03:10")
     rail = RawDescription((NAMED.channels[1],), kind="passage", rate=20000.0, time_zone="Europe/Copenhagen")
-    stamps = np.array([f"2024-10-27T{clock}:00" for clock in told])
+    stamps = np.array([f"2024-10-27T{clock}:00" for clock in local_times])
     numbered = {f"record_{k:03d}": X[:, 1:].T for k in range(5)}
     np.savez(tmp_path / "a.npz", channels=["acc"], started_at=stamps, **numbered)
     result = read("a.npz", tmp_path, rail)
@@ -518,8 +524,8 @@ def test_the_hour_that_comes_twice_in_autumn_is_told_by_the_order_of_the_records
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_text_is_read_in_the_encodings_that_loggers_and_spreadsheets_write(encoding, end, tmp_path):
-    """The squared metre is one byte in Windows' own code, two in UTF-8; UTF-16 has a zero behind most letters."""
+def test_text_in_the_encodings_of_loggers_and_spreadsheets_is_read(encoding, end, tmp_path):
+    """The character ² is one byte in cp1252 and two bytes in UTF-8."""
     channels = (RawChannel("force", "force", "force"), RawChannel("rail", "acc", "acceleration"))
     rows = "".join(f"{a:.4f};{b:.4f}{end}" for a, b in X)
     text = f"rate: 20000{end}force [N];acc [m/s²]{end}" + rows
@@ -529,14 +535,14 @@ def test_text_is_read_in_the_encodings_that_loggers_and_spreadsheets_write(encod
     np.testing.assert_allclose(result.recordings[0].samples, X.T.round(4), atol=1e-12)
 
 
-def test_half_a_letter_of_utf16_is_said(tmp_path):
+def test_an_incomplete_character_of_utf16_is_an_error(tmp_path):
     (tmp_path / "a.csv").write_bytes("force,acc\n1,2\n".encode("utf-16")[:-1])
     with pytest.raises(ReadError, match="the text in UTF-16"):
         read("a.csv", tmp_path, NAMED)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_rows_behind_an_empty_line_are_no_samples(end, tmp_path):
+def test_rows_after_an_empty_line_are_an_error(end, tmp_path):
     rows = [f"{x:.4f};{y:.4f}" for x, y in X]
     texts = {
         "summary": [*rows, "", "-9.1000;9.3000"],
@@ -553,7 +559,7 @@ def test_rows_behind_an_empty_line_are_no_samples(end, tmp_path):
         assert read("a.csv", tmp_path, NAMED).recordings[0].n_sample == len(rows)
 
 
-def test_a_footer_of_another_width_is_said_with_its_line(tmp_path):
+def test_the_error_of_a_footer_with_another_number_of_cells_states_its_line(tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\nforce;acc\n{COMMAS}Mean\n0,5;0,4\n")
     with pytest.raises(ReadError) as caught:
         read("a.csv", tmp_path, NAMED)
@@ -564,7 +570,7 @@ def test_a_footer_of_another_width_is_said_with_its_line(tmp_path):
 @pytest.mark.parametrize("end", ["\r", "\r\n", "\n"])
 @pytest.mark.parametrize("separator", [";", "\t", ","])
 def test_a_file_of_any_length_is_read_with_any_line_ends(end, separator, tmp_path):
-    """A line is never the whole file: 3,000 rows have more separators than a file may have columns."""
+    """The 3,000 rows have more separators than a line may have columns."""
     rows = [f"{a:.4f}{separator}{b:.4f}" for a, b in np.tile(X, (60, 1))]
     path = tmp_path / "a.csv"
     path.write_bytes(end.join(["rate: 20000", f"force{separator}acc", *rows, ""]).encode())
@@ -574,8 +580,8 @@ def test_a_file_of_any_length_is_read_with_any_line_ends(end, separator, tmp_pat
     np.testing.assert_allclose(recording.samples, np.tile(X, (60, 1)).T.round(4), atol=1e-12)
 
 
-def test_names_without_cells_are_an_error_and_a_comment_is_none(tmp_path):
-    """A logger that left out its counter would shift every channel by one."""
+def test_names_without_cells_are_an_error_except_for_a_comment(tmp_path):
+    """If the counter were missing in the rows, every channel would be shifted by one."""
     numbers = np.random.default_rng(1).normal(size=(40, 3))
     rows = "".join(f"{a:.4f};{b:.4f};{c:.4f}\n" for a, b, c in numbers)
     channels = (*NAMED.channels, RawChannel("nr", "nr", "ignored"), RawChannel("air", "air", "ignored"))
@@ -592,8 +598,8 @@ BRACKETS_OF_NAMES = ["Y[0];Y[1]", "ai (1);ai (2)", "acc [x];acc [y]", "rail (lef
 
 
 @pytest.mark.parametrize("names", BRACKETS_OF_NAMES)
-def test_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
-    """Before, both columns were called Y, and no layout could name one of them."""
+def test_brackets_that_distinguish_columns_are_not_read_as_units(names, tmp_path):
+    """Formerly, both columns had the name Y, and a layout could select neither of them."""
     first, second = names.split(";")
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
     channels = tuple(replace(c, source=n) for c, n in zip(NAMED.channels, (first, second)))
@@ -606,7 +612,7 @@ def test_brackets_that_tell_columns_apart_are_no_units(names, tmp_path):
 @pytest.mark.parametrize(
     "names", ["Y [N];Y [g]", "a [mm/s² rms];a [m/s² peak]", "a [furlong];a [furlong]", "a [furlong];a"]
 )
-def test_units_in_brackets_behind_one_name_remain_units(names, tmp_path):
+def test_units_in_brackets_after_equal_names_are_read_as_units(names, tmp_path):
     (tmp_path / "a.csv").write_text(f"rate: 20000\n{names}\n{ROWS}")
     channels = tuple(replace(c, source=i) for i, c in enumerate(NAMED.channels))
     result = read("a.csv", tmp_path, replace(NAMED, channels=channels))
@@ -618,7 +624,7 @@ TEMPERATURES = ["T [°C]", "t (K)", "T [Nm]", "Time [kN]"]
 
 @pytest.mark.parametrize("name", TEMPERATURES)
 @pytest.mark.parametrize("time", ["t [s]", "Zeit [s]", "time", "idő [s]"])
-def test_a_column_in_another_unit_than_of_time_is_no_time_axis(name, time, tmp_path):
+def test_a_column_whose_unit_is_no_unit_of_time_is_not_read_as_a_time_axis(name, time, tmp_path):
     rows = "".join(f"21.5;{k / 20000:.8g};{a:.4f};{b:.4f}\n" for k, (a, b) in enumerate(X))
     (tmp_path / "a.csv").write_text(f"{name};{time};force;acc\n{rows}", encoding="utf-8")
     ignored = RawChannel("t", name.split(" ")[0], "ignored")
@@ -629,7 +635,7 @@ def test_a_column_in_another_unit_than_of_time_is_no_time_axis(name, time, tmp_p
 
 @pytest.mark.parametrize("word", ["TRUE", "FALSE", "on", "overload"])
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
-def test_a_column_of_words_is_named(separator, word, tmp_path):
+def test_the_error_of_a_column_of_words_states_its_name(separator, word, tmp_path):
     rows = [separator.join((f"{a:.4f}", f"{b:.4f}", word)) for a, b in X]
     lines = ["rate: 20000", separator.join(("force", "acc", "valid")), *rows]
     (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
@@ -650,7 +656,7 @@ SUMMARIES = {
 
 @pytest.mark.parametrize("summary", SUMMARIES.values(), ids=list(SUMMARIES))
 @pytest.mark.parametrize("is_lazy", [False, True])
-def test_statistics_below_the_samples_are_none_of_them(summary, is_lazy, tmp_path):
+def test_statistics_below_the_samples_are_not_read_as_samples(summary, is_lazy, tmp_path):
     numbers = np.random.default_rng(4).normal(size=(60, 2)).round(6)
     rows = "".join(f"{a};{b}\n" for a, b in numbers)
     least, largest = (f"{x[0]};{x[1]}" for x in (numbers.min(axis=0), numbers.max(axis=0)))
@@ -661,14 +667,14 @@ def test_statistics_below_the_samples_are_none_of_them(summary, is_lazy, tmp_pat
 
 
 @pytest.mark.parametrize("word", ["NaN", "nan", "inf", "-Infinity"])
-def test_missing_samples_above_a_closing_line_are_samples(word, tmp_path):
-    """They are no words that end the text, as "Information" is one."""
+def test_missing_samples_above_a_closing_line_are_read_as_samples(word, tmp_path):
+    """They are not read as words that end the samples, such as "Information"."""
     (tmp_path / "a.csv").write_text("force;rail\n" + "1.5;2.5\n" * 60 + f"{word};{word}\nInformation\nEnd of data\n")
     _, _, raw = read_unconverted("a.csv", tmp_path)
     assert [len(column) for column in raw.records[0].samples] == [61, 61]
 
 
-def test_a_damaged_row_at_the_end_is_no_statistic(tmp_path):
+def test_a_damaged_row_at_the_end_is_not_read_as_a_statistic(tmp_path):
     rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(4).normal(size=(60, 2)))
     for row in ("maxwell;0.1;0.2\n", "m;0.1\n", "0.1;max\n"):
         (tmp_path / "a.csv").write_text("force;rail\n" + rows + row)
@@ -676,8 +682,8 @@ def test_a_damaged_row_at_the_end_is_no_statistic(tmp_path):
             read_unconverted("a.csv", tmp_path)
 
 
-def test_a_short_table_has_no_summary(tmp_path):
-    """Its first rows are too few to say what is usual: flags of two contacts are samples."""
+def test_rows_of_a_short_table_are_not_read_as_a_summary(tmp_path):
+    """A short table has too few rows to identify a summary: the flags of two contacts are samples."""
     rows = ["0;1", "1;0", "0;1", "1;0", "0;1", "1;0", "1;1", "0;0", "1;0"]
     (tmp_path / "a.csv").write_text("left;right\n" + "".join(f"{row}\n" for row in rows))
     _, _, raw = read_unconverted("a.csv", tmp_path)
@@ -687,7 +693,7 @@ def test_a_short_table_has_no_summary(tmp_path):
 @pytest.mark.parametrize("is_lazy", [False, True])
 @pytest.mark.parametrize("n", [60, 30_000])
 def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path, is_lazy, n):
-    """Of a long text, too, which is read in blocks of 16 MB: here each number has 300 zeros behind it."""
+    """Also in a long text, which is read in blocks of 16 MB: each number has 300 further zeros."""
     numbers = np.random.default_rng(4).normal(size=(n, 2)).round(6)
     zeros = "0" * (300 if n > 60 else 0)
     rows = [*numbers, numbers.mean(axis=0), numbers.max(axis=0), numbers.min(axis=0)]
@@ -701,8 +707,8 @@ def test_extremes_below_the_samples_without_a_label_are_an_error(tmp_path, is_la
             read_unconverted("a.csv", tmp_path, is_lazy=is_lazy)
 
 
-def test_a_long_periodic_signal_has_no_summary(tmp_path):
-    """Its last rows hold the extremes as rows above do."""
+def test_rows_of_a_long_periodic_signal_are_not_read_as_a_summary(tmp_path):
+    """The last rows contain the extremes, as earlier rows do."""
     x = np.sin(np.arange(120) * np.pi / 2).round(6) + 0.0
     (tmp_path / "a.csv").write_text("force;rail\n" + "".join(f"{a:.2f};{a:.2f}\n" for a in x))
     _, _, raw = read_unconverted("a.csv", tmp_path, is_lazy=True)

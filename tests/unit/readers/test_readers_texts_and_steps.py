@@ -1,4 +1,4 @@
-"""Texts in the encoding of an older program, and steps of a time axis that are none."""
+"""Texts in the encodings of older programs, and invalid steps of a time axis."""
 
 import h5py
 import nptdms
@@ -55,13 +55,13 @@ def tdms(path, step=1 / RATE, **properties):
 
 
 def outcome(tmp_path, name):
-    """The samples in SI, or the error."""
+    """Samples in SI units, or the error."""
     result = read(name, tmp_path, RawDescription(CHANNELS, rate=RATE))
     return result.errors[0] if result.errors else np.stack([result.recordings[0].signal(c.name) for c in CHANNELS], 1)
 
 
 def test_an_lvm_file_with_a_time_column_per_channel_has_a_header_cell_per_channel(tmp_path):
-    """Between the cells of the channels LabVIEW leaves one empty, as each channel has two columns."""
+    """LabVIEW leaves an empty cell between those of the channels, as each channel has two columns."""
     lines = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tMulti"]
     lines += ["***End_of_Header***", ""]
     lines += ["Channels\t2", "Samples\t400\t\t400", "Y_Unit_Label\tkN\t\tg", "X0\t0.0\t\t0.0", "Delta_X\t5E-5\t\t5E-5"]
@@ -77,7 +77,7 @@ def test_the_unit_of_an_lvm_file_is_read_in_the_encoding_of_the_program(encoding
     np.testing.assert_allclose(outcome(tmp_path, "a.lvm"), SAMPLES)
 
 
-def test_a_wide_text_that_no_program_of_the_format_writes_is_named(tmp_path):
+def test_an_lvm_file_in_utf16_is_an_error_that_states_its_encoding(tmp_path):
     lvm(tmp_path / "a.lvm", "utf-16")
     with pytest.raises(ReadError, match=r"its text is in UTF-16\. Save it as UTF-8"):
         outcome(tmp_path, "a.lvm")
@@ -104,7 +104,7 @@ def test_names_in_a_dataset_of_texts_are_read_in_the_encoding_of_the_program(tmp
 
 
 @pytest.mark.parametrize("step", ["0.0", "0", "-5.00000E-05", "NaN", ""])
-def test_a_step_of_a_universal_file_that_is_none_is_an_error(step, tmp_path):
+def test_an_invalid_step_of_a_universal_file_is_an_error(step, tmp_path):
     uff(tmp_path / "a.uff")
     np.testing.assert_allclose(outcome(tmp_path, "a.uff"), SAMPLES)
     uff(tmp_path / "b.uff", step)
@@ -113,7 +113,7 @@ def test_a_step_of_a_universal_file_that_is_none_is_an_error(step, tmp_path):
 
 
 @pytest.mark.parametrize("step", ["0.0", "-5.0E-5", "NaN", ""])
-def test_a_step_of_an_lvm_file_that_is_none_is_an_error_without_a_time_column(step, tmp_path):
+def test_an_invalid_step_of_an_lvm_file_without_a_time_column_is_an_error(step, tmp_path):
     lvm(tmp_path / "a.lvm", step=step)
     error = outcome(tmp_path, "a.lvm")
     assert error.reason == "wrong_rate" and "in header of the segment: Delta_X states no rate" in str(error)
@@ -122,7 +122,7 @@ def test_a_step_of_an_lvm_file_that_is_none_is_an_error_without_a_time_column(st
 
 
 @pytest.mark.parametrize("step", [0.0, -5e-5])
-def test_a_step_of_a_tdms_file_that_is_none_is_an_error_unless_another_entry_states_the_rate(step, tmp_path):
+def test_an_invalid_step_of_a_tdms_file_is_an_error_unless_another_entry_states_the_rate(step, tmp_path):
     tdms(tmp_path / "a.tdms", step)
     error = outcome(tmp_path, "a.tdms")
     assert error.reason == "wrong_rate" and "wf_increment states no rate, and nothing else does" in str(error)
@@ -132,7 +132,7 @@ def test_a_step_of_a_tdms_file_that_is_none_is_an_error_unless_another_entry_sta
     assert "sampled at 25600 Hz instead of 20000 Hz" in str(outcome(tmp_path, "c.tdms"))
 
 
-def test_the_layout_can_declare_a_step_checked_that_is_none(tmp_path):
+def test_the_layout_can_declare_an_invalid_step_as_checked(tmp_path):
     tdms(tmp_path / "a.tdms", 0.0)
     description = RawDescription(CHANNELS, rate=RATE, checked_entries=("wf_increment",))
     assert len(read("a.tdms", tmp_path, description).recordings) == 1
@@ -149,7 +149,7 @@ def test_the_layout_can_declare_a_step_checked_that_is_none(tmp_path):
     ],
 )
 @pytest.mark.parametrize("name", ["Start time", "Startzeit", "Messbeginn"])
-def test_a_start_that_begins_with_the_day_is_no_number(name, text, tmp_path):
+def test_a_start_that_begins_with_the_day_is_not_read_as_a_number(name, text, tmp_path):
     rows = "".join(f"{f:.6f};{a:.6f}\n" for f, a in SAMPLES)
     (tmp_path / "a.csv").write_text(
         f"{name};{text}\nSample rate;20000\nforce [N];rail [m/s²]\n{rows}", encoding="utf-8"

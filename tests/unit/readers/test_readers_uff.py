@@ -1,4 +1,4 @@
-"""Universal Files of several vendors, against pyuff where it reads them, and the traps of the format."""
+"""Universal Files of several vendors, compared with pyuff if it can read them, and difficult cases of the format."""
 
 import gzip
 import re
@@ -33,7 +33,7 @@ def vendors(shared_data):
 
 
 @pytest.mark.parametrize("name", VENDORS)
-def test_every_set_of_a_vendor_file_is_what_pyuff_reads(name, vendors):
+def test_every_set_of_a_vendor_file_equals_the_set_that_pyuff_reads(name, vendors):
     ours = read_datasets((vendors / name).read_bytes())
     theirs = pyuff.UFF(str(vendors / name)).read_sets()
     theirs = theirs if isinstance(theirs, list) else [theirs]
@@ -50,8 +50,8 @@ def test_every_set_of_a_vendor_file_is_what_pyuff_reads(name, vendors):
 
 
 @pytest.mark.parametrize("name", ["Sample_UFF58_ascii.uff", "Sample_UFF58b_bin.uff"])
-def test_a_microphone_in_pascal(name, vendors):
-    """1/65536 s prints as 1.52588E-05: the whole number of Hz that prints the same is 65536."""
+def test_a_recording_of_a_microphone_in_pascals_is_read(name, vendors):
+    """1.52588E-05 s is 1/65536 s: 65536 Hz is the only whole number of Hz with this printed step."""
     for source in ("Mic 01.0Scalar", "Mic 01", "Pressure", 0):
         description = RawDescription((RawChannel("p", source, "pressure"),))
         (recording,) = read(name, vendors, description).recordings
@@ -63,8 +63,8 @@ def test_a_microphone_in_pascal(name, vendors):
     assert error.reason == "wrong_rate"
 
 
-def test_eight_byte_binary_is_the_sine_it_says(vendors):
-    """Its header says: sine, 5 Hz, 100 samples per second."""
+def test_eight_byte_binary_numbers_are_the_sine_of_the_header(vendors):
+    """The header states a sine, 5 Hz, and 100 samples per second."""
     description = RawDescription((RawChannel("a", "sine 5 Hz", "acceleration"),), rate=100.0, n_samples=250)
     (recording,) = read("binary8byte.uff", vendors, description).recordings
     spectrum = np.abs(np.fft.rfft(recording.samples[0]))
@@ -72,28 +72,28 @@ def test_eight_byte_binary_is_the_sine_it_says(vendors):
     assert np.abs(recording.samples[0]).max() == pytest.approx(9.80665, rel=2e-3)  # 1 g, no sample on the crest
 
 
-def test_a_unit_that_is_not_ascii_and_a_short_last_line(vendors):
+def test_a_file_with_a_unit_outside_ascii_and_a_short_last_line_is_read(vendors):
     description = RawDescription((RawChannel("a", "1x", "acceleration"),), rate=20000.0, n_samples=13)
     (recording,) = read("time-history-not-all-columns-filled.uff", vendors, description).recordings
     np.testing.assert_array_equal(recording.samples[0, [0, 12]], [-3.81956, -5.84096])  # as printed, m/s²
 
 
-def test_an_excerpt_is_called_cut_off(vendors):
-    """The file holds 42 of the 2 508 876 samples its header states; pyuff gives the 42 without a word."""
+def test_an_excerpt_is_reported_as_truncated(vendors):
+    """The file has 42 of the 2 508 876 stated samples; pyuff returns the 42 without a message."""
     description = RawDescription((RawChannel("p", 0, "pressure"),))
     (error,) = read("dataset_milestone_in_header.uff", vendors, description).errors
     assert error.reason == "truncated"
     assert "byte 0: ends after 42 of 2508876 samples. Copy the file again" in str(error)
 
 
-def test_a_file_without_time_responses_says_so(vendors):
+def test_the_error_of_a_file_without_time_responses_states_its_content(vendors):
     with pytest.raises(ReadError, match="it holds 1 x frequency response and no time response"):
         read("non_ascii_header.uff", vendors, RawDescription((RawChannel("a", 0, "acceleration"),)))
     with pytest.raises(ReadError, match=r"1 x header, .* and no time response"):
         read(VENDORS[2], vendors, RawDescription((RawChannel("a", 0, "acceleration"),)))
 
 
-def test_frequency_responses_carry_their_unit(vendors):
+def test_frequency_responses_have_their_unit(vendors):
     frf = read_frf(vendors / "non_ascii_header.uff", vendors)
     assert frf.units == ("(1/N)*(m/s²)",)
     assert frf.frequency == pytest.approx(0.195313 * np.arange(6))
@@ -102,8 +102,8 @@ def test_frequency_responses_carry_their_unit(vendors):
         read_frf("binary8byte.uff", vendors)
 
 
-def test_the_beam_has_its_resonances_where_its_peaks_are_known(vendors):
-    """Peaks read off the plotted curves: 52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293 Hz."""
+def test_the_frequency_responses_of_the_beam_have_their_peaks_at_the_known_resonances(vendors):
+    """Peaks of the plotted curves: 52.6, 144.6, 283.1, 468.3, 698.5, 973.0, 1293 Hz."""
     frf = read_frf("beam.uff.gz", vendors)
     assert frf.frf.shape == (3, 64000)
     assert frf.frequency[[0, -1]] == pytest.approx([0.0, 6399.9])
@@ -113,15 +113,15 @@ def test_the_beam_has_its_resonances_where_its_peaks_are_known(vendors):
         assert frf.frequency[near][sum_of_squares.argmax()] == pytest.approx(peak, abs=0.5)
 
 
-def test_frequency_responses_survive_a_cut_only_as_an_error(vendors, tmp_path):
+def test_truncated_frequency_responses_are_an_error(vendors, tmp_path):
     whole = gzip.decompress((vendors / "beam.uff.gz").read_bytes())
     (tmp_path / "beam.uff").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(ReadError, match="the set is not closed by -1"):
         read_frf("beam.uff", tmp_path)
 
 
-def test_a_rate_that_the_header_cuts_off_snaps_to_the_configured_one(hammer_test, in_si, tmp_path):
-    """1/51200 s = 1.953125E-05, of which a header may keep 1.95312E-05, that is 51200.13 Hz."""
+def test_a_step_truncated_in_the_header_gives_the_exact_rate(hammer_test, in_si, tmp_path):
+    """1/51200 s = 1.953125E-05; a header may state 1.95312E-05, which is 51200.13 Hz."""
     path = write(hammer_test, tmp_path / "a.uff", "uff58b")
     cut = path.read_bytes().replace(b" 1.95313e-05", b" 1.95312E-05")
     assert cut.count(b" 1.95312E-05") == 8
@@ -131,14 +131,14 @@ def test_a_rate_that_the_header_cuts_off_snaps_to_the_configured_one(hammer_test
     assert read("a.uff", tmp_path, replace(in_si, rate=51201.0)).errors[0].reason == "wrong_rate"
 
 
-def test_bytes_that_look_like_the_delimiter_do_not_part_a_binary_set(hammer_test, in_si, tmp_path):
-    """pyuff looks for the delimiter everywhere: put one into a sample and it finds an odd number of them."""
-    trap = np.frombuffer(b"\n    -1\n", dtype="<f8")[0]
+def test_bytes_like_the_delimiter_do_not_divide_a_binary_set(hammer_test, in_si, tmp_path):
+    """pyuff searches the samples for the delimiter too, and finds an odd number of delimiters here."""
+    delimiter = np.frombuffer(b"\n    -1\n", dtype="<f8")[0]
     samples = hammer_test[1].samples.copy()
-    samples[0, 10] = trap
+    samples[0, 10] = delimiter
     hammer_test[1] = replace(hammer_test[1], samples=samples)
     path = write(hammer_test, tmp_path / "a.uff", "uff58b")
-    assert pyuff.UFF(str(path)).get_n_sets() == 8  # of 17 delimiters; sound ones are lost behind the false one
+    assert pyuff.UFF(str(path)).get_n_sets() == 8  # of 17 delimiters; intact sets after the false one are lost
     assert np.count_nonzero(pyuff.UFF(str(path)).get_set_types() == 58) < 8
     result = read("a.uff", tmp_path, in_si)
     assert result.errors == () and len(result.recordings) == 4
@@ -146,8 +146,8 @@ def test_bytes_that_look_like_the_delimiter_do_not_part_a_binary_set(hammer_test
 
 
 @pytest.mark.parametrize("ending", [b"\r\n", b"\n"])
-def test_the_closing_delimiter_may_stand_on_a_line_of_its_own(ending, hammer_test, in_si, tmp_path):
-    """Some exporters end the binary numbers with a line break, others do not."""
+def test_the_closing_delimiter_can_have_its_own_line(ending, hammer_test, in_si, tmp_path):
+    """Some exporters write a line break after the binary numbers, others do not."""
     path = write(hammer_test, tmp_path / "a.uff", "uff58b")
     data = path.read_bytes()
     at = 0
@@ -163,7 +163,7 @@ def test_the_closing_delimiter_may_stand_on_a_line_of_its_own(ending, hammer_tes
         np.testing.assert_array_equal(got.samples, put.samples)
 
 
-def test_big_endian_and_crlf(hammer_test, in_si, tmp_path):
+def test_big_endian_numbers_and_crlf_are_read(hammer_test, in_si, tmp_path):
     head, numbers, tail = _first_set(write(hammer_test[:1], tmp_path / "a.uff", "uff58b").read_bytes())
     swapped = head.replace(b"    58b     1", b"    58b     2").replace(b"\n", b"\r\n")
     big = np.frombuffer(numbers, "<f8").astype(">f8").tobytes()
@@ -185,8 +185,8 @@ def _first_set(data):
     return data[:at], data[at : at + 301 * 8], b"    -1\n"
 
 
-def test_channel_after_channel_without_numbers_is_paired_by_order(hammer_test, in_si, tmp_path):
-    """pyuff's own writer, single precision said and double written, all forces first, then all accelerations."""
+def test_unnumbered_sets_of_one_channel_after_the_other_are_paired_by_order(hammer_test, in_si, tmp_path):
+    """pyuff states single precision and writes double precision; all forces precede all accelerations."""
     file = pyuff.UFF(str(tmp_path / "a.uff"))
     for i, (name, unit) in enumerate((("force", "N"), ("rail", "m/s²"))):
         for recording in hammer_test:
@@ -202,8 +202,8 @@ def test_channel_after_channel_without_numbers_is_paired_by_order(hammer_test, i
         np.testing.assert_array_equal(got.samples, put.samples)
 
 
-def test_a_lost_header_between_unnumbered_sets_forbids_pairing(hammer_test, in_si, tmp_path):
-    """Force of one impact and acceleration of the next would look like a sound record."""
+def test_unnumbered_sets_with_a_lost_header_are_not_paired(hammer_test, in_si, tmp_path):
+    """The force of one impact with the acceleration of the next would look like an intact record."""
     path = write(hammer_test, tmp_path / "a.uff", "uff58")
     data = path.read_bytes()
     for k in range(4):
@@ -217,7 +217,7 @@ def test_a_lost_header_between_unnumbered_sets_forbids_pairing(hammer_test, in_s
 
 
 def _sets_without_numbers(hammer_test, tmp_path, line_3=None):
-    """Text of each set F1 R1 F2 R2 ... without sequence numbers, with other texts in ID line 3 if they are given."""
+    """Text of each set F1 R1 F2 R2 ... without sequence numbers and with the given texts in ID line 3."""
     text = write(hammer_test, tmp_path / "a.uff", "uff58").read_text(encoding="utf-8")
     sets = ["    -1\n    58" + part for part in text.split("    -1\n    58")[1:]]
     sets = [re.sub(r"^(    1         0) {4}\d", r"\1    0", part, flags=re.MULTILINE) for part in sets]
@@ -227,7 +227,7 @@ def _sets_without_numbers(hammer_test, tmp_path, line_3=None):
     return sets
 
 
-STAMPS = [f"13-May-24 10:0{k // 2}:0{k % 2}" for k in range(8)]  # of both sets of an impact but for rounding
+STAMPS = [f"13-May-24 10:0{k // 2}:0{k % 2}" for k in range(8)]  # equal for both sets of an impact except for rounding
 SAME = ["13-May-24 10:00:00"] * 8
 CHANNEL_AFTER_CHANNEL = (0, 2, 4, 6, 1, 3, 5, 7)
 MOVED_AND_LOST = {
@@ -264,7 +264,7 @@ def test_sets_without_numbers_are_paired_by_their_times(order, hammer_test, in_s
 
 @pytest.mark.parametrize("line_3", [SAME, ["NONE"] * 8])
 @pytest.mark.parametrize("name", ["shuffled", "swapped in a record", "one lost", "channel after channel, one lost"])
-def test_sets_in_no_regular_order_without_times_are_no_records(name, line_3, hammer_test, in_si, tmp_path):
+def test_sets_in_irregular_order_without_times_are_an_error(name, line_3, hammer_test, in_si, tmp_path):
     sets = _sets_without_numbers(hammer_test, tmp_path, line_3)
     with pytest.raises(ReadError, match="come in no regular order, and neither numbers, times nor nodes") as caught:
         _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in MOVED_AND_LOST[name]).encode(), in_si)
@@ -273,7 +273,7 @@ def test_sets_in_no_regular_order_without_times_are_no_records(name, line_3, ham
 
 @pytest.mark.parametrize("order", [range(8), CHANNEL_AFTER_CHANNEL])
 @pytest.mark.parametrize("line_3", [SAME, STAMPS, ["NONE"] * 8, [*STAMPS[:4], *["NONE"] * 4]])
-def test_sets_in_regular_order_need_no_times(line_3, order, hammer_test, in_si, tmp_path):
+def test_sets_in_regular_order_are_paired_without_times(line_3, order, hammer_test, in_si, tmp_path):
     sets = _sets_without_numbers(hammer_test, tmp_path, line_3)
     result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in order).encode(), in_si)
     assert _impacts(result, hammer_test) == [0, 1, 2, 3]
@@ -281,8 +281,10 @@ def test_sets_in_regular_order_need_no_times(line_3, order, hammer_test, in_si, 
 
 @pytest.mark.parametrize(("lost_force", "lost_rail"), [(0, 8), (8, 0), (2, 7), (None, None), (4, 4)])
 @pytest.mark.parametrize("seed", range(5))
-def test_sizes_show_that_two_lost_sets_moved_the_others(lost_force, lost_rail, seed, hammer_test, in_si, tmp_path):
-    """Nine impacts of different strength, channel after channel; one force and the response to another one are lost."""
+def test_the_ratio_of_response_to_force_shows_that_two_lost_sets_shifted_the_others(
+    lost_force, lost_rail, seed, hammer_test, in_si, tmp_path
+):
+    """Nine impacts of different strength; one force and the response of another impact are lost."""
     rng = np.random.default_rng(seed)
     scatter = np.exp(0.01 * rng.normal(size=(9, 2, 1)))
     shape = rng.normal(size=(2, 301)) * [[100.0], [30.0]]
@@ -301,8 +303,8 @@ def test_sizes_show_that_two_lost_sets_moved_the_others(lost_force, lost_rail, s
     assert "field 3 of record 6" in caught.value.remedy
 
 
-def test_a_contradiction_forbids_the_order_for_records_that_no_time_confirms(hammer_test, in_si, tmp_path):
-    """Impacts 1 and 2 have no times, the rail of 3 and the force of 4 are lost: 3 and 4 would be one record."""
+def test_records_without_times_are_not_paired_by_order_if_other_times_contradict_it(hammer_test, in_si, tmp_path):
+    """Impacts 1 and 2 have no times; the rail of 3 and the force of 4 are lost and must not be joined."""
     sets = _sets_without_numbers(hammer_test, tmp_path, [*["NONE"] * 4, *STAMPS[4:]])
     result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 1, 2, 3, 4, 7)).encode(), in_si)
     assert result.recordings == ()
@@ -316,7 +318,7 @@ def test_a_contradiction_forbids_the_order_for_records_that_no_time_confirms(ham
 
 
 def _at_nodes(sets, nodes):
-    """Sets whose references are at these nodes."""
+    """Sets with these reference nodes."""
     lines = [one.split("\n") for one in sets]
     return [
         "\n".join([*one[:7], f"{one[7][:66]}{node:10d}{one[7][76:]}", *one[8:]])
@@ -324,7 +326,7 @@ def _at_nodes(sets, nodes):
     ]
 
 
-def test_nodes_of_the_impacts_pair_sets_without_times(hammer_test, in_si, tmp_path):
+def test_sets_without_times_are_paired_by_the_nodes_of_the_impacts(hammer_test, in_si, tmp_path):
     sets = _at_nodes(_sets_without_numbers(hammer_test, tmp_path, SAME), [11, 11, 12, 12, 13, 13, 14, 14])
     result = _read_bytes(tmp_path / "a.uff", "".join(sets[i] for i in (0, 3, 4, 1, 6, 7)).encode(), in_si)
     assert sorted(_impacts(result, hammer_test)) == [0, 3]
@@ -339,7 +341,7 @@ def _read_bytes(path, data, description):
     return read(path.name, path.parent, description)
 
 
-def test_a_set_after_the_last_record_costs_the_last_record(hammer_test, in_si, tmp_path):
+def test_a_missing_set_at_the_end_is_an_error_of_the_last_record(hammer_test, in_si, tmp_path):
     path = write(hammer_test, tmp_path / "a.uff", "uff58b")
     data = path.read_bytes()
     last = data.rfind(b"    -1\n    58b")
@@ -350,7 +352,7 @@ def test_a_set_after_the_last_record_costs_the_last_record(hammer_test, in_si, t
     assert "record 4 of 4: channel 'rail' is missing from this record" in str(error)
 
 
-# Unit code of dataset 164, factors for length and force, newtons and metres of one unit.
+# Unit code of dataset 164, factors for length and force, and one unit of force and length in newtons and metres.
 UNITS_164 = [
     (1, 1.0, 1.0, 1.0, 1.0),
     (5, 1000.0, 1000.0, 1e-3, 1e-3),
@@ -392,7 +394,7 @@ def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length,
         (9, 2.5, 1.0, "m/s²", "0.4 m/s²"),
     ],
 )  # fmt: skip
-def test_a_label_that_dataset_164_denies_is_reported(code, length, force, label, stated, tmp_path):
+def test_a_label_that_contradicts_dataset_164_is_reported(code, length, force, label, stated, tmp_path):
     samples = universal_file(tmp_path, LABELS[0], (f"{'m/s²':<20}", f"{label:<20}"))
     text = (tmp_path / "a.uff").read_text(encoding="utf-8")
     head = [f"{'    -1':80}", "   164", f"{code:10d}{'units':20}{2:10d}", f"{length:25.17E}{force:25.17E}{1.0:25.17E}"]
@@ -406,8 +408,8 @@ def test_a_label_that_dataset_164_denies_is_reported(code, length, force, label,
     assert f"its label says {label!r}, data set 164 of the file {stated!r}" in str(result.errors[0])
     (without_layout,) = file_contents(tmp_path / "a.uff").problems
     assert "Find out which is right" in without_layout and "Find out which is right" in str(result.errors[0])
-    overruled = (sensors[0], RawChannel("rail", "rail", "acceleration", unit="m/s²!"))
-    assert read("a.uff", tmp_path, RawDescription(overruled)).recordings[0].samples[1] == pytest.approx(
+    overridden = (sensors[0], RawChannel("rail", "rail", "acceleration", unit="m/s²!"))
+    assert read("a.uff", tmp_path, RawDescription(overridden)).recordings[0].samples[1] == pytest.approx(
         samples[1], rel=1e-5
     )
 
@@ -415,8 +417,8 @@ def test_a_label_that_dataset_164_denies_is_reported(code, length, force, label,
 @pytest.mark.parametrize(
     ("order", "n_read"), [((0, 1, 0, 1, 4, 5), 3), ((0, 1, 0, 3, 4, 5), None), ((0, 2, 4, 1, 3, 1), None)]
 )
-def test_a_set_that_repeats_another_one_without_its_partner_is_reported(order, n_read, hammer_test, in_si, tmp_path):
-    """A whole impact that was written twice is told by the hammer test, a force beside another response by the file."""
+def test_a_repeated_set_whose_partner_is_not_repeated_is_an_error(order, n_read, hammer_test, in_si, tmp_path):
+    """The hammer test reports a complete repeated impact; the reader reports an incomplete one."""
     sets = _sets_without_numbers(hammer_test, tmp_path, ["NONE"] * 8)
     data = "".join(sets[i] for i in order).encode()
     if n_read:
@@ -427,8 +429,8 @@ def test_a_set_that_repeats_another_one_without_its_partner_is_reported(order, n
 
 
 @pytest.mark.parametrize("values", [np.full(301, -0.0123), np.eye(301)[5]], ids=["dead", "one step"])
-def test_a_dead_channel_repeats_itself_without_any_lost_set(values, hammer_test, in_si, tmp_path):
-    """It costs the records where it is dead, not the file."""
+def test_equal_sets_of_a_dead_channel_are_not_reported_as_repeated(values, hammer_test, in_si, tmp_path):
+    """Only the records with the dead channel are lost."""
     impacts = [replace(r, samples=np.stack([r.samples[0], values])) if k > 1 else r for k, r in enumerate(hammer_test)]
     sets = _sets_without_numbers(impacts, tmp_path, ["NONE"] * 8)
     result = _read_bytes(tmp_path / "a.uff", "".join(sets).encode(), in_si)
@@ -436,8 +438,8 @@ def test_a_dead_channel_repeats_itself_without_any_lost_set(values, hammer_test,
 
 
 @pytest.mark.parametrize("n", [4, 5, 6, 7])
-def test_few_sets_need_sizes_that_fit_much_better(n, hammer_test, in_si, tmp_path):
-    """All between the first force and the last response are moved; intact impacts whose ratios scatter are read."""
+def test_shifted_sets_are_found_in_short_files_only_if_the_ratios_fit_much_better(n, hammer_test, in_si, tmp_path):
+    """The first force and the last response are lost; intact impacts with scattered ratios are read."""
     rng = np.random.default_rng(n)
     strengths = np.array([5.0, 9.0, 6.0, 10.0, 5.5, 8.0, 7.0, 9.5])[: n + 1]
     shape = rng.normal(size=(2, 301)) * [[100.0], [30.0]]
@@ -456,7 +458,7 @@ def test_few_sets_need_sizes_that_fit_much_better(n, hammer_test, in_si, tmp_pat
 @pytest.mark.parametrize(
     "label, is_read", [("s", True), ("ms", True), ("NONE", True), ("-", True), ("Hz", False), ("m", False)]
 )
-def test_a_time_response_has_times_on_its_abscissa(label, is_read, tmp_path):
+def test_a_time_response_must_have_a_unit_of_time_on_its_abscissa(label, is_read, tmp_path):
     universal_file(tmp_path)
     text = (tmp_path / "a.uff").read_text(encoding="utf-8")
     text, n = re.subn(r"(?m)^(        17    0    0    0 .{20} )s {19}", lambda m: f"{m[1]}{label:<20}", text)
@@ -498,8 +500,8 @@ LABELS = ((f"{'N':<20}", f"{'NONE':<20}"), (f"{'m/s²':<20}", f"{'NONE':<20}"))
 
 
 @pytest.mark.parametrize("code, quantity", [(8, "displacement"), (11, "velocity"), (13, "force")])
-def test_the_data_type_of_an_ordinate_is_the_quantity_of_the_layout(code, quantity, tmp_path):
-    """Without dataset 164 and label nothing says the unit, and still the numbers are no accelerations."""
+def test_the_data_type_of_an_ordinate_must_be_the_quantity_of_the_layout(code, quantity, tmp_path):
+    """Without dataset 164 and label no unit is stated, but the numbers are no accelerations."""
     samples = universal_file(tmp_path, *LABELS, (f"{12:10d}{0:5d}{0:5d}{0:5d}", f"{code:10d}{0:5d}{0:5d}{0:5d}"))
     force = RawChannel("force", "force", "force", unit="N")
     rail = RawChannel("rail", "rail", "acceleration", unit="m/s²")
@@ -510,7 +512,7 @@ def test_the_data_type_of_an_ordinate_is_the_quantity_of_the_layout(code, quanti
     np.testing.assert_allclose(recording.samples, samples, rtol=1e-6)
 
 
-def test_the_layout_states_the_unit_that_a_data_type_leaves_open(tmp_path):
+def test_the_unit_of_the_layout_is_used_if_the_data_type_states_none(tmp_path):
     samples = universal_file(tmp_path, *LABELS)
     channels = [RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration", unit="g")]
     assert "says the unit" in str(read("a.uff", tmp_path, RawDescription(tuple(channels))).errors[0])
@@ -527,8 +529,8 @@ TAILS = [DELIMITER, 2 * DELIMITER, f"{DELIMITER}End\n{DELIMITER}", "End\n", "\x1
 
 
 @pytest.mark.parametrize("tail", TAILS)
-def test_text_behind_the_last_set_is_no_damage(tail, tmp_path):
-    """The file states its records; without such a number a further set may be missing."""
+def test_text_after_the_last_set_is_accepted(tail, tmp_path):
+    """The file states its number of records; without this number, a further set may be missing."""
     universal_file(tmp_path)
     description = RawDescription((RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")))
     path = tmp_path / "a.uff"

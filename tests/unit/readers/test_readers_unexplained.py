@@ -1,6 +1,6 @@
-"""Entries that no other rule understands: what could change samples or rate is reported by name, the others are not.
+"""Entries that no other rule can interpret are reported if they could change samples or rate.
 
-The layout states 25.6 kHz, newtons and m/s²; the file holds no statement in known words.
+The layout states 25.6 kHz, newtons and m/s²; the file has no statement in known words.
 """
 
 import h5py
@@ -15,7 +15,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.unexplained_entries import RecordFacts, unexplained_entries
 from turnout.records import RawDescription
 
-# Name, value: a rate of 20 kHz, a scale, or another unit, under names that are on no list.
+# Name, value: a rate of 20 kHz, a scale, or another unit, with names that are in no list.
 CONTRADICTIONS = [
     ("Mode", "20 kS/s @ 24 bit"), ("Profile", "mono/20kHz/16bit"), ("Setup", "2 ch x 20000 Hz, 24 bit"), ("Acq", "20k"),
     ("Qtz", 5e-05), ("Punktabstand", 5e-05), ("Hub", "20000"), ("Nyquist", "10 kHz"), ("Uhr", "1/20000 s"),
@@ -29,7 +29,7 @@ CONTRADICTIONS = [
     ("Time scale", 2.5), ("direction", "20 kS/s"), ("Serial number", "sampled at 20 kHz"), ("Battery", 12800),
     ("Delay", "78.125 us"),
 ]  # fmt: skip
-# The same statements in agreement with the record, and values that are about something else.
+# The same statements in agreement with the record, and values about something else.
 HARMLESS = [
     ("Mode", "25.6 kS/s @ 24 bit"), ("Acq", "25.6k"), ("Qtz", 3.90625e-05), ("Nyquist", "12.8 kHz"),
     ("Sweep", "2.5 ms"), ("Hub", 2), ("Hub", 1.0), ("Values in", "N"), ("Amplifier", "x1"), ("Scaled", "yes"),
@@ -58,7 +58,7 @@ def test_a_value_that_agrees_or_is_about_something_else_is_not_reported(format, 
             assert recording is not None and errors == (), (name, value)
 
 
-def test_a_checked_entry_is_accepted_and_no_other(tmp_path):
+def test_only_checked_entries_are_accepted(tmp_path):
     write_csv(tmp_path / "a.csv", [("Profile", "20 kS/s"), ("Hub", "2.5")])
     for checked, n_record, reasons in (
         ((), 0, ["wrong_rate"]), (("profile",), 1, ["entry_unknown"]), (("Profile", "Hub"), 1, []),
@@ -73,27 +73,27 @@ def test_a_checked_entry_is_accepted_and_no_other(tmp_path):
         assert all("checked_entries: Hub" in str(e) for e in result.errors if e.reason == "entry_unknown")
 
 
-def test_units_that_overrule_the_file_explain_scales_but_no_rates(tmp_path):
+def test_units_that_override_the_file_explain_scales_but_no_rates(tmp_path):
     sensors = tuple(RawDescription(SENSORS).channels)
-    overruled = tuple(type(s)(s.name, s.source, s.quantity, unit=f"{s.unit}!") for s in sensors)
+    overridden = tuple(type(s)(s.name, s.source, s.quantity, unit=f"{s.unit}!") for s in sensors)
     write_csv(tmp_path / "a.csv", [("Reading", "raw*0.01"), ("Values in", "kN")])
-    assert read("a.csv", tmp_path, RawDescription(overruled, rate=TRUE)).errors == ()
+    assert read("a.csv", tmp_path, RawDescription(overridden, rate=TRUE)).errors == ()
     write_csv(tmp_path / "a.csv", [("Profile", "20 kS/s")])
-    (error,) = read("a.csv", tmp_path, RawDescription(overruled, rate=TRUE)).errors
+    (error,) = read("a.csv", tmp_path, RawDescription(overridden, rate=TRUE)).errors
     assert error.reason == "wrong_rate"
     assert read("a.csv", tmp_path, described(20000.0)).errors == ()
 
 
-def test_samples_of_another_record_are_no_statements():
-    """The matrix of a second record explains itself; a short list of the same numbers does not."""
+def test_samples_of_another_record_are_not_read_as_statements():
+    """The matrix of a second record is not reported; a short list of the same numbers is reported."""
     facts = RecordFacts(5000.0, 32, 2, 2, ("N", "m/s²"))
     matrix = np.random.default_rng(3).normal(size=(2, 32)) * 0.01
     assert not list(unexplained_entries([Entry("record_001", "record_001", matrix)], facts))
     assert list(unexplained_entries([Entry("head", "list", matrix[:1, :5])], facts))
 
 
-def test_a_condition_is_explained_for_one_record_or_each(tmp_path):
-    """A speed [m/s] that is stored with the samples of one record, as an array of one value."""
+def test_a_condition_of_one_record_or_of_each_record_is_not_reported(tmp_path):
+    """A speed [m/s] is stored with the samples of one record as a number or as an array of one value."""
     force, rail = np.random.default_rng(5).normal(size=(2, 64))
     for speed in (37.871, np.array([37.871])):
         np.savez(tmp_path / "a.npz", rate=TRUE, force=force, rail=rail, speed=speed)
@@ -103,7 +103,7 @@ def test_a_condition_is_explained_for_one_record_or_each(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "value"), [("Profile", "20 kS/s"), ("Values in", "kN"), ("Reading", "raw*0.01")])
-def test_a_plain_contradiction_rejects_every_record_that_it_is_about(name, value, tmp_path):
+def test_a_clear_contradiction_rejects_every_record_that_it_concerns(name, value, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.attrs[name] = value
         for k in range(3):

@@ -1,4 +1,4 @@
-"""Every format x each place of a unit x right, wrong, overruled: the layout agrees or the file is rejected."""
+"""Every format with each place of a unit: right, wrong or overridden. A contradiction of the layout is an error."""
 
 import json
 from dataclasses import replace
@@ -96,8 +96,8 @@ def test_a_unit_under_any_name_is_compared_with_the_layout(format, tmp_path):
         for wrong in ("g", "mg", "mm/s²", "V", "counts", "dB", "m/s"):
             write_file(path, key, ("N", wrong))
             cases[wrong] = is_rejected(outcome(path), wrong)
-            overruled = outcome(path, (SENSORS[0], replace(SENSORS[1], unit="m/s²!")))
-            cases[f"{wrong} overruled"] = not isinstance(overruled, ReadError)
+            overridden = outcome(path, (SENSORS[0], replace(SENSORS[1], unit="m/s²!")))
+            cases[f"{wrong} overruled"] = not isinstance(overridden, ReadError)
         failures += [f"{key}: {case}" for case, ok in cases.items() if not ok]
     assert failures == []
 
@@ -114,8 +114,8 @@ def test_a_unit_in_the_name_of_a_channel_is_compared_with_the_layout(name, tmp_p
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     sensor = replace(SENSORS[1], source=name)
     assert is_rejected(outcome(tmp_path / "a.npz", (SENSORS[0], sensor)), NAMES[name])
-    overruled = outcome(tmp_path / "a.npz", (SENSORS[0], replace(sensor, unit="m/s²!")))
-    assert is_read(overruled)
+    overridden = outcome(tmp_path / "a.npz", (SENSORS[0], replace(sensor, unit="m/s²!")))
+    assert is_read(overridden)
 
 
 @pytest.mark.parametrize(
@@ -138,13 +138,13 @@ def test_a_unit_in_the_name_of_a_channel_is_compared_with_the_layout(name, tmp_p
         "rail ±50,5 g left",
     ],
 )
-def test_a_name_without_another_unit_of_the_channel_states_nothing(name, tmp_path):
+def test_a_name_without_another_unit_of_the_channel_is_accepted(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": SAMPLES[0], name: SAMPLES[1]})
     assert is_read(outcome(tmp_path / "a.npz", (SENSORS[0], replace(SENSORS[1], source=name))))
 
 
 @pytest.mark.parametrize("name", ["rail_{}", "{}", "rail {} 2"])
-def test_letters_that_number_the_channels_are_no_units(name, tmp_path):
+def test_letters_that_number_the_channels_are_not_read_as_units(name, tmp_path):
     names = [name.format(letter) for letter in "fg"]
     np.savez(tmp_path / "a.npz", **dict(zip(names, SAMPLES)))
     sensors = tuple(RawChannel(n, n, "acceleration", unit="m/s²") for n in names)
@@ -158,7 +158,7 @@ def test_letters_that_number_the_channels_are_no_units(name, tmp_path):
         ("Rail [g] (ch 2)", "Rail [g] (ch 2)", "g"), ("[g] rail", "[g] rail", "g"), ("rail (ch 2)", "rail", "ch 2"),
     ],
 )  # fmt: skip
-def test_brackets_anywhere_in_a_column_name_hold_its_unit(cell, name, unit, tmp_path):
+def test_a_unit_in_brackets_anywhere_in_a_column_name_is_read(cell, name, unit, tmp_path):
     rows = "\n".join(f"{f:.12g};{a:.12g}" for f, a in SAMPLES.T)
     (tmp_path / "a.csv").write_text(f"force [N];{cell}\n{rows}\n", encoding="utf-8")
     assert names_and_units("a.csv", tmp_path) == (("force", "N"), (name, unit))
@@ -169,12 +169,12 @@ def test_brackets_anywhere_in_a_column_name_hold_its_unit(cell, name, unit, tmp_
     [("unit", "g"), ("Einheit", "mm/s²"), ("unit", "dB"), ("unit", "V"), ("time unit", "g"), ("Sensitivity unit", "g"),
      ("Test unit", "B"), ("unit", "m/s²"), ("unit", "°C")],
 )  # fmt: skip
-def test_a_unit_of_no_channel_in_particular_counts_for_its_own_quantity(entry, unit, tmp_path):
+def test_a_unit_without_a_channel_is_used_for_its_own_quantity(entry, unit, tmp_path):
     np.savez(tmp_path / "a.npz", force=SAMPLES[0], rail=SAMPLES[1], info=np.array(json.dumps({"setup": {entry: unit}})))
     found = outcome(tmp_path / "a.npz")
     if entry in ("unit", "Einheit") and unit in ("g", "mm/s²", "dB"):
         assert is_rejected(found, unit)
-    elif (entry, unit) == ("unit", "V"):  # perhaps that of the sensor's signal
+    elif (entry, unit) == ("unit", "V"):  # it may be the unit of the sensor signal
         assert found.reason == "entry_unknown"
     else:
         assert is_read(found)
@@ -199,7 +199,7 @@ QUANTITIES = {
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("key", QUANTITIES)
 def test_a_stated_quantity_must_be_that_of_the_layout(format, key, tmp_path):
-    """Right; the rail as a displacement; the sensors exchanged; overruled."""
+    """The quantity is right, a displacement, exchanged with the other sensor, or overridden."""
     writer, name = FORMATS[format]
     key_in_file = plain(key) if format == "mat" else key
     right = QUANTITIES[key]

@@ -1,4 +1,4 @@
-"""Units and sensitivities against closed forms."""
+"""Units and sensitivities, compared with exact values."""
 
 import math
 
@@ -29,7 +29,7 @@ G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
         ("force", "0.305 mV", 0.23, "mV/N", 0.305 / 0.23),
         ("force", "10 V", 0.5, "V/kN", 20e3),
         ("force", "kN", None, "", 1000.0),
-        ("force", "Newtons", 0.23, "mV/N", 1.0),  # physical already: the sensitivity is not used
+        ("force", "Newtons", 0.23, "mV/N", 1.0),  # already physical: the sensitivity is not used
         ("velocity", "km/h", None, "", 1 / 3.6),
         ("displacement", "µm", None, "", 1e-6),
         ("displacement", "\u03bcm", None, "", 1e-6),  # the Greek letter instead of the micro sign
@@ -47,7 +47,7 @@ G = 9.80665  # m/s², by definition (3rd CGPM, 1901)
         ("temperature", "Deg C", None, "", 1.0),  # as LabVIEW writes it
     ],
 )
-def test_one_raw_unit_is_what_the_data_sheet_says(quantity, unit, sensitivity, sensitivity_unit, one):
+def test_one_raw_unit_has_the_value_of_the_data_sheet(quantity, unit, sensitivity, sensitivity_unit, one):
     convert = to_si(quantity, unit, sensitivity, sensitivity_unit)
     assert math.isclose(convert.scale, one, rel_tol=1e-15 * 8)  # a handful of roundings
     assert convert.offset == 0.0
@@ -76,23 +76,23 @@ def test_temperatures_have_an_offset(unit, number, celsius):
         (("colour", "V"), "the quantity 'colour' is not known; known are force, acceleration"),
     ],
 )
-def test_what_cannot_be_converted_says_why(arguments, sentence):
+def test_the_error_of_an_impossible_conversion_states_the_cause(arguments, sentence):
     with pytest.raises(ValueError) as caught:
         to_si(*arguments)
     assert sentence in str(caught.value)
 
 
-def test_a_lone_factor_of_zero_is_no_unit():
+def test_a_factor_of_zero_is_rejected_as_a_unit():
     with pytest.raises(ValueError, match="'0 V' is not known"):
         conversion("0 V")
 
 
-def test_file_and_layout_must_agree_where_both_speak():
+def test_file_and_layout_must_agree_if_both_state_a_unit():
     assert resolve_unit("g", "g") == "g"
     assert resolve_unit("m/s^2", "m/s²") == "m/s²"
-    for label in ("EU", "", " - ", "None", "[a.u.]", "1.0"):  # the file's label means nothing
+    for label in ("EU", "", " - ", "None", "[a.u.]", "1.0"):  # the label of the file states no unit
         assert resolve_unit(label, "V") == "V"
-    assert resolve_unit("count", "0.305 mV") == "0.305 mV"  # the layout says what a count is worth
+    assert resolve_unit("count", "0.305 mV") == "0.305 mV"  # the layout states the value of a count
     assert resolve_unit("g", "V!") == "V"
     assert resolve_unit("counts", "mV") == "mV"  # a step of the converter is a millivolt
     assert resolve_unit("count", "0.05 N") == "0.05 N"
@@ -103,11 +103,11 @@ def test_file_and_layout_must_agree_where_both_speak():
         resolve_unit("", None)
 
 
-def test_a_unit_of_the_file_that_nobody_knows_is_no_licence_for_the_layouts():
+def test_an_unknown_unit_of_the_file_is_an_error_unless_the_layout_overrides_it():
     with pytest.raises(ValueError) as caught:
         resolve_unit("tf", "kN")
-    said = "the file says 'tf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
-    assert str(caught.value) == said
+    expected = "the file says 'tf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
+    assert str(caught.value) == expected
     assert resolve_unit("tf", "kN!") == "kN"
 
 
@@ -122,8 +122,8 @@ SENSITIVITIES = {
     ("format", "name"),
     [*(("csv", name) for name in SENSITIVITIES), ("npz", "rail 10.2 mV/(m/s²)"), ("npz", "rail (100 mV/g)")],
 )
-def test_a_sensitivity_in_the_name_of_a_channel_is_compared_and_is_no_unit(name, format, tmp_path):
-    """Before, the g of 100 mV/g was the unit of the samples."""
+def test_a_sensitivity_in_the_name_of_a_channel_is_compared_and_not_read_as_a_unit(name, format, tmp_path):
+    """Formerly, the g of 100 mV/g was read as the unit of the samples."""
     samples = np.random.default_rng(2).normal(size=(2, 40)).round(6)
     if format == "csv":
         rows = "".join(f"{f};{a}\n" for f, a in samples.T)
@@ -143,7 +143,7 @@ def test_a_sensitivity_in_the_name_of_a_channel_is_compared_and_is_no_unit(name,
         assert result.recordings[0].samples[1] == pytest.approx(samples[1]) and not result.errors
 
 
-def test_the_value_of_a_count_and_a_unit_beside_a_sensitivity_still_count(tmp_path):
+def test_the_value_of_a_count_and_a_unit_beside_a_sensitivity_are_compared(tmp_path):
     for name, problem in (("rail 0.3 mV/count", "count"), ("rail_100mV/g_mm/s2", "mm/s2"), ("rail_g", "g")):
         (tmp_path / "a.csv").write_text(f"force;{name}\n" + "1.5;2.5\n3.5;1.5\n" * 20)
         sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))

@@ -1,4 +1,4 @@
-"""Whole numbers that a layout takes for newtons, beside a sensitivity or a range: the file may hold codes."""
+"""Whole numbers that a layout reads as newtons, with a sensitivity or a range: the file may contain codes."""
 
 import h5py
 import numpy as np
@@ -32,7 +32,7 @@ def remarks(tmp_path, type, name, value, checked=(), **keys):
     ],
 )
 @pytest.mark.parametrize("type", ["i2", "i4"])
-def test_what_may_convert_whole_numbers_is_reported(type, name, value, tmp_path):
+def test_an_entry_that_may_convert_whole_numbers_is_reported(type, name, value, tmp_path):
     errors = [e for e in remarks(tmp_path, type, name, value) if "whole numbers" in str(e)]
     (error,) = errors
     assert error.reason == "entry_unknown"
@@ -51,5 +51,5 @@ def test_what_may_convert_whole_numbers_is_reported(type, name, value, tmp_path)
         ("i2", "sensitivity", 0.5, {"unit": "0.5 N!"}),
     ],
 )
-def test_what_converts_nothing_is_not_reported(type, name, value, keys, tmp_path):
+def test_an_entry_that_does_not_convert_the_samples_is_not_reported(type, name, value, keys, tmp_path):
     assert not [e for e in remarks(tmp_path, type, name, value, **keys) if "whole numbers" in str(e)]

@@ -1,4 +1,4 @@
-"""The rows that the tests register are a module of its own, for what runs once per module needs it, too."""
+"""Fixtures of the registry tests; their rows are in a separate module, as fixtures of module scope need them, too."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A small made-up fleet with season, noise, events and passages, for the views; its numbers mean nothing."""
+"""A small artificial fleet with season, noise, events and passages for tests of views. Its values have no meaning."""
 
 from datetime import datetime, timedelta
 
@@ -40,7 +40,7 @@ def fleet_tables():
 
 
 def hammer_results(seed=1):
-    """One result per section and campaign: every 14 days, north_1/A7 ballast falls 2 %/a, some temperatures missing."""
+    """One result per section and campaign, every 14 days; ballast of north_1/A7 falls by 2 %/a."""
     generator = np.random.default_rng(seed)
     results = []
     for t in TURNOUTS:

@@ -1,4 +1,4 @@
-"""Results of units, batches of them, and registries made from them, for the tests of the registry."""
+"""Results of units, their batches, and registries made from them, for the tests of the registry."""
 
 import hashlib
 from pathlib import Path
@@ -62,7 +62,7 @@ class Bench:
         return batch
 
     def register(self, *results, **more):
-        """Register all batches so far, ``results`` as the newest of them; one written again moves to the end."""
+        """Register all batches so far, with ``results`` as the newest; a batch written again moves to the end."""
         if results:
             self.batch(*results)
         return register(self.batches, self.registry, read=read_results, **more)

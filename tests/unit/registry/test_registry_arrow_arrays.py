@@ -1,4 +1,4 @@
-"""Arrays without ``pa.array``: the same as its own, and no pandas in the process that registers."""
+"""Arrays that are built without ``pa.array`` equal those of ``pa.array``, and registration does not import pandas."""
 
 import subprocess
 import sys
@@ -24,13 +24,13 @@ CASES = [
 
 
 @pytest.mark.parametrize(("values", "type_"), CASES, ids=str)
-def test_an_array_is_that_of_arrow(values, type_):
+def test_an_array_equals_that_of_arrow(values, type_):
     array = arrow_array(values, type_)
     array.validate(full=True)
     assert array.type == type_ and array.equals(pa.array(values, type_))
 
 
-def test_nan_is_no_null():
+def test_nan_is_not_stored_as_null():
     array = arrow_array([float("nan"), None], pa.float64())
     assert array.null_count == 1 and np.isnan(array[0].as_py())
 
@@ -51,7 +51,7 @@ def test_a_value_that_does_not_fit_is_rejected(values, type_):
         arrow_array(values, type_)
 
 
-def test_lists_of_numbers_and_missing_ones():
+def test_lists_of_numbers_and_missing_lists_are_converted():
     values = [np.array([1.0, 2.0]), None, np.zeros(0), *[np.arange(3.0)] * 8]
     array, wrong = to_arrow(column("models", "a_matrix"), values)
     array.validate(full=True)
@@ -61,7 +61,7 @@ def test_lists_of_numbers_and_missing_ones():
 
 @pytest.mark.parametrize("name", ["passed", "coherence"])
 def test_lists_of_every_type_are_read_back_as_written(name):
-    """Arrow packs eight truth values into a byte: bytes taken as bits would leave one of eight lines passed."""
+    """Arrow packs eight booleans into a byte; bytes taken as bits would leave one of eight values true."""
     rng = np.random.default_rng(4)
     values = [rng.random(n) > 0.3 if name == "passed" else rng.random(n).astype(np.float32) for n in (19, 1, 0, 64)]
     array, wrong = to_arrow(column("receptances", name), [*values, None])

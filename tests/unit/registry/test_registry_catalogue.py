@@ -23,7 +23,7 @@ LISTS = (
 
 @pytest.fixture
 def no_cache(tmp_path, monkeypatch):
-    """Nothing is remembered in this process, and the cache folder is empty."""
+    """No template is cached in this process, and the cache folder is empty."""
     monkeypatch.setattr(catalogue_template, "_templates", {})
     monkeypatch.setattr(catalogue_template, "_folders", lambda: [tmp_path / "cache"])
     return tmp_path / "cache"
@@ -48,20 +48,20 @@ def entries(file):
     return [sorted(str(row).replace("TIMESTAMP_US", "TIMESTAMP") for row in some) for some in rows]
 
 
-def test_a_copy_of_the_template_is_the_catalogue_that_is_made_for_its_generation(bench, tmp_path):
-    generation, root, made = load(bench.registry), bench.registry.resolve(), tmp_path / "made.duckdb"
+def test_a_copy_of_the_template_equals_a_catalogue_that_is_created_for_its_generation(bench, tmp_path):
+    generation, root, created = load(bench.registry), bench.registry.resolve(), tmp_path / "made.duckdb"
     with duckdb.connect() as con:
-        con.execute(f"attach '{made}' as registry")
+        con.execute(f"attach '{created}' as registry")
         con.execute("use registry")
         create_catalogue(con, root, generation, datetime.now(UTC))
         comment_catalogue(con)
     build_database(bench.registry, generation)
-    expected, copied = entries(made), entries(root / "registry.duckdb")
+    expected, copied = entries(created), entries(root / "registry.duckdb")
     assert min(map(len, expected[:3])) > 50
     assert copied == expected
 
 
-def test_the_template_is_made_once_and_read_by_other_processes(no_cache, monkeypatch):
+def test_the_template_is_created_once_and_read_by_other_processes(no_cache, monkeypatch):
     template = catalogue_template.catalogue_template()
     monkeypatch.setattr(catalogue_template, "_make", lambda: pytest.fail("made again"))
     assert catalogue_template.catalogue_template() is template
@@ -69,7 +69,7 @@ def test_the_template_is_made_once_and_read_by_other_processes(no_cache, monkeyp
     assert catalogue_template.catalogue_template() == template
 
 
-def test_a_damaged_template_is_made_again(no_cache, monkeypatch):
+def test_a_damaged_template_is_created_again(no_cache, monkeypatch):
     catalogue_template.catalogue_template()
     (path,) = no_cache.iterdir()
     content = bytearray(path.read_bytes())
@@ -90,7 +90,7 @@ def test_other_views_have_another_template(no_cache, monkeypatch):
     assert catalogue_template.catalogue_template() == b"with another view"
 
 
-def test_without_a_cache_folder_that_can_be_written_each_process_makes_it(no_cache, monkeypatch):
+def test_each_process_creates_the_template_if_the_cache_folder_cannot_be_written(no_cache, monkeypatch):
     no_cache.write_text("a file, not a folder")
     template = catalogue_template.catalogue_template()
     assert template[8:12] == b"DUCK" and no_cache.read_text() == "a file, not a folder"

@@ -1,6 +1,6 @@
-"""The registry answers every version of DuckDB that the documents promise: all views, and macros by their defaults.
+"""All documented versions of DuckDB can query the registry: all views, and macros with their defaults.
 
-The versions are installed by pip into temporary folders; where it cannot get one, the test of it is skipped.
+pip installs the versions into temporary folders; the test of a version is skipped if pip cannot install it.
 """
 
 import subprocess
@@ -45,7 +45,7 @@ def old_duckdb(request, tmp_path_factory):
     return request.param, folder
 
 
-def test_an_older_duckdb_answers_all_views_and_macros(fleet, old_duckdb, repository):
+def test_an_older_duckdb_can_query_all_views_and_macros(fleet, old_duckdb, repository):
     import json
 
     version, folder = old_duckdb

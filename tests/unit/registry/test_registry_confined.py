@@ -1,4 +1,4 @@
-"""A query reads the registry's files, writes none, and reaches nothing else of the machine."""
+"""A query reads the files of the registry, writes no file, and has no access to anything else on the machine."""
 
 import csv
 import io
@@ -31,7 +31,7 @@ def query(registry, sql, *more):
 
 
 @pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(b"no Parquet")])
-def test_a_damaged_file_is_not_said_to_be_a_fault_of_the_query(registry, tmp_path, capsys, damage):
+def test_a_damaged_file_is_not_reported_as_a_fault_of_the_query(registry, tmp_path, capsys, damage):
     copy = tmp_path / "registry"
     shutil.copytree(registry, copy)
     assert main(["registry", "relocate", "--registry", str(copy)]) == 0
@@ -42,7 +42,7 @@ def test_a_damaged_file_is_not_said_to_be_a_fault_of_the_query(registry, tmp_pat
     assert "'turnout query --list' names the tables, views and macros" in capsys.readouterr().err
 
 
-def test_a_registry_that_another_program_writes_is_not_said_to_be_damaged(registry, tmp_path, capsys):
+def test_a_registry_that_another_program_has_open_is_not_reported_as_damaged(registry, tmp_path, capsys):
     shutil.copytree(registry, tmp_path / "registry")
     file = tmp_path / "registry" / "registry.duckdb"
     program = f"import duckdb\nheld = duckdb.connect({str(file)!r})\nprint('held', flush=True)\ninput()"
@@ -80,7 +80,7 @@ def test_a_registry_that_another_program_writes_is_not_said_to_be_damaged(regist
         "from 'http://127.0.0.1:9/x.parquet'",
     ],
 )
-def test_a_query_that_writes_or_leaves_the_registry_is_rejected(registry, sql, capsys):
+def test_a_query_that_writes_or_accesses_other_files_is_rejected(registry, sql, capsys):
     before = {p: p.read_bytes() for p in registry.parent.rglob("*") if p.is_file() and p.name != ".lock"}
     assert query(registry, sql.format(root=registry.parent)) != 0
     assert "sesame" not in capsys.readouterr().out
@@ -101,7 +101,7 @@ def test_a_query_that_writes_or_leaves_the_registry_is_rejected(registry, sql, c
         "from worklist(timestamp '2026-02-01')",
     ],
 )
-def test_queries_answer(registry, sql):
+def test_queries_that_only_read_are_accepted(registry, sql):
     assert query(registry, sql) == 0
 
 
@@ -114,7 +114,7 @@ def test_a_csv_has_no_formula(registry, tmp_path):
     assert stream.getvalue() == "name\n'+x\n-2.0\n"
 
 
-def test_a_misspelt_name_is_told_where_a_query_gives_no_row(registry, capsys):
+def test_a_misspelt_name_is_reported_if_a_query_returns_no_row(registry, capsys):
     assert query(registry, "from turnouts where turnout_id = 't11'") == 0
     assert capsys.readouterr().err == "The registry has no 't11'. Did you mean 't1'?\n"
     for sql in ("from turnouts where turnout_id = 't1' and name = ''", "select 'T1'"):

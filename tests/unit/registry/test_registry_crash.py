@@ -1,4 +1,4 @@
-"""Killed at any moment, out of space, locked out: nothing lost, nothing half, and the same bytes afterwards."""
+"""A killed process, a full disk or a lock loses no row and leaves no partial state; a new run gives the same bytes."""
 
 import errno
 import os
@@ -28,8 +28,8 @@ REGISTER = (
 
 
 @pytest.fixture(scope="module")
-def calm(tmp_path_factory):
-    """Two batches, the registry after the first and after both, never disturbed."""
+def undisturbed_run(tmp_path_factory):
+    """Two batches, and the registry after the first and after both, without an interruption."""
     root = tmp_path_factory.mktemp("calm")
     (root / "work").mkdir()
     first, second = two_nights(Bench(root), hammer_result)
@@ -40,9 +40,9 @@ def calm(tmp_path_factory):
 
 
 @pytest.fixture
-def after_one(calm, bench):
-    """The registry after the first batch, to disturb."""
-    shutil.copytree(calm[0] / "one", bench.registry)
+def after_one(undisturbed_run, bench):
+    """The registry after the first batch, for a test to interrupt."""
+    shutil.copytree(undisturbed_run[0] / "one", bench.registry)
     rebuild_database(bench.registry)
     return bench
 
@@ -54,14 +54,16 @@ def two_nights(bench, hammer):
 
 
 def start_register(registry, night):
-    """A process that registers ``night``, past its imports."""
+    """Start a process that registers ``night``; return it when its imports are complete."""
     writer = subprocess.Popen([sys.executable, "-c", REGISTER, str(registry), *map(str, night)], stdout=subprocess.PIPE)
     writer.stdout.readline()
     return writer
 
 
-def test_killed_at_random_moments_and_started_again_gives_the_same_bytes(bench, calm, hashes):
-    undisturbed, first, second = calm
+def test_a_registration_that_is_killed_at_random_times_and_started_again_gives_the_same_bytes(
+    bench, undisturbed_run, hashes
+):
+    undisturbed, first, second = undisturbed_run
     writer, began = start_register(bench.registry.with_name("timed"), [first]), time.monotonic()
     writer.communicate()
     lasts = time.monotonic() - began
@@ -75,7 +77,7 @@ def test_killed_at_random_moments_and_started_again_gives_the_same_bytes(bench, 
             writer.wait()
             writer.stdout.close()
         register(night, bench.registry, read=read_results)
-    assert killed >= 3, "the kills came too late to mean anything"
+    assert killed >= 3, "too few processes were killed before they ended"
     vacuum(bench.registry)
     assert hashes(bench.registry) == hashes(undisturbed / "two")
     assert check(bench.registry) == []
@@ -86,8 +88,10 @@ STEPS = ["write_sorted", "write_durably", "commit", "build_database", "delete_fi
 
 @pytest.mark.parametrize("step", STEPS)
 @pytest.mark.parametrize("when", ["before", "after"])
-def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(after_one, calm, hashes, monkeypatch, step, when):
-    bench, (undisturbed, first, second) = after_one, calm
+def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(
+    after_one, undisturbed_run, hashes, monkeypatch, step, when
+):
+    bench, (undisturbed, first, second) = after_one, undisturbed_run
     module = registration if step == "write_sorted" else publication
     real, calls = getattr(module, step), []
 
@@ -112,8 +116,8 @@ def test_a_stop_at_any_step_leaves_the_old_or_the_new_state(after_one, calm, has
     assert hashes(bench.registry) == hashes(undisturbed / "two")
 
 
-def test_a_full_disk_changes_nothing_and_says_what_to_do(after_one, calm, hashes):
-    bench, (_, first, second) = after_one, calm
+def test_a_full_disk_changes_nothing_and_its_error_states_the_remedy(after_one, undisturbed_run, hashes):
+    bench, (_, first, second) = after_one, undisturbed_run
     before = hashes(bench.registry, without=())
     limited = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000)); {REGISTER}"
     arguments = [sys.executable, "-c", limited, str(bench.registry), str(first), str(second)]
@@ -127,7 +131,7 @@ def test_a_full_disk_changes_nothing_and_says_what_to_do(after_one, calm, hashes
     assert bench.ask("select count(*) from modes") == [(96,)]
 
 
-def test_a_locked_registry_is_said_and_left_alone(bench, hammer):
+def test_a_locked_registry_is_an_error_and_is_not_changed(bench, hammer):
     bench.register(hammer())
     with (
         FileLock(bench.registry / ".lock"),
@@ -141,7 +145,9 @@ def test_a_locked_registry_is_said_and_left_alone(bench, hammer):
 
 @pytest.mark.parametrize("code", [errno.EACCES, errno.ENOSPC, errno.EIO])
 @pytest.mark.parametrize("part", ["generations", "_generation.json"])
-def test_a_list_that_cannot_be_written_is_said_and_the_former_one_counts(part, code, bench, hammer, monkeypatch):
+def test_a_list_that_cannot_be_written_is_an_error_and_the_former_list_stays_valid(
+    part, code, bench, hammer, monkeypatch
+):
     bench.register(hammer())
     replace = os.replace
 
@@ -160,7 +166,7 @@ def test_a_list_that_cannot_be_written_is_said_and_the_former_one_counts(part, c
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_registry_without_permission_is_said(bench, hammer):
+def test_a_registry_without_write_permission_is_an_error(bench, hammer):
     bench.register(hammer())
     bench.registry.chmod(0o500)
     try:

@@ -1,4 +1,4 @@
-"""A registry without a single measurement answers every view and macro, offline, and opens in older DuckDB."""
+"""A registry without measurements answers queries of every view and macro, offline, and opens in older DuckDB."""
 
 import csv
 
@@ -13,7 +13,7 @@ from turnout.registry.documentation import views
 from turnout.registry.job import register
 from turnout.registry.view_texts import view_columns
 
-# DuckDB writes its storage version behind the magic bytes of the main header; 64 was written by all of 0.9.2 to 1.2.
+# DuckDB writes its storage version after the magic bytes of the main header; versions 0.9.2 to 1.2 write 64.
 MAGIC, OLDEST_READ_BY_1_2 = b"DUCK", 64 + 3
 ARGUMENTS = {
     "section": "'t1/A7'", "resonance": "'ballast'", "days": "365", "asof": "timestamp '2026-01-01'", "most": "20",
@@ -32,21 +32,21 @@ def empty(tmp_path_factory):
 
 
 def sql_of(call):
-    """The view, or the macro with one value for each of its parameters, by position."""
+    """The query of the view, or of the macro with one value for each parameter, by position."""
     name, _, parameters = call.partition("(")
     wanted = [p.split(":=")[0].strip() for p in parameters.rstrip(")").split(",") if p.strip()]
     return f"from {name}" + (f"({', '.join(ARGUMENTS[p] for p in wanted)})" if wanted else "")
 
 
 @pytest.mark.parametrize("call", sorted(views()))
-def test_every_view_and_macro_answers_when_there_is_nothing(empty, call):
+def test_every_view_and_macro_can_be_queried_without_measurements(empty, call):
     with open_registry(empty) as connection:
         rows = connection.execute(sql_of(call)).fetchall()
     assert len(rows) == {"registry_info": 1, "reasons": len(REASONS)}.get(call, 0)
 
 
 @pytest.mark.parametrize("path", ["r.main", "memory.main,r.main"])
-def test_every_view_and_macro_answers_in_an_attached_registry_on_the_search_path(empty, path):
+def test_every_view_and_macro_can_be_queried_in_an_attached_registry_on_the_search_path(empty, path):
     with duckdb.connect() as connection:
         connection.execute(f"attach '{empty}/registry.duckdb' as r (read_only)")
         for call in [c for c in views() if "(" not in c]:
@@ -57,17 +57,17 @@ def test_every_view_and_macro_answers_in_an_attached_registry_on_the_search_path
             connection.execute(bench_registry._sql(call)).fetchall()
 
 
-def test_there_are_at_least_the_views_that_users_were_promised():
-    promised = {
+def test_the_registry_has_all_documented_views():
+    documented = {
         "modes_current", "models_current", "epochs", "section_trend", "resonance_drift", "change_since_event",
         "rejected", "cannot_see", "quarantine_open", "fleet_state", "campaigns_of", "fit_by_type", "fit_by_speed",
         "fit_by_axle_load", "passage_fits_weekly", "fit_by_cluster_week", "sections_whose_scores_fell",
         "passages_behind",
     }  # fmt: skip
-    assert promised <= {call.partition("(")[0] for call in views()}
+    assert documented <= {call.partition("(")[0] for call in views()}
 
 
-def test_storage_is_of_version_1_2(empty):
+def test_the_storage_version_is_1_2(empty):
     with open(empty / "registry.duckdb", "rb") as stream:
         header = stream.read(32)
     assert header[8:12] == MAGIC
@@ -77,7 +77,7 @@ def test_storage_is_of_version_1_2(empty):
     assert tags[0][0]["storage_version"].startswith("v1.2.0")
 
 
-def test_nothing_is_loaded_from_anywhere(empty):
+def test_no_extension_is_loaded_or_installed(empty):
     with open_registry(empty) as connection:
         settings = connection.execute(
             "select name, value from duckdb_settings() where name like 'auto%known_extensions' order by 1"
@@ -87,12 +87,12 @@ def test_nothing_is_loaded_from_anywhere(empty):
             connection.execute("create table x(i integer)")
 
 
-def test_the_database_holds_no_rows(empty):
+def test_the_database_contains_no_tables(empty):
     with open_registry(empty) as connection:
         assert connection.execute("select count(*) from duckdb_tables()").fetchall() == [(0,)]
 
 
-def test_columns_carry_their_unit_as_a_comment(empty):
+def test_the_comment_of_a_column_contains_its_unit(empty):
     with open_registry(empty) as connection:
         comments = connection.execute(
             "select comment from duckdb_columns() where table_name in ('modes', 'modes_current') "
@@ -112,21 +112,21 @@ def test_query_prints_a_table_and_writes_csv(empty, tmp_path, capsys):
     assert capsys.readouterr().out.endswith("(2 of 100 rows)\n")
 
 
-def test_a_wrong_query_is_one_message_and_exit_code_2(empty, capsys):
+def test_a_wrong_query_gives_one_message_and_exit_code_2(empty, capsys):
     assert main(["query", "from modes_curent", "--registry", str(empty)]) == 2
-    said = capsys.readouterr().err
-    assert "modes_curent" in said and "turnout query --list" in said and "Traceback" not in said
+    message = capsys.readouterr().err
+    assert "modes_curent" in message and "turnout query --list" in message and "Traceback" not in message
 
 
-def test_the_registry_command_looks_after_it(empty, capsys):
-    for action, said in [
+def test_the_registry_command_checks_compacts_and_describes_an_empty_registry(empty, capsys):
+    for action, message in [
         ("check", "The files of the registry agree with its list."),
         ("compact", "Nothing to do."),
         ("vacuum", "Nothing to delete."),
         ("relocate", "views over"),
     ]:
         assert main(["registry", action, "--registry", str(empty)]) == 0
-        assert said in capsys.readouterr().out
+        assert message in capsys.readouterr().out
     assert main(["registry", "describe", "section_trend"]) == 0
     assert "frequency_hz" in capsys.readouterr().out
     assert main(["registry", "describe", "section_trends"]) == 2

@@ -1,7 +1,7 @@
-"""Small runs of ``python -m benchmarks robustness``: readers during nightly runs, and bits that flip in live files."""
+"""Small runs of ``python -m benchmarks robustness``: readers during nightly runs, and flipped bits in live files."""
 
 
-def test_bits_that_flip_in_live_files_change_no_row_and_each_file_is_named(repository, tmp_path, monkeypatch):
+def test_flipped_bits_in_live_files_change_no_row_and_each_file_is_reported(repository, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(repository))
     from benchmarks.bit_flips import flip_bits
 

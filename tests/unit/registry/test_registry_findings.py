@@ -1,4 +1,4 @@
-"""Findings in the registry: what grows, what reads wrong, what nobody can name, against numpy from the rows."""
+"""Views of findings: growth, wrong gains, mismatches without a name. The expected values are computed with numpy."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -14,7 +14,7 @@ YEAR = 365.25 * 86400.0
 
 
 def visit(turnout, day, verdict="named", term=None, values=(), sections="A7, A8", rival=None, accepted=False):
-    """Result of one visit; ``values`` are (parameter, value, se, unit, place, channel)."""
+    """Result of one visit; ``values`` are (parameter, value, se, unit, position, channel)."""
     found = START + timedelta(days=day)
     identity = f"{turnout}-{sections}-{day}"
     finding = {
@@ -55,11 +55,11 @@ EVENT = {
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
     results = [gap("t1", d, v, s) for d, (v, s) in zip(DAYS, GROWING)]
-    results += [gap("t2", d, 0.5e-3 + 1e-6 * (d % 7), 0.05e-3) for d in DAYS]  # stays
-    results += [gap("t3", d, 0.5 * v, s) for d, (v, s) in zip(DAYS[:3], GROWING)]  # grows, small, then gone
+    results += [gap("t2", d, 0.5e-3 + 1e-6 * (d % 7), 0.05e-3) for d in DAYS]  # constant
+    results += [gap("t3", d, 0.5 * v, s) for d, (v, s) in zip(DAYS[:3], GROWING)]  # grows, is small, then repaired
     results.append(visit("t3", 300, verdict="none"))
     results += [gap("t4", d, v, s) for d, (v, s) in zip(DAYS[:2], GROWING)]  # tamped since
-    results.append(gap("t5", 0, 0.8e-3, 0.05e-3))  # seen once
+    results.append(gap("t5", 0, 0.8e-3, 0.05e-3))  # measured once
     gain = [("gain", 1.31, 0.02, "-", None, "A8")]
     results.append(visit("t6", 0, term="sensor_gain", values=gain))
     results.append(visit("t7", 0, term="sensor_gain", values=[("gain", 1.03, 0.04, "-", None, "A7")]))
@@ -89,7 +89,7 @@ def fleet(tmp_path_factory):
 
 
 def straight_line(days, values, errors):
-    """Slope per year and its standard error by numpy's weighted polynomial."""
+    """Slope per year and its standard error by the weighted polynomial fit of numpy."""
     year = np.array(days) * 86400.0 / YEAR
     fit, covariance = np.polyfit(year, values, 1, w=1.0 / np.array(errors), cov="unscaled")
     return fit[0], np.sqrt(covariance[0, 0])
@@ -108,7 +108,7 @@ def test_growth_is_the_weighted_straight_line(fleet):
     alone = fleet.execute("select per_year, per_year_se from parameter_growth where n_visits = 1").fetchall()
     assert set(alone) == {(None, None)}
     assert not frame.is_open["t3"] and frame.is_open["t1"]
-    assert "t4" not in frame.index  # its visits lie before the tamping
+    assert "t4" not in frame.index  # all its visits are before the tamping
 
 
 def test_hanging_sleepers_that_grow_are_large_open_and_growing(fleet):
@@ -117,7 +117,7 @@ def test_hanging_sleepers_that_grow_are_large_open_and_growing(fleet):
     assert fleet.execute("from hanging_sleepers_that_grow(above := 0.001)").fetchall() == []
 
 
-def test_a_wrong_gain_excludes_one_and_is_still_there(fleet):
+def test_a_wrong_gain_is_listed_if_its_interval_excludes_1_and_the_finding_is_current(fleet):
     rows = fleet.execute(
         "select turnout_id, channel, gain, gain_low, gain_high from sensors_with_wrong_gain where turnout_id <> 't11'"
     ).fetchall()
@@ -126,14 +126,14 @@ def test_a_wrong_gain_excludes_one_and_is_still_there(fleet):
     assert (low, high) == pytest.approx((1.31 - 1.959964 * 0.02, 1.31 + 1.959964 * 0.02))
 
 
-def test_tamping_mends_no_sensor(fleet):
-    """Ballast work undoes what was found of the ballast; a gain of one half is still one half."""
+def test_tamping_does_not_end_a_finding_of_a_sensor(fleet):
+    """Tamping ends findings of the ballast; a gain of 0.5 stays a gain of 0.5."""
     asked = "select channel, gain from sensors_with_wrong_gain where turnout_id = 't11'"
     assert fleet.execute(asked).fetchall() == [("A7", 0.5)]
 
 
-def test_a_finding_ends_when_each_of_its_sections_was_looked_at_again(fleet):
-    """Sections come and go from visit to visit: A9 of t12 has not been looked at since, in t13 all have."""
+def test_a_finding_ends_when_each_of_its_sections_has_a_later_finding(fleet):
+    """The sections of visits differ: A9 of t12 has no later finding, all sections of t13 have one."""
     asked = "select sections, verdict from findings_newest where turnout_id = ? order by all"
     assert fleet.execute(asked, ["t12"]).fetchall() == [
         ("A7, A8, A9", "unknown"), ("A8", "none"), ("OT, SP", "named"), ("SP", "none"),
@@ -147,7 +147,7 @@ def test_a_finding_ends_when_each_of_its_sections_was_looked_at_again(fleet):
     assert grown.fetchall() == [("t12", True), ("t13", False)]
 
 
-def test_what_nobody_can_name_is_unknown_or_one_of_two(fleet):
+def test_mismatches_without_a_name_are_those_with_the_answer_unknown_or_a_or_b(fleet):
     rows = fleet.execute("select turnout_id, verdict, term, rival_term from mismatches_without_name order by all")
     assert rows.fetchall() == [
         ("t10", "a_or_b", "local_ballast", "hanging_sleeper"), ("t12", "unknown", None, None),
@@ -155,7 +155,7 @@ def test_what_nobody_can_name_is_unknown_or_one_of_two(fleet):
     ]  # fmt: skip
 
 
-def test_the_newest_visit_of_each_group_counts(fleet):
+def test_the_newest_finding_of_each_group_of_sections_is_current(fleet):
     rows = fleet.execute(
         "select sections, verdict from findings_newest where turnout_id = 't9' order by all"
     ).fetchall()
@@ -163,7 +163,7 @@ def test_the_newest_visit_of_each_group_counts(fleet):
     assert fleet.execute("select verdict from findings_newest where turnout_id = 't8'").fetchall() == [("none",)]
 
 
-def test_a_rejected_finding_takes_its_parameters_and_curves_with_it(tmp_path):
+def test_parameters_and_curves_of_a_rejected_finding_are_rejected_too(tmp_path):
     bad = gap("t1", 0, 0.4e-3, 0.1e-3)
     bad.tables["mismatch_findings"][0]["verdict"] = "perhaps"
     bench = Bench(tmp_path)
@@ -172,7 +172,7 @@ def test_a_rejected_finding_takes_its_parameters_and_curves_with_it(tmp_path):
         assert bench.ask(f"select count(*) from {table}") == [(0,)]
 
 
-def test_a_turnout_that_was_taken_out_has_nothing_to_look_after(tmp_path):
+def test_a_removed_turnout_is_in_no_list_of_findings(tmp_path):
     bench = Bench(tmp_path)
     results = []
     for t in ("t1", "t2"):
@@ -188,8 +188,8 @@ def test_a_turnout_that_was_taken_out_has_nothing_to_look_after(tmp_path):
             assert found == [(row["turnout_id"],) for row in there], name
 
 
-def test_work_that_is_planned_undoes_nothing_yet(tmp_path):
-    """Tamping is entered for next month: the sleeper hangs until then, and the last work is the one before."""
+def test_planned_maintenance_has_no_effect_before_its_day(tmp_path):
+    """Tamping is planned for next month: the finding stays open until then, and the last event is the earlier one."""
     then = (datetime.now(UTC) + timedelta(days=30)).replace(tzinfo=None).isoformat()
     planned = EVENT | {"event_id": "e9", "turnout_id": "t1", "section_id": None, "event_at_utc": then}
     done = planned | {"event_id": "e8", "kind": "grinding", "event_at_utc": START.isoformat(), "resets_ballast": False}
@@ -219,7 +219,7 @@ def line_limits(days, values, errors, size):
     return [365.25 * brentq(limit, mean, 50.0, args=(sign,)) for sign in (1.0, -1.0)]
 
 
-def test_a_gap_that_grows_has_a_date_for_its_limit(fleet):
+def test_a_growing_gap_has_dates_at_which_it_reaches_its_limit(fleet):
     rows = fleet.execute("from growth_to_limit()").df().set_index("turnout_id")
     earliest, latest = line_limits(DAYS, *zip(*GROWING), 2e-3)
     for column, days in (("not_before_utc", earliest), ("not_after_utc", latest)):
@@ -236,8 +236,8 @@ def test_a_gap_that_grows_has_a_date_for_its_limit(fleet):
     assert fleet.execute(asked).fetchall() == [("open", None)]
 
 
-def test_the_page_has_the_dates_of_significant_growth_alone(fleet):
-    """Of the fleet only t1 grows by more than 1.96 standard errors; t2 stays, t5 was seen once."""
+def test_the_page_has_dates_only_for_significant_growth(fleet):
+    """Only the gap of t1 grows by more than 1.96 standard errors; that of t2 is constant, t5 has one visit."""
     from turnout.report.pages.turnout import mismatches_with_limits
     from turnout.report.source import FleetSource
 
@@ -248,12 +248,12 @@ def test_the_page_has_the_dates_of_significant_growth_alone(fleet):
     (finding,) = rows["mismatches"]["t1"]
     expected = f"hanging sleeper at 24.6 m: {words}"
     assert mismatches_with_limits([finding], [limit]) == [(finding["sentence"], [expected])]
-    assert mismatches_with_limits([], [limit]) == [("", [expected])]  # accepted, and nothing beyond it
+    assert mismatches_with_limits([], [limit]) == [("", [expected])]  # accepted, and no further mismatch
     assert mismatches_with_limits([finding], []) == [(finding["sentence"], [])]
 
 
-def test_a_stiffness_that_falls_has_the_dates_of_the_gap_that_it_mirrors(tmp_path):
-    """A factor of 1 - 250 g falls to 0.5 when a gap g reaches 2 mm; one that rises has no date."""
+def test_a_falling_stiffness_has_the_same_dates_as_the_growing_gap_from_which_it_is_computed(tmp_path):
+    """A factor of 1 - 250 g falls to 0.5 when a gap g reaches 2 mm; a rising factor has no date."""
     from turnout.report.source import FleetSource
 
     def stiffness(turnout, day, value, error):
@@ -277,7 +277,7 @@ def test_a_stiffness_that_falls_has_the_dates_of_the_gap_that_it_mirrors(tmp_pat
     assert of_factor[3].startswith(f"factor reaches 0.5 not before {of_gap[1]:%Y-%m-%d}, by ")
 
 
-def test_a_gap_that_shrinks_has_no_date_on_the_page(tmp_path):
+def test_a_shrinking_gap_has_no_date_on_the_page(tmp_path):
     from turnout.report.source import FleetSource
 
     bench = Bench(tmp_path)
@@ -289,8 +289,8 @@ def test_a_gap_that_shrinks_has_no_date_on_the_page(tmp_path):
         assert list(FleetSource(connection).rows_of(["t1", "t2"])["limits"]) == ["t1"]
 
 
-def test_dates_of_a_limit_cover_the_true_one():
-    """Linear growth with known noise: of 2000 lines, the date at which the true line reaches the limit is inside."""
+def test_the_interval_of_dates_covers_the_true_date_in_95_percent_of_cases():
+    """2000 lines of linear growth with known noise: the date at which the true line reaches the limit is inside."""
     import duckdb
 
     from turnout.registry.view_texts import view_files

@@ -1,4 +1,4 @@
-"""Effects of train type, speed and axle load on the scores, in SQL, against statsmodels with dummy variables."""
+"""SQL views of the effects of train type, speed and axle load on scores, compared with statsmodels."""
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ def scored(fleet):
 
 
 def least_squares(rows, column):
-    """Result of statsmodels (HC3) with a level per type, speed in 10 km/h and load in t, and its design."""
+    """Result of statsmodels (HC3) with one level per type, speed in 10 km/h and load in t, and the design matrix."""
     design = pd.get_dummies(rows.train_type, dtype=float)
     design["speed"], design["load"] = rows.speed_kmh / 10, rows.axle_load_t
     return sm.OLS(rows[column], design).fit(cov_type="HC3"), design
@@ -41,7 +41,7 @@ def test_adjusted_effects_equal_those_of_a_design_matrix(fleet, scored, score, f
 
 
 @pytest.mark.parametrize("freedom", [5, 8, 12, 40, 400])
-def test_the_quantile_of_the_intervals_is_that_of_student(freedom):
+def test_the_quantile_of_the_intervals_is_that_of_students_t(freedom):
     made = 1.96 + 2.3724 / freedom + 2.8225 / freedom**2 + 2.56 / freedom**3
     assert made == pytest.approx(stats.t.ppf(0.975, freedom), abs=0.005)
 
@@ -68,8 +68,8 @@ def test_adjusted_bars_are_means_of_partial_residuals(fleet, scored):
         assert (level + speed + load + found.resid).corr(own.fit_pct) > 0.5
 
 
-def test_without_loads_the_speed_is_adjusted_for_the_type_alone(bench):
-    """Half of the loads unknown: no effect of the load, the speed holds only the type fixed; bars of what is known."""
+def test_without_loads_the_speed_is_adjusted_only_for_the_type(bench):
+    """Half of the loads are unknown: no effect of the load; the speed effect holds only the type fixed."""
     results = passage_results(n=120)
     for result in results[::2]:
         result.tables["passages"][0]["axle_load_t"] = None
@@ -87,7 +87,7 @@ def test_without_loads_the_speed_is_adjusted_for_the_type_alone(bench):
     assert bars.to_dict() == {"train type": len(rows), "speed": len(rows), "axle load": rows.axle_load_t.count()}
 
 
-def test_one_type_at_one_speed_has_no_effects_and_still_its_bars(bench):
+def test_one_type_at_one_speed_has_bars_and_no_effects(bench):
     results = passage_results(n=40)
     for result in results:
         result.tables["passages"][0] |= {"train_type": "IC", "speed_kmh": 120.0, "axle_load_t": 15.0}
@@ -99,7 +99,7 @@ def test_one_type_at_one_speed_has_no_effects_and_still_its_bars(bench):
 
 
 def without_channels(registry):
-    """What depends on how many passages there were, of every view that compares scores."""
+    """Columns that depend on the number of passages, of every view that compares scores."""
     of = {
         "fit_effects": ("score, factor", "change_pct, change_se_pct, low_pct, high_pct, raw_change_pct"),
         "fit_adjusted": (
@@ -120,8 +120,8 @@ def without_channels(registry):
     return {v: registry.frame(ask.format(v, values, keys)) for v, (keys, values) in of.items()}
 
 
-def test_sensors_that_hear_the_same_train_are_no_trains_of_their_own(bench, tmp_path):
-    """Two more sensors beside each, that say the same: no mean moves, and no error gets smaller."""
+def test_several_sensors_of_one_passage_count_as_one_passage(bench, tmp_path):
+    """Two more sensors at each section with the same scores change no mean and reduce no error."""
     once, thrice = passage_results(n=200), passage_results(n=200)
     for result in thrice:
         fits = result.tables["passage_fits"]
@@ -138,8 +138,8 @@ def test_sensors_that_hear_the_same_train_are_no_trains_of_their_own(bench, tmp_
     ]
 
 
-def test_errors_are_those_of_passages_where_sensors_hear_alike(bench):
-    """Three sensors whose scores share four fifths of their scatter: errors from the means of each passage."""
+def test_errors_are_computed_from_passages_if_the_scores_of_sensors_are_correlated(bench):
+    """Three sensors share four fifths of their scatter: the errors are those of the means of each passage."""
     rng, results = np.random.default_rng(5), passage_results(n=150)
     for result in results:
         fits, common = [f for f in result.tables["passage_fits"] if f["channel"] == "a_A7"], rng.normal(0, 4)

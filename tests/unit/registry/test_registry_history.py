@@ -1,4 +1,4 @@
-"""Generations are kept for a day: for who opened one before, and for who asks what it said."""
+"""Generations are kept for a day, for readers that opened one earlier and for queries of an earlier state."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ COUNT = "select count(*) from modes"
 
 
 def pass_time(registry, span):
-    """Let ``span`` pass: all generations were published that much earlier."""
+    """Simulate that ``span`` has passed: date the publication of all generations back by it."""
     for number, (path, time) in history(registry).items():
         path.rename(path.with_name(f"{number:06d}-{(time - span).strftime(TIME_FORMAT)}.json"))
 
@@ -34,8 +34,8 @@ def count_as_of(registry, as_of):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Generations 1 to 3 add a mode each, 4 merges them."""
+def registered(tmp_path_factory):
+    """Generations 1 to 3 add one mode each, generation 4 merges their files."""
     root = tmp_path_factory.mktemp("made")
     (root / "work").mkdir()
     bench = Bench(root)
@@ -46,14 +46,14 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture
-def merged(made, tmp_path):
-    shutil.copytree(made.root, tmp_path / "copy")
+def merged(registered, tmp_path):
+    shutil.copytree(registered.root, tmp_path / "copy")
     bench = Bench(tmp_path / "copy")
-    bench.batches = [bench.root / "work" / b.name for b in made.batches]
+    bench.batches = [bench.root / "work" / b.name for b in registered.batches]
     return bench
 
 
-def test_who_opened_the_registry_can_read_it_for_a_day_whatever_is_published_meanwhile(merged, hammer):
+def test_an_open_registry_can_be_read_for_a_day_while_other_generations_are_published(merged, hammer):
     merged.register(hammer("t1", day="2026-01-26"))
     with open_registry(merged.registry) as reader:
         for k in range(2):
@@ -65,7 +65,7 @@ def test_who_opened_the_registry_can_read_it_for_a_day_whatever_is_published_mea
         assert reader.execute(COUNT).fetchall() == [(4,)]
 
 
-def test_what_no_generation_of_the_last_day_names_is_deleted(merged, hammer):
+def test_files_that_no_generation_of_the_last_day_uses_are_deleted(merged, hammer):
     assert len(load(merged.registry).retired) >= 3
     pass_time(merged.registry, timedelta(days=1))
     for k in range(2):
@@ -73,14 +73,14 @@ def test_what_no_generation_of_the_last_day_names_is_deleted(merged, hammer):
     generation = load(merged.registry)
     assert {number for _, number in generation.retired} == {5, 6}  # the table of sections was written again
     assert parquet_files(merged.registry) == {f.path for f in generation.files} | {p for p, _ in generation.retired}
-    assert list(history(merged.registry)) == [4, 5, 6]  # the last before that day was read until 5 came
+    assert list(history(merged.registry)) == [4, 5, 6]  # generation 4 was current until 5 was published
     assert [count_as_of(merged.registry, number) for number in (4, 5, 6)] == [3, 4, 5]
     assert check(merged.registry) == [] and vacuum(merged.registry) == []
 
 
 @pytest.mark.parametrize("span", [timedelta(days=-400), timedelta(days=400)])
-def test_a_clock_that_was_wrong_keeps_nothing_for_ever_and_takes_nothing_at_once(merged, hammer, span):
-    """All times so far lie in the future, or long ago: two more generations are kept, then the files go."""
+def test_after_a_wrong_clock_files_are_kept_for_two_generations_and_then_deleted(merged, hammer, span):
+    """All times are in the future, or long ago: the files are kept for two more generations and then deleted."""
     pass_time(merged.registry, span)
     with open_registry(merged.registry, as_of=3) as reader:
         merged.register(hammer("t2"))
@@ -89,7 +89,7 @@ def test_a_clock_that_was_wrong_keeps_nothing_for_ever_and_takes_nothing_at_once
     assert {number for _, number in load(merged.registry).retired} == {5, 6}
 
 
-def test_an_earlier_generation_answers_by_number_and_by_time(merged):
+def test_an_earlier_generation_can_be_queried_by_number_and_by_time(merged):
     start = datetime(2026, 11, 24, 6, tzinfo=UTC)
     for number, (path, _) in history(merged.registry).items():
         time = start + timedelta(hours=number)
@@ -120,8 +120,8 @@ def catalogue_of(connection):
     return connection.execute(views).fetchall(), connection.execute(macros).fetchall()
 
 
-def test_an_earlier_generation_has_all_views_and_comments_of_the_present_one(made):
-    with open_registry(made.registry) as now, open_registry(made.registry, as_of=2) as then:
+def test_an_earlier_generation_has_all_views_and_comments_of_the_current_one(registered):
+    with open_registry(registered.registry) as now, open_registry(registered.registry, as_of=2) as then:
         assert catalogue_of(then) == catalogue_of(now)
         for view, _ in catalogue_of(then)[0]:
             then.execute(f'from "{view}"')
@@ -130,7 +130,7 @@ def test_an_earlier_generation_has_all_views_and_comments_of_the_present_one(mad
         ]
 
 
-def test_an_earlier_generation_is_opened_though_no_temporary_file_can_be_written(merged, monkeypatch):
+def test_an_earlier_generation_can_be_opened_without_space_for_a_temporary_file(merged, monkeypatch):
     def full(prefix):
         raise OSError(28, "No space left on device")
 
@@ -138,7 +138,7 @@ def test_an_earlier_generation_is_opened_though_no_temporary_file_can_be_written
     assert count_as_of(merged.registry, 2) == 2
 
 
-def test_the_command_asks_an_earlier_generation_and_reads_nothing_else(merged, capsys, tmp_path):
+def test_the_command_queries_an_earlier_generation_and_reads_no_other_file(merged, capsys, tmp_path):
     assert main(["query", COUNT, "--registry", str(merged.registry), "--as-of", "2"]) == 0
     assert re.search(r"^\s*2$", capsys.readouterr().out, re.M)
     (tmp_path / "secret.csv").write_text("a\n1\n")
@@ -146,7 +146,7 @@ def test_the_command_asks_an_earlier_generation_and_reads_nothing_else(merged, c
         assert main(["query", sql, "--registry", str(merged.registry), "--as-of", "2"]) != 0
 
 
-def test_an_entry_of_a_run_that_was_killed_before_its_generation_counted_is_not_used(merged, hammer):
+def test_the_entry_of_a_run_that_was_killed_before_publication_is_not_used(merged, hammer):
     lost = merged.registry / HISTORY_FOLDER / f"000005-{datetime.now(UTC).strftime(TIME_FORMAT)}.json"
     lost.write_text("cut")
     assert count_as_of(merged.registry, "2999-01-01") == 3
@@ -155,7 +155,7 @@ def test_an_entry_of_a_run_that_was_killed_before_its_generation_counted_is_not_
 
 
 def test_a_generation_that_is_not_published_yet_is_not_listed(merged):
-    """Its file is written first; a run that is killed then leaves it behind."""
+    """Its file is written before publication; a run that is killed in between leaves the file behind."""
     path = merged.registry / HISTORY_FOLDER / "000005-20260101T000000000000Z.json"
     path.write_bytes((merged.registry / "_generation.json").read_bytes())
     assert max(history(merged.registry)) == 4 == load(merged.registry).number

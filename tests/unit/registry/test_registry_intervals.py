@@ -1,4 +1,4 @@
-"""Intervals of modes from the history of their section equal an independent computation, and cover as they promise."""
+"""Intervals of modes from the history of a section equal an independent computation and have the stated coverage."""
 
 from datetime import date, timedelta
 
@@ -14,7 +14,7 @@ N, REPEATABILITY, BETWEEN, SLOPE = 25, 0.002, 0.006, -0.0015  # relative, and pe
 
 
 def campaigns(section, rng, between=BETWEEN, step=None, **mode):
-    """Results of N campaigns, and (frequency, temperature) of each; ``step`` (campaign, factor) changes the section."""
+    """Results of N campaigns, with log frequency and temperature; ``step`` (campaign, factor) changes the section."""
     temperature = np.round(10.0 + 10.0 * np.sin(np.arange(N) * 0.8) + rng.normal(0.0, 3.0, N), 1)  # as stored
     log_f = np.log(150.0) + SLOPE * temperature + rng.normal(0.0, np.hypot(REPEATABILITY, between), N)
     if step is not None:
@@ -29,14 +29,14 @@ def campaigns(section, rng, between=BETWEEN, step=None, **mode):
 
 
 def between_variance(log_f, temperature):
-    """Scatter between campaigns beyond their repeatability, from steps."""
+    """Variance between campaigns beyond their repeatability, from successive differences."""
     step, warmer = np.diff(log_f), np.diff(temperature)
     residual = step - (step @ warmer) / (warmer @ warmer) * warmer
     residual = residual[np.abs(residual) <= 6 * 1.4826 * np.median(np.abs(residual))]
     return max(0.0, residual @ residual / (len(residual) - 1) / 2 - REPEATABILITY**2), len(residual)
 
 
-def test_the_interval_is_that_of_the_steps_of_its_section_and_the_mean_of_the_fleet(bench):
+def test_the_interval_follows_from_the_steps_of_its_section_and_the_mean_of_the_fleet(bench):
     rng = np.random.default_rng(5)
     histories = {
         "A1": campaigns("A1", rng), "A2": campaigns("A2", rng, 0.02), "A3": campaigns("A3", rng, step=(12, 0.7)),
@@ -59,7 +59,7 @@ def test_the_interval_is_that_of_the_steps_of_its_section_and_the_mean_of_the_fl
         np.testing.assert_allclose(np.log(high / low) / 2, half, rtol=0.01)
 
 
-def test_intervals_cover_the_law_of_temperature_in_19_of_20_campaigns(bench):
+def test_intervals_cover_the_frequency_at_the_temperature_in_19_of_20_campaigns(bench):
     """Twelve sections of 25 campaigns: .95 ± .025 (two standard errors)."""
     rng = np.random.default_rng(6)
     histories = [campaigns(f"S{k}", rng) for k in range(12)]
@@ -75,7 +75,7 @@ def test_intervals_cover_the_law_of_temperature_in_19_of_20_campaigns(bench):
     assert np.mean((low <= law) & (law <= high)) == pytest.approx(0.955, abs=0.025)
 
 
-def test_seven_campaigns_are_no_history(bench):
+def test_seven_campaigns_are_too_few_for_a_history(bench):
     results, _, _ = campaigns("A1", np.random.default_rng(7))
     bench.register(*results[:7])
     assert bench.ask("select * from mode_intervals") == []
@@ -106,7 +106,7 @@ def test_the_page_shows_the_interval_of_the_history_with_its_number_of_steps(ben
     for k in (0, N - 1):
         half = 0.5 * (limits[k][1] - limits[k][0])
         assert f"{np.exp(log_f[k]):.1f} Hz ± {half:.2g} (95 %, from {N - 1} differences)" in text
-    assert f">{np.exp(log_f[-1]):.1f} ± {half:.1f}</td>" in text  # the table of the present resonances
+    assert f">{np.exp(log_f[-1]):.1f} ± {half:.1f}</td>" in text  # the table of the newest resonances
 
 
 def test_the_page_of_a_section_without_history_shows_the_interval_of_the_campaign(bench, tmp_path):
@@ -117,8 +117,8 @@ def test_the_page_of_a_section_without_history_shows_the_interval_of_the_campaig
     assert " differences)" not in text
 
 
-def test_the_page_names_a_mode_that_leaves_the_track_of_its_section(bench, tmp_path):
-    """A pole of a third of the damping, 15 % higher; the campaigns before and after it are not named."""
+def test_the_page_reports_a_mode_that_departs_from_the_history_of_its_section(bench, tmp_path):
+    """A pole with a third of the damping and a 15 % higher frequency; the campaigns around it are not reported."""
     results, log_f, _ = campaigns("A1", np.random.default_rng(10), frequency_se_hz=0.3, damping_se=0.002)
     odd = results[9].tables["modes"][0]
     odd |= {"frequency_hz": 1.15 * odd["frequency_hz"], "damping_ratio": 0.03}

@@ -1,4 +1,4 @@
-"""A generation file that names paths outside the registry is not used: nothing is read or deleted there."""
+"""A generation file with paths outside the registry is rejected: no file outside is read or deleted."""
 
 import json
 
@@ -11,7 +11,7 @@ from turnout.workflow.launch import launch
 
 @pytest.mark.parametrize("path", ["../victim", "modes/../../victim", "/etc/passwd", ""])
 @pytest.mark.parametrize("where", ["retired", "files"])
-def test_a_path_out_of_the_registry_is_rejected(tmp_path, path, where):
+def test_a_path_outside_the_registry_is_rejected(tmp_path, path, where):
     registry, victim = tmp_path / "registry", tmp_path / "victim"
     registry.mkdir()
     victim.write_text("x")
@@ -26,7 +26,7 @@ def test_a_path_out_of_the_registry_is_rejected(tmp_path, path, where):
     assert victim.exists()
 
 
-def test_a_folder_without_database_is_rejected_before_anything_is_computed(tmp_path, monkeypatch):
+def test_a_folder_name_that_duckdb_cannot_use_is_rejected_before_any_computation(tmp_path, monkeypatch):
     folder = tmp_path / "what?"
     (folder / "config").mkdir(parents=True)
     (folder / "config" / "turnouts.tsv").write_text("turnout\tlayout\n")

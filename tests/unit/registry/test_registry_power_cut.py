@@ -1,4 +1,4 @@
-"""A power cut keeps what was flushed to the disk: a file gets its name only after its content was flushed."""
+"""A power cut preserves only flushed data: a file is renamed to its final name only after its content is flushed."""
 
 import ast
 import os
@@ -18,7 +18,7 @@ RENAMING = {"replace", "rename", "renames", "move"}
 
 
 def test_only_one_module_renames_files(repository):
-    """``turnout.files`` does, after fsync; all others call it."""
+    """``turnout.files`` renames after fsync; all other modules call it."""
     wrong = []
     for path in sorted((repository / "src" / "turnout").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -30,8 +30,8 @@ def test_only_one_module_renames_files(repository):
     assert not wrong
 
 
-def test_every_file_is_flushed_before_it_gets_its_name(bench, monkeypatch):
-    """Counts system calls of a registration, trends, compaction, relocation and pages."""
+def test_every_file_is_flushed_before_it_is_renamed(bench, monkeypatch):
+    """The test records the system calls of a registration, trends, compaction, relocation and pages."""
     flushed, renamed, unflushed = set(), [], []
     real_sync, real_replace = os.fsync, os.replace
 
@@ -63,11 +63,11 @@ def test_every_file_is_flushed_before_it_gets_its_name(bench, monkeypatch):
     assert {"_schema", "batch", "compact", "_generation.json", "registry.duckdb", "index.html"} <= names
 
 
-def test_an_empty_table_whose_file_was_emptied_is_written_again(bench):
+def test_a_damaged_schema_file_of_an_empty_table_is_written_again(bench):
     bench.register(hammer_result())
-    emptied = sorted(bench.registry.glob("*/_schema-*.parquet"))
-    assert len(emptied) > 5
-    for k, path in enumerate(emptied):
+    damaged = sorted(bench.registry.glob("*/_schema-*.parquet"))
+    assert len(damaged) > 5
+    for k, path in enumerate(damaged):
         path.write_bytes((b"", b"PAR1", b"PAR1" + 4096 * b"\0" + b"PAR1")[k % 3])
     assert any("_schema" in problem for problem in check(bench.registry))
     bench.register(hammer_result(day="2026-01-12"))

@@ -1,4 +1,4 @@
-"""What comes in is there once, whatever way it came; what was computed again replaces what was."""
+"""Each result is registered once, whatever batch contains it; a newly computed result supersedes the earlier one."""
 
 import random
 import subprocess
@@ -22,14 +22,14 @@ def some_results(hammer, quarantined, n_turnouts=5):
     return [*results, quarantined("t9", "A1"), quarantined("t9", "A2", reason="not_finite")]
 
 
-def test_a_result_is_found_by_its_content(bench, hammer):
+def test_a_registered_result_can_be_queried(bench, hammer):
     done = bench.register(hammer(frequency=150.1234))
     assert done.rows["modes"] == done.rows["models"] == done.rows["recordings"] == 1
     rows = bench.ask("select turnout_id, section_id, band, frequency_hz, method from modes_current")
     assert rows == [("t1", "t1/A1", "ballast", 150.123, "joint")]
 
 
-def test_years_lie_apart_and_a_run_makes_one_file_per_table_and_year(bench, hammer, quarantined):
+def test_a_run_writes_one_file_per_table_and_year(bench, hammer, quarantined):
     bench.register(*some_results(hammer, quarantined))
     files = [p.parent.name for p in (bench.registry / "modes").rglob("batch-*.parquet")]
     assert sorted(files) == ["year=2025", "year=2026"]
@@ -52,7 +52,7 @@ def test_the_same_results_in_another_batch_add_nothing(bench, hammer, quarantine
 
 
 @pytest.mark.parametrize("n_batches", [1, 4, 7])
-def test_files_do_not_depend_on_how_the_batches_were_cut(n_batches, tmp_path, hammer, quarantined, hashes):
+def test_files_do_not_depend_on_the_division_into_batches(n_batches, tmp_path, hammer, quarantined, hashes):
     results = some_results(hammer, quarantined)
     random.Random(n_batches).shuffle(results)
     (tmp_path / "work").mkdir()
@@ -79,7 +79,7 @@ def test_files_do_not_depend_on_the_number_of_threads(tmp_path, hammer, hashes):
     assert hashes(tmp_path / "1") == hashes(tmp_path / "2")
 
 
-def test_of_a_unit_in_two_batches_the_later_counts(bench, hammer):
+def test_the_later_batch_decides_for_a_unit_in_two_batches(bench, hammer):
     bench.batch(hammer(file="a", frequency=150.0))
     bench.batch(hammer(file="b", frequency=151.0))
     done = bench.register()
@@ -96,7 +96,7 @@ def test_of_a_unit_in_two_batches_the_later_counts(bench, hammer):
         ({"file": "b", "algo": "2"}, "new_data"),
     ],
 )
-def test_a_unit_computed_again_supersedes_its_model_with_the_reason(bench, hammer, second, reason):
+def test_a_newly_computed_unit_supersedes_its_model_with_the_reason(bench, hammer, second, reason):
     bench.register(hammer(frequency=150.0), hammer(section="A2", frequency=99.0))
     old = bench.ask("select model_id from models where section_id = 't1/A1'")
     done = bench.register(hammer(frequency=151.0, **second))
@@ -110,26 +110,26 @@ def test_a_unit_computed_again_supersedes_its_model_with_the_reason(bench, hamme
     assert bench.ask("select count(*) from recordings_current where section_id = 't1/A1'") == [(1,)]
 
 
-def test_a_configuration_taken_back_makes_the_old_model_count_again(bench, hammer):
+def test_the_old_model_becomes_current_again_if_a_change_of_the_configuration_is_reverted(bench, hammer):
     bench.register(hammer(frequency=150.0, key="k1"))
     bench.register(hammer(frequency=151.0, key="k2"))
     third = bench.register(hammer(frequency=150.0, key="k1"))
     assert bench.ask("select frequency_hz from modes_current") == [(150.0,)]
-    assert "modes" not in third.rows, "its rows were there already"
+    assert "modes" not in third.rows, "its rows are already registered"
     fourth = bench.register(hammer(frequency=151.0, key="k2"))
     assert bench.ask("select frequency_hz from modes_current") == [(151.0,)]
     assert len({r for (r,) in bench.ask("select run_id from runs")}) == 4 and "modes" not in fourth.rows
 
 
-def test_a_run_says_when_it_began_and_ended(bench, hammer):
+def test_a_run_records_its_start_and_end(bench, hammer):
     before = datetime.now(UTC).replace(tzinfo=None)
     bench.register(hammer(key="k1"))
     bench.register(hammer(key="k2"), started_at=datetime(2024, 5, 13, 2, 0))
-    (told, _), (began, ended) = bench.ask("select started_at_utc, ended_at_utc from runs order by all")
-    assert told == datetime(2024, 5, 13, 2, 0) and before <= began <= ended
+    (given, _), (began, ended) = bench.ask("select started_at_utc, ended_at_utc from runs order by all")
+    assert given == datetime(2024, 5, 13, 2, 0) and before <= began <= ended
 
 
-def test_a_repaired_file_leaves_quarantine(bench, hammer, quarantined):
+def test_a_repaired_file_is_no_longer_in_quarantine(bench, hammer, quarantined):
     bench.register(quarantined(section="A1"), quarantined(section="A2"))
     assert bench.ask("select count(*) from quarantine_open") == [(2,)]
     bench.register(hammer(section="A1"))
@@ -138,13 +138,13 @@ def test_a_repaired_file_leaves_quarantine(bench, hammer, quarantined):
     assert bench.ask("select count(*) from quarantine") == [(2,)]
 
 
-def test_a_file_that_fails_in_the_same_way_after_an_update_stays_one_row(bench, quarantined):
+def test_a_file_that_fails_in_the_same_way_after_an_update_keeps_one_row(bench, quarantined):
     bench.register(quarantined(key="x"))
     bench.register(quarantined(key="y"))
     assert bench.ask("select count(*) from quarantine") == bench.ask("select count(*) from quarantine_open") == [(1,)]
 
 
-def test_small_tables_are_replaced_whole_and_units_keep_their_sections(bench, hammer):
+def test_tables_of_the_configuration_are_replaced_and_measured_sections_are_kept(bench, hammer):
     turnouts = [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in ("t1", "t2")]
     events = [
         {
@@ -162,22 +162,22 @@ def test_small_tables_are_replaced_whole_and_units_keep_their_sections(bench, ha
     assert bench.ask("select section_id, panel from sections order by 1") == [("t1/A1", None), ("t1/A7", "CP")]
 
 
-def test_a_section_that_the_layout_names_no_more_is_known_to_have_left_it(bench, hammer):
-    """What was measured without ever being in a layout has left none; who comes back has not left."""
+def test_a_section_that_the_layout_no_longer_has_is_marked(bench, hammer):
+    """A section that was never in a layout has not left one; a section that comes back has no mark."""
     at = {"turnout_id": "t1", "panel": "CP", "track": "main", "position_m": 1.0}
     both = [at | {"section_id": f"t1/{label}", "label": label} for label in ("A7", "A8")]
-    asked = "select label, panel, left_layout from sections order by 1"
+    query = "select label, panel, left_layout from sections order by 1"
     bench.register(hammer(section="A1"), tables={"sections": both})
-    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
+    assert bench.ask(query) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
     bench.register(tables={"sections": both[:1]})
-    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
+    assert bench.ask(query) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
     bench.register(hammer(section="A7", day="2026-02-05"), tables={"sections": both[:1]})
-    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
+    assert bench.ask(query) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", True)]
     bench.register(tables={"sections": both})
-    assert bench.ask(asked) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
+    assert bench.ask(query) == [("A1", None, None), ("A7", "CP", False), ("A8", "CP", False)]
 
 
-def test_two_registrations_at_once_give_the_union(tmp_path, hammer):
+def test_two_registrations_at_the_same_time_give_the_union(tmp_path, hammer):
     (tmp_path / "work").mkdir()
     code = (
         "import sys; from turnout.registry.job import register; from turnout.workflow.batches import read_results;"

@@ -1,4 +1,4 @@
-"""What may not enter is rejected by name, becomes a quarantine row, and stops nothing else."""
+"""A row with a bad value is rejected, becomes a row of the quarantine, and does not affect any other row."""
 
 import json
 import math
@@ -23,21 +23,21 @@ NAN, INF = math.nan, math.inf
 
 
 def results_as_given(path):
-    """The result as the test made it, past the encoding of batches, which turns NaN into NULL."""
-    return iter(HELD[path.name])
+    """Results as the test made them, without the encoding of batches, which turns NaN into NULL."""
+    return iter(RAW_RESULTS[path.name])
 
 
-HELD: dict[str, list[UnitResult]] = {}
+RAW_RESULTS: dict[str, list[UnitResult]] = {}
 
 
 @pytest.fixture
 def register_raw(tmp_path):
-    """Register results that no batch file would hold."""
+    """Register results that no batch file can contain."""
 
     def run(*results):
-        path = tmp_path / f"raw-{len(HELD)}"
-        path.write_text("x" * len(HELD))
-        HELD[path.name] = sorted(results, key=lambda r: r.unit)
+        path = tmp_path / f"raw-{len(RAW_RESULTS)}"
+        path.write_text("x" * len(RAW_RESULTS))
+        RAW_RESULTS[path.name] = sorted(results, key=lambda r: r.unit)
         return register([path], tmp_path / "registry", read=results_as_given)
 
     return run
@@ -68,13 +68,13 @@ BAD_MODES = [
 
 
 @pytest.fixture(scope="module")
-def all_bad_at_once(tmp_path_factory):
-    """Every bad row in a unit of its own, sound units before, between and after them: place and found by section."""
+def all_bad_rows(tmp_path_factory):
+    """Register every bad row in its own unit, with valid units between: place and message by section."""
     root = tmp_path_factory.mktemp("bad")
     bad = [hammer_result(section=f"B{i:02d}", **{c: v}) for i, (c, v, *_) in enumerate(BAD_MODES)]
     sound = [hammer_result(section=s) for s in ("A1", "B05x", "C1")]
     (root / "raw").write_text("raw")
-    HELD["raw"] = sorted([*bad, *sound], key=lambda r: r.unit)
+    RAW_RESULTS["raw"] = sorted([*bad, *sound], key=lambda r: r.unit)
     done = register([root / "raw"], root / "registry", read=results_as_given)
     assert done.n_rejected == len(BAD_MODES)
     with open_registry(root / "registry") as connection:
@@ -86,21 +86,21 @@ def all_bad_at_once(tmp_path_factory):
     return {row[0]: row[1:] for row in rows}, modes
 
 
-def test_bad_rows_stop_no_sound_one(all_bad_at_once):
-    assert all_bad_at_once[1] == [("t1/A1",), ("t1/B05x",), ("t1/C1",)]
+def test_bad_rows_do_not_affect_valid_rows(all_bad_rows):
+    assert all_bad_rows[1] == [("t1/A1",), ("t1/B05x",), ("t1/C1",)]
 
 
 @pytest.mark.parametrize("i", range(len(BAD_MODES)), ids=[f"{c}={v}" for c, v, *_ in BAD_MODES])
-def test_a_bad_value_is_rejected_by_name(all_bad_at_once, i):
-    column, _, said, asked = BAD_MODES[i]
-    place, found, stage, reason, path = all_bad_at_once[0][f"t1/B{i:02d}"]
+def test_the_rejection_of_a_bad_value_states_its_column_value_and_limits(all_bad_rows, i):
+    column, _, bad_value, required = BAD_MODES[i]
+    place, found, stage, reason, path = all_bad_rows[0][f"t1/B{i:02d}"]
     assert place == f"modes, row 1, column {column}"
-    assert said in found.split(", must be ")[0]
-    assert found.split(", must be ")[1].startswith(asked)
+    assert bad_value in found.split(", must be ")[0]
+    assert found.split(", must be ")[1].startswith(required)
     assert (stage, reason, path) == ("register", "internal_error", f"t1/hammer/2026-01-05/B{i:02d}_1.uff")
 
 
-def test_nothing_of_a_rejected_row_is_lost(bench, register_raw, hammer):
+def test_the_quarantine_contains_the_whole_rejected_row(bench, register_raw, hammer):
     register_raw(hammer(frequency=-1.0, damping_se=0.0123))
     found = bench.ask("select found, measured_value from quarantine_open")[0]
     row = json.loads(found[0].split("; row: ")[1])
@@ -109,7 +109,9 @@ def test_nothing_of_a_rejected_row_is_lost(bench, register_raw, hammer):
 
 
 @pytest.mark.parametrize("matrix", [[0.5, NAN], [INF, 0.5], [0.5, None], "0.5 0.5", [["a"]]], ids=str)
-def test_a_list_with_one_bad_element_is_rejected_and_its_modes_with_it(bench, register_raw, hammer, matrix):
+def test_a_model_with_one_bad_element_of_a_list_is_rejected_together_with_its_modes(
+    bench, register_raw, hammer, matrix
+):
     bad = hammer(section="A1")
     bad.tables["models"][0]["a_matrix"] = matrix
     register_raw(bad, hammer(section="A2"))
@@ -125,7 +127,7 @@ def test_the_second_row_of_a_key_is_rejected(bench, register_raw, hammer):
         "model_id"
     ]
     done = register_raw(twice, copied)
-    assert done.n_rejected == 2  # the mode of the copied model goes with it and is no row of its own
+    assert done.n_rejected == 2  # the mode of the copied model is rejected with it, without its own row
     assert bench.ask("select section_id, frequency_hz from modes") == [("t1/A1", 150.0)]
     assert bench.ask("select section_id from models") == [("t1/A1",)]
     places = bench.ask("select turnout_id, place from quarantine_open order by place, section_id")
@@ -156,19 +158,19 @@ def _mode_twice_of_a_bad_model(hammer):
 
 @pytest.mark.parametrize("size", [1, 1024])
 @pytest.mark.parametrize("make", [_same_model_twice, _row_twice, _mode_twice_of_a_bad_model])
-def test_keys_checked_at_the_end_give_the_bytes_of_an_index(tmp_path, monkeypatch, hammer, make, size):
+def test_a_check_of_keys_at_the_end_gives_the_same_bytes_as_an_index(tmp_path, monkeypatch, hammer, make, size):
     monkeypatch.setattr("turnout.registry.job.chunks", partial(chunks, size=size))
     (tmp_path / "raw").write_text("")
-    HELD["raw"] = list(make(hammer))
+    RAW_RESULTS["raw"] = list(make(hammer))
     late = register([tmp_path / "raw"], tmp_path / "late", read=results_as_given)
     monkeypatch.setattr("turnout.registry.job.Registration", lambda *a, **_: Registration(*a, is_indexed=True))
-    HELD["raw"] = list(make(hammer))
+    RAW_RESULTS["raw"] = list(make(hammer))
     at_once = register([tmp_path / "raw"], tmp_path / "at_once", read=results_as_given)
     assert late.n_rejected == at_once.n_rejected > 0
     assert parquet_hashes(tmp_path / "late") == parquet_hashes(tmp_path / "at_once")
 
 
-def test_a_table_or_a_row_of_no_kind_is_rejected(bench, register_raw, hammer):
+def test_an_unknown_table_and_a_row_of_a_wrong_type_are_rejected(bench, register_raw, hammer):
     strange = hammer(section="A1")
     strange.tables["weather"] = [{"rain": 1}]
     strange.tables["impacts"] = ["not a row"]
@@ -180,7 +182,7 @@ def test_a_table_or_a_row_of_no_kind_is_rejected(bench, register_raw, hammer):
     assert bench.ask("select count(*) from modes") == [(1,)]
 
 
-def test_a_quarantine_row_that_is_itself_wrong_still_becomes_one(bench, register_raw, quarantined):
+def test_a_faulty_row_of_the_quarantine_becomes_a_valid_one(bench, register_raw, quarantined):
     wrong = quarantined()
     wrong.tables["quarantine"][0] |= {"kind": "telegram", "path": None, "measured_value": NAN}
     register_raw(wrong)
@@ -188,14 +190,14 @@ def test_a_quarantine_row_that_is_itself_wrong_still_becomes_one(bench, register
     assert rows == [("internal_error", "register", "quarantine, row 1, column kind")]
 
 
-def test_a_rejection_leaves_quarantine_when_the_code_is_fixed(bench, register_raw, hammer):
+def test_a_rejected_row_is_no_longer_in_quarantine_when_the_code_is_fixed(bench, register_raw, hammer):
     register_raw(hammer(frequency=NAN, algo="1"))
     register_raw(hammer(frequency=150.0, algo="2"))
     assert bench.ask("select count(*) from quarantine_open") == [(0,)]
     assert bench.ask("select frequency_hz from modes_current") == [(150.0,)]
 
 
-def test_a_half_written_batch_does_not_stop_the_others(bench, hammer):
+def test_a_truncated_batch_does_not_affect_the_others(bench, hammer):
     sound = bench.batch(hammer(section="A1"))
     broken = bench.batch(hammer(section="A2"))
     whole = broken.read_bytes()
@@ -208,7 +210,7 @@ def test_a_half_written_batch_does_not_stop_the_others(bench, hammer):
     assert bench.ask("select count(*) from modes_current") == [(2,)]
 
 
-def test_a_batch_that_is_gone_does_not_stop_the_others(bench, hammer):
+def test_a_missing_batch_does_not_affect_the_others(bench, hammer):
     gone = bench.batch(hammer(section="A1"))
     bench.batch(hammer(section="A2"))
     gone.unlink()
@@ -217,7 +219,7 @@ def test_a_batch_that_is_gone_does_not_stop_the_others(bench, hammer):
     assert bench.ask("select section_id from modes_current") == [("t1/A2",)]
 
 
-def test_every_double_of_every_table_rejects_nan_and_infinity():
+def test_every_column_of_type_double_rejects_nan_and_infinity():
     connection, tried = connect(), 0
     for table, columns in tables().items():
         connection.execute(create_table(table, f"t_{table}").replace("not null", "").split(", primary key")[0] + ")")
@@ -233,7 +235,7 @@ def test_every_double_of_every_table_rejects_nan_and_infinity():
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         ({"state": ["ok", "fine"]}, "column state: fine, must be one of ok, baseline"),
         ({"epoch": [0, None]}, "column epoch: None, must be given"),
@@ -241,14 +243,14 @@ def test_every_double_of_every_table_rejects_nan_and_infinity():
         ({"zz": [0.0, 1.0]}, "column zz: columns.csv does not know it"),
     ],
 )
-def test_a_derived_table_with_a_bad_row_is_rejected_whole(tmp_path, rows, said):
+def test_a_derived_table_with_a_bad_row_is_rejected_completely(tmp_path, rows, message):
     days = pa.array(["2026-01-01", "2026-01-08"]).cast(pa.timestamp("us"))
     good = {
         "turnout_id": ["t1"] * 2, "section_id": ["t1/A1"] * 2, "band": ["ballast"] * 2, "source": ["hammer"] * 2,
         "measured_at_utc": days, "epoch": [0, 0], "state": ["ok", "ok"], "z": [0.5, NAN], "is_sibling": [True, True],
     }  # fmt: skip
     assert publish(tmp_path / "registry", {"charts": pa.table(good)}).number == 1
-    with pytest.raises(RegistryError, match=said) as caught:
+    with pytest.raises(RegistryError, match=message) as caught:
         publish(tmp_path / "registry", {"charts": pa.table(good | rows)})
     assert "2026-01-08" in str(caught.value) or "zz" in str(caught.value)
     assert publish(tmp_path / "registry", {"charts": pa.table(good)}).number == 1
@@ -256,8 +258,8 @@ def test_a_derived_table_with_a_bad_row_is_rejected_whole(tmp_path, rows, said):
 
 
 @pytest.mark.parametrize("size", [1, 1024])
-def test_an_id_that_two_units_give_is_one_passage_and_a_quarantine_row(bench, monkeypatch, size):
-    """In the same chunk of units or in another one: the second is left out by name, and all else is registered."""
+def test_of_two_passages_with_one_id_one_is_registered_and_the_other_is_in_quarantine(bench, monkeypatch, size):
+    """In the same chunk of units or in another: the second is rejected, and all other rows are registered."""
     monkeypatch.setattr("turnout.registry.job.chunks", partial(chunks, size=size))
     passage = {"turnout_id": "t1", "passage_id": "p", "recording_id": "r", "passed_at_utc": "2026-01-05T10:00:00"}
     passage |= {"status": "accepted", "n_axles": 8, "track": "main", "axle_load_source": "unavailable"}
@@ -271,6 +273,6 @@ def test_an_id_that_two_units_give_is_one_passage_and_a_quarantine_row(bench, mo
     done = bench.register(*units)
     assert done.n_rejected == 1 and bench.ask("select count(*) from passages") == [(1,)]
     assert bench.ask("select count(*) from passage_fits") == [(1,)]
-    said = bench.ask("select reason_code, place, remedy from quarantine_open")
-    assert [(code, place) for code, place, _ in said] == [("internal_error", "passages, row 1, column passage_id")]
-    assert "fault of the stage" in said[0][2]
+    message = bench.ask("select reason_code, place, remedy from quarantine_open")
+    assert [(code, place) for code, place, _ in message] == [("internal_error", "passages, row 1, column passage_id")]
+    assert "fault of the stage" in message[0][2]

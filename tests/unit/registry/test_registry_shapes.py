@@ -1,4 +1,4 @@
-"""Modes are tracked by their shape at two responses where a section has a second one."""
+"""Modes are tracked by their shape at two responses if a section has a second response."""
 
 from datetime import date, timedelta
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 N_CAMPAIGN, N_IMPACT, SE = 24, 10, 0.05
-SWAPPED = (9, 14, 15, 20, 23)  # campaigns in which the other mode has the name
-# two modes that cross, with the same damping; the second sensor moves with the first mode and against the other
+SWAPPED = (9, 14, 15, 20, 23)  # campaigns in which the other mode is identified as this one
+# two crossing modes of equal damping; the second sensor is in phase in the first mode and out of phase in the other
 FREQUENCY = np.linspace([150.0, 162.0], [165.0, 155.0], N_CAMPAIGN)
 RATIO = np.array([0.8 + 0.1j, -0.7 + 0.2j])
 COVARIANCE = SE**2 * np.array([[1.0, 0.3], [0.3, 1.5]])
@@ -40,8 +40,8 @@ def listed(bench, section="A1"):
     return [(day.date() - date(2024, 1, 10)).days // 30 for (day,) in days]
 
 
-def test_modes_that_cross_are_swapped_by_frequency_and_not_by_shape(bench, hammer):
-    """Their frequencies lie within the range of the history, so only the shape shows which of them has the name."""
+def test_swapped_crossing_modes_are_found_by_shape_and_not_by_frequency(bench, hammer):
+    """Both frequencies are within the range of the history, so only the shape distinguishes the two modes."""
     frequency_only = crossing(hammer, np.random.default_rng(1), has_second=False, section="A1")
     both = crossing(hammer, np.random.default_rng(1), has_second=True, section="A2")
     bench.register(*frequency_only, *both)
@@ -52,23 +52,23 @@ def test_modes_that_cross_are_swapped_by_frequency_and_not_by_shape(bench, hamme
     ]
 
 
-def test_a_track_survives_another_mode_in_a_third_of_its_campaigns(bench, hammer):
-    """Seven of the first 20: quartiles would hold both modes, the median deviation holds one."""
+def test_the_history_of_a_mode_is_robust_to_another_mode_in_a_third_of_its_campaigns(bench, hammer):
+    """Seven of the first 20 campaigns: quartiles would include both modes, the median deviation only one."""
     swapped = (1, 3, 6, 9, 12, 15, 18, 23)
     bench.register(*crossing(hammer, np.random.default_rng(4), has_second=True, swapped=swapped))
     assert 23 in listed(bench) and set(listed(bench)) <= set(swapped)
 
 
-def test_intact_sections_keep_their_tracks(bench, hammer):
-    """40 sections with five or more campaigns before: no campaign leaves its track by its shape."""
+def test_no_campaign_of_an_intact_section_is_listed_by_its_shape(bench, hammer):
+    """40 sections with five or more earlier campaigns: no shape is far from its history."""
     rng = np.random.default_rng(2)
     sections = [f"A{k}" for k in range(1, 41)]
     bench.register(*(c for s in sections for c in crossing(hammer, rng, has_second=True, swapped=(), section=s)))
     assert bench.ask("select count(*) from modes_off_track where shape_distance > 5.0") == [(0,)]
 
 
-def test_the_distance_is_that_of_hotelling(bench, hammer):
-    """By numpy: T² of the covariance of this campaign and the median deviation of the track, then equal probability."""
+def test_the_distance_is_that_of_hotellings_t2(bench, hammer):
+    """By numpy: T² with the covariance of the campaign and the median deviation of the history."""
     from scipy.stats import chi2, f
 
     rng = np.random.default_rng(3)
@@ -90,7 +90,7 @@ def test_the_distance_is_that_of_hotelling(bench, hammer):
     assert mac == pytest.approx(expected)
 
 
-def test_four_earlier_shapes_are_no_track(bench, hammer):
+def test_four_earlier_shapes_are_too_few_for_a_history(bench, hammer):
     """The section got its second sensor late: frequency and damping have a history, the shape has none."""
     earlier = [campaign_of(hammer, k, shape=RATIO[0] if k > 1 else None, damping_ratio=0.1) for k in range(6)]
     bench.register(*earlier, campaign_of(hammer, 6, shape=RATIO[1], frequency=190.0, damping_ratio=0.1))

@@ -1,4 +1,4 @@
-"""Compaction, checks, moves and updates leave every answer as it was."""
+"""Compaction, checks, moves and updates change no query result."""
 
 import json
 import os
@@ -21,7 +21,7 @@ ALL_MODES = "select * from modes order by model_id, band"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def registered(tmp_path_factory):
     """Six registrations, one of which supersedes a model."""
     root = tmp_path_factory.mktemp("made")
     (root / "work").mkdir()
@@ -34,16 +34,16 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture
-def five_nights(made, tmp_path):
-    """A copy of it to spoil."""
-    shutil.copytree(made.root, tmp_path / "copy")
+def five_nights(registered, tmp_path):
+    """A copy for a test to change or damage."""
+    shutil.copytree(registered.root, tmp_path / "copy")
     rebuild_database(tmp_path / "copy" / "registry")
     bench = Bench(tmp_path / "copy")
-    bench.batches = [bench.root / "work" / b.name for b in made.batches]
+    bench.batches = [bench.root / "work" / b.name for b in registered.batches]
     return bench
 
 
-def test_compaction_keeps_every_row_and_answer(five_nights):
+def test_compaction_keeps_every_row_and_every_query_result(five_nights):
     before = five_nights.ask(ALL_MODES), five_nights.ask("select * from modes_current order by all")
     done = compact(five_nights.registry)
     assert done["modes/year=2026"] == (6, 21)
@@ -52,14 +52,14 @@ def test_compaction_keeps_every_row_and_answer(five_nights):
     assert compact(five_nights.registry) == {} and check(five_nights.registry) == []
 
 
-def test_compaction_waits_until_it_pays(bench, hammer):
+def test_compaction_merges_only_at_least_the_given_number_of_files(bench, hammer):
     for day in ("2026-01-05", "2026-01-12", "2026-01-19"):
         bench.register(hammer(day=day))
     assert compact(bench.registry, at_least=4) == {}
     assert compact(bench.registry, at_least=3)["modes/year=2026"] == (3, 3)
 
 
-def test_compaction_parts_what_counts_from_what_does_not(five_nights, hammer):
+def test_compaction_separates_current_rows_from_superseded_rows(five_nights, hammer):
     def counts():
         return sorted((f.rows, f.dead) for f in load(five_nights.registry).of("modes"))
 
@@ -69,28 +69,28 @@ def test_compaction_parts_what_counts_from_what_does_not(five_nights, hammer):
     current = five_nights.ask("select turnout_id, frequency_hz from modes_current order by all")
     assert len(current) == 20 and ("t0", 99.0) in current and ("t0", 100.0) not in current
     five_nights.register(hammer("t0", day="2026-01-10", frequency=100.0))
-    assert counts() == [(1, 0), (20, 1)], "taken back: the old row counts again, the new one does not"
+    assert counts() == [(1, 0), (20, 1)], "after the reversal the old row is current again, the new one is not"
     assert five_nights.ask("select frequency_hz from modes_current where turnout_id = 't0' order by 1")[0] == (100.0,)
     compact(five_nights.registry)
     assert counts() == [(1, 1), (20, 0)] and five_nights.ask("select count(*) from modes_current") == [(20,)]
 
 
-def test_a_glob_counts_twice_during_compaction_and_the_list_does_not(five_nights, monkeypatch):
+def test_during_compaction_a_glob_has_every_row_twice_and_the_list_has_it_once(five_nights, monkeypatch):
     glob = f"select count(*) from read_parquet('{five_nights.registry}/modes/year=*/*.parquet')"
     seen, real = [], publication.commit
 
-    def look(root, generation):
+    def record_counts(root, generation):
         seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
         real(root, generation)
         seen.append((five_nights.ask("select count(*) from modes"), duckdb.sql(glob).fetchall()))
 
-    monkeypatch.setattr(publication, "commit", look)
+    monkeypatch.setattr(publication, "commit", record_counts)
     compact(five_nights.registry)
     assert [listed for listed, _ in seen] == [[(21,)], [(21,)]]
     assert [globbed for _, globbed in seen] == [[(42,)], [(42,)]]
 
 
-def test_a_small_table_that_changes_and_changes_back_is_never_deleted(bench):
+def test_a_small_table_that_changes_and_changes_back_stays_readable(bench):
     def event(kind):
         return {
             "event_id": "e", "turnout_id": "t1", "event_at_utc": "2026-02-01T00:00:00", "kind": kind,
@@ -110,7 +110,9 @@ def damage_truncate(path):
 def damage_flip(path):
     content = bytearray(path.read_bytes())
     footer = int.from_bytes(content[-8:-4], "little")
-    content[(len(content) - footer) // 2] ^= 1  # among the values: a changed footer is another fault, no Parquet file
+    content[(len(content) - footer) // 2] ^= (
+        1  # within the values: a file with a changed footer would be no Parquet file
+    )
     path.write_bytes(content)
 
 
@@ -123,7 +125,7 @@ def damage_replace(path):
 
 
 @pytest.mark.parametrize(
-    ("damage", "said"),
+    ("damage", "message"),
     [
         (damage_truncate, "bytes, the list says"),
         (damage_flip, "its hash differs from the list"),
@@ -131,15 +133,15 @@ def damage_replace(path):
         (damage_replace, "bytes, the list says"),
     ],
 )
-def test_check_names_the_damaged_file(bench, hammer, damage, said):
+def test_check_reports_the_damaged_file(bench, hammer, damage, message):
     bench.register(hammer())
     file = load(bench.registry).of("modes")[0].path
     damage(bench.registry / file)
     problems = check(bench.registry)
-    assert len(problems) == 1 and problems[0].startswith(f"{file}: ") and said in problems[0]
+    assert len(problems) == 1 and problems[0].startswith(f"{file}: ") and message in problems[0]
 
 
-def test_vacuum_deletes_what_is_on_no_list_and_nothing_else(five_nights):
+def test_vacuum_deletes_only_files_that_are_on_no_list(five_nights):
     folder = five_nights.registry / "modes" / "year=2026"
     (folder / "batch-feed-0000.parquet").write_bytes(b"left by a killed run")
     assert check(five_nights.registry)[0].startswith("1 file is on no list, the first modes/year=2026/batch-feed")
@@ -152,7 +154,7 @@ def test_vacuum_deletes_what_is_on_no_list_and_nothing_else(five_nights):
     assert check(five_nights.registry) == [] and five_nights.ask(ALL_MODES) == before
 
 
-def test_a_moved_registry_is_relocated(five_nights):
+def test_a_moved_registry_can_be_relocated(five_nights):
     before, moved = five_nights.ask(ALL_MODES), five_nights.root / "elsewhere with 'quotes'"
     shutil.move(five_nights.registry, moved)
     assert "registry.duckdb is not of generation" in check(moved)[0]
@@ -163,7 +165,7 @@ def test_a_moved_registry_is_relocated(five_nights):
     assert five_nights.ask(ALL_MODES) == before and check(moved) == []
 
 
-def test_a_copied_registry_does_not_answer_with_the_rows_of_the_first_one(five_nights):
+def test_a_copied_registry_does_not_return_the_rows_of_the_original(five_nights):
     copy = five_nights.root / "copy"
     shutil.copytree(five_nights.registry, copy)
     with pytest.raises(
@@ -179,7 +181,7 @@ def test_a_copied_registry_does_not_answer_with_the_rows_of_the_first_one(five_n
     assert five_nights.ask(ALL_MODES) == before
 
 
-def test_an_export_with_an_unknown_table_writes_none(five_nights, tmp_path, capsys):
+def test_an_export_with_an_unknown_table_writes_no_file(five_nights, tmp_path, capsys):
     out = tmp_path / "out"
     command = ["export", str(out), "--registry", str(five_nights.registry), "--only", "turnouts", "modes"]
     assert main(command) == 0 and len(list(out.iterdir())) == 2
@@ -188,7 +190,7 @@ def test_an_export_with_an_unknown_table_writes_none(five_nights, tmp_path, caps
     assert "no table or view 'mode'" in capsys.readouterr().err
 
 
-def test_a_column_added_later_is_null_in_old_rows_and_rebuild_writes_it(bench, hammer, monkeypatch):
+def test_a_later_column_is_null_in_old_rows_and_rebuild_writes_it(bench, hammer, monkeypatch):
     bench.register(hammer(frequency=150.0))
     file = bench.registry / load(bench.registry).of("modes")[0].path
     strip_column(bench, "modes", file, "frequency_sd_hz")
@@ -217,7 +219,7 @@ def strip_column(bench, table, file, column):
     path.write_text(json.dumps(generation))
 
 
-def test_a_column_that_changed_its_type_is_rejected_before_anything_is_written(bench, hammer):
+def test_a_column_with_a_changed_type_is_rejected_before_any_file_is_written(bench, hammer):
     bench.register(hammer())
     path = bench.registry / GENERATION_FILE
     generation = json.loads(path.read_text())
@@ -229,31 +231,31 @@ def test_a_column_that_changed_its_type_is_rejected_before_anything_is_written(b
 
 
 @pytest.mark.parametrize("content", ["{", "[]", "3", '{"format": 1}', '{"format": 1, "files": [{"rows": 2}]}'])
-def test_a_spoilt_generation_file_is_said(bench, hammer, content):
+def test_a_damaged_generation_file_is_an_error(bench, hammer, content):
     bench.register(hammer())
     (bench.registry / GENERATION_FILE).write_text(content)
     with pytest.raises(RegistryError, match=r"not a generation file.*delete its folder"):
         bench.register(hammer(section="A2"))
 
 
-def test_no_registry_is_said(tmp_path):
+def test_a_folder_without_a_registry_is_an_error(tmp_path):
     with pytest.raises(RegistryError, match=r"there is no registry here. 'turnout nightly' makes one"):
         open_registry(tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("texts", "said"),
+    ("texts", "message"),
     [
         ({"a": "-- needs: b"}, "views/a.sql needs b, and there is no such file"),
         ({"a": "-- needs: b", "b": "-- needs: a"}, "need each other in a circle"),
     ],
 )
-def test_views_that_cannot_be_ordered_are_rejected(texts, said):
-    with pytest.raises(RegistryError, match=said):
+def test_views_that_cannot_be_ordered_are_rejected(texts, message):
+    with pytest.raises(RegistryError, match=message):
         sort_by_needs(texts)
 
 
-def test_views_of_an_older_program_are_made_anew_though_there_is_no_new_row(bench, hammer, monkeypatch):
+def test_views_of_an_older_program_are_created_again_without_a_new_row(bench, hammer, monkeypatch):
     bench.register(hammer())
     generation = bench.ask("select generation from registry_info")
     monkeypatch.setattr("turnout.registry.view_texts.views_version", lambda: "older")

@@ -1,4 +1,4 @@
-"""Every view against an independent computation from the rows: pandas, numpy, statsmodels."""
+"""Every view against an independent computation from the rows with pandas, numpy or statsmodels."""
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from turnout.workflow.batches import UnitResult
 
 YEAR = 31557600.0
 CHART = ["turnout_id", "section_id", "band", "source"]
-# SQL and the oracle do the same arithmetic in another order; 1e-8 is asked of every view.
+# SQL and the independent computation do the same arithmetic in another order; every view must agree to 1e-8.
 SAME = {"rtol": 1e-8, "atol": 1e-8}
 
 
@@ -28,7 +28,7 @@ def scores(fleet):
 
 
 def resets_of(fleet, section, band):
-    """Times of the events that reset a chart, from the table of events alone."""
+    """Times of the events that reset a chart, from the table of events only."""
     events = fleet.frame("from events")
     own = (events.turnout_id == section.split("/")[0]) & (events.section_id.isna() | (events.section_id == section))
     return sorted(set(events.event_at_utc[own & events[f"resets_{band}"]]))
@@ -56,7 +56,7 @@ def test_epochs_begin_at_the_last_event_that_resets_the_band(fleet, modes):
     assert set(both) == {"tamping", "sensor_change, tamping"}
 
 
-def test_section_trend_is_one_chart_in_order(fleet, modes):
+def test_section_trend_is_one_chart_in_order_of_time(fleet, modes):
     trend = fleet.frame("from section_trend('south_2/A9', 'railpad')")
     own = modes[(modes.section_id == "south_2/A9") & (modes.band == "railpad")]
     assert list(trend.frequency_hz) == list(own.frequency_hz) and len(trend) == 74
@@ -99,8 +99,8 @@ def test_resonance_drift_is_ordinary_least_squares(fleet, modes, days, asof, ver
     assert set(drift.verdict) == verdicts
 
 
-def test_a_campaign_with_a_large_error_does_not_decide_a_drift(bench, hammer):
-    """Weights 2 / (1 + (se / median se)²): against weighted least squares of statsmodels."""
+def test_a_campaign_with_a_large_error_has_little_weight_in_a_drift(bench, hammer):
+    """The weights are 2 / (1 + (se / median se)²), compared with weighted least squares of statsmodels."""
     days = pd.date_range("2025-01-05", periods=26, freq="14D")
     warm, error = np.round(10.0 + 8.0 * np.sin(np.arange(26)), 1), np.where(np.arange(26) % 3, 0.4, 0.6)
     frequency = 150.0 - 0.1 * np.arange(26) + 0.1 * np.cos(3.0 * np.arange(26))
@@ -123,7 +123,7 @@ def test_a_campaign_with_a_large_error_does_not_decide_a_drift(bench, hammer):
     assert abs(row.drift_pct_per_year - 100 * (-0.1 * 365.25 / 14.0) / mean) < 3.0 * row.drift_se_pct_per_year < 3.0
 
 
-def test_drift_of_short_constant_or_cold_charts_is_said_not_to_be_known(bench, hammer):
+def test_the_drift_of_short_charts_and_of_charts_without_varying_temperature_is_unknown(bench, hammer):
     flat = [
         hammer(section="flat", day=f"2026-01-{d:02d}", frequency=150.0, rail_temperature_c=5.0) for d in range(1, 20)
     ]
@@ -142,7 +142,7 @@ def test_drift_of_short_constant_or_cold_charts_is_said_not_to_be_known(bench, h
     assert list(rows.n) == [19, 0, 3] and list(rows.n_without_temperature) == [0, 19, 0]
 
 
-def test_rejected_lists_everything_that_was_not_used(fleet):
+def test_the_view_rejected_lists_everything_that_was_not_used(fleet):
     counts = dict(fleet.ask("select what || ' ' || reason_code, count(*) from rejected group by all"))
     fits = fleet.ask("select count(*) from passage_fits where status <> 'accepted'")[0][0]
     assert counts == {
@@ -154,14 +154,14 @@ def test_rejected_lists_everything_that_was_not_used(fleet):
     assert fleet.ask("select count(*) from rejected where what = 'impact' and at_utc = '2023-03-20'") == [(6,)]
 
 
-def test_quarantine_by_reason_counts(fleet):
+def test_quarantine_by_reason_has_the_number_of_files_per_reason(fleet):
     rows = fleet.ask("select reason_code, n, first_path from quarantine_by_reason order by 1")
     assert rows == [
         ("not_finite", 1, "south_2/hammer/2026-01-05/OT_1.uff"), ("truncated", 2, "south_2/hammer/2026-01-05/OT_0.uff"),
     ]  # fmt: skip
 
 
-def test_fleet_state_counts(fleet):
+def test_fleet_state_has_the_numbers_of_each_turnout(fleet):
     rows = fleet.frame("from fleet_state order by turnout_id").set_index("turnout_id")
     assert list(rows.n_sections) == list(rows.n_sections_measured) == [3, 3]
     assert list(rows.n_campaigns) == [75, 75] and list(rows.n_models) == [225, 224]
@@ -226,7 +226,7 @@ def test_scores_by_cluster_and_week(fleet, scores):
     np.testing.assert_allclose(rows.forecast_se_pct, groups.forecast_pct.std() / np.sqrt(groups.size()), **SAME)
 
 
-def test_sections_whose_scores_fell_compares_like_trains(fleet, scores):
+def test_sections_whose_scores_fell_compares_trains_of_the_same_cluster(fleet, scores):
     asof = scores.passed_at_utc.max() + pd.Timedelta(minutes=1)
     rows = fleet.frame(f"from sections_whose_scores_fell(28, asof := timestamp '{asof}')").set_index("section_id")
     since = asof - pd.Timedelta(days=28)
@@ -244,10 +244,10 @@ def test_sections_whose_scores_fell_compares_like_trains(fleet, scores):
         np.testing.assert_allclose(
             rows.loc[section, ["change_pct", "change_se_pct", "z"]].astype(float), expected, **SAME
         )
-    assert list(rows.index) == ["north_1/A9", "north_1/A7"], "the section that fell stands first"
+    assert list(rows.index) == ["north_1/A9", "north_1/A7"], "the section whose scores fell is first"
 
 
-def test_passages_behind_a_number_lead_to_the_files(fleet, scores):
+def test_passages_behind_returns_the_passages_of_a_period_with_their_files(fleet, scores):
     rows = fleet.frame("from passages_behind('north_1/A9', '2023-06-01', '2023-07-01')")
     own = scores[
         (scores.section_id == "north_1/A9") & scores.passed_at_utc.between("2023-06-01", "2023-06-30 23:59:59.99")
@@ -256,7 +256,7 @@ def test_passages_behind_a_number_lead_to_the_files(fleet, scores):
     assert rows.path.str.startswith("north_1/passages/202306").all()
 
 
-def test_values_of_the_papers_method_are_in_no_chart(bench, hammer):
+def test_values_by_the_method_of_the_paper_are_in_no_chart(bench, hammer):
     paper = hammer(section="A7", frequency=140.0, file="p")
     paper.tables["models"][0]["method"] = "paper"
     both = hammer(section="A7", frequency=150.0)
@@ -270,8 +270,8 @@ def test_values_of_the_papers_method_are_in_no_chart(bench, hammer):
     assert bench.ask("select frequency_hz from epochs") == [(150.0,)]
 
 
-def test_a_clock_that_runs_ahead_does_not_date_the_fleet(bench):
-    """What is asked of the last thirty days is asked of the last run's, not of a year that has not come."""
+def test_a_passage_with_a_future_date_does_not_change_the_newest_date_of_the_fleet(bench):
+    """The last thirty days are counted back from the last run, not from a future year."""
     passage = {"turnout_id": "t1", "passage_id": "p", "recording_id": "r", "passed_at_utc": "2099-01-05T10:00:00"}
     passage |= {"status": "accepted", "n_axles": 8, "track": "main", "axle_load_source": "unavailable"}
     late = UnitResult("t1/passage/20990105T100000Z.h5", "t1", "passage", "k", "1", "ok", {"passages": [passage]})
@@ -281,8 +281,8 @@ def test_a_clock_that_runs_ahead_does_not_date_the_fleet(bench):
     assert bench.ask("select newest_measurement_at_utc from registry_info") == [(newest,)]
 
 
-def test_a_date_that_was_corrected_dates_the_fleet_no_more(bench):
-    """The first entry said 2097; the file of the right day has taken its place."""
+def test_a_corrected_date_no_longer_affects_the_newest_date_of_the_fleet(bench):
+    """The first entry has the year 2097; the file with the correct day replaces it."""
     campaign = {"campaign_id": "t1/2097-01-05", "turnout_id": "t1", "started_at_utc": "2097-01-05T10:00:00"}
     wrong = hammer_result(day="2097-01-05")
     bench.register(wrong, hammer_result(day="2026-01-05"), tables={"campaigns": [campaign]})
@@ -291,15 +291,15 @@ def test_a_date_that_was_corrected_dates_the_fleet_no_more(bench):
     assert str(bench.ask("select newest_measurement()")[0][0]) == "2026-01-05 10:00:00"
 
 
-def test_campaigns_are_believed_where_the_clock_of_the_server_is_late(bench):
-    """A campaign's date is written down by people."""
+def test_the_date_of_a_campaign_is_accepted_if_the_clock_of_the_server_is_late(bench):
+    """People write the date of a campaign, so it does not depend on a clock."""
     campaign = {"campaign_id": "t1/2098-01-05", "turnout_id": "t1", "started_at_utc": "2098-01-05T10:00:00"}
     bench.register(hammer_result(day="2098-01-05"), tables={"campaigns": [campaign]})
     assert str(bench.ask("select newest_measurement()")[0][0]) == "2098-01-05 10:00:00"
 
 
-def test_a_campaign_that_one_turnout_alone_dates_ahead_does_not_date_the_fleet(bench):
-    """Of three turnouts one has a campaign of 2098: a mistyped year, and no late clock of this server."""
+def test_a_future_campaign_of_one_turnout_does_not_change_the_newest_date_of_the_fleet(bench):
+    """One of three turnouts has a campaign of 2098: the year is mistyped, and the clock of this server is not late."""
     days = {"t1": "2026-01-05", "t2": "2098-01-05", "t3": "2026-01-07"}
     campaigns = [
         {"campaign_id": f"{turnout}/{day}", "turnout_id": turnout, "started_at_utc": f"{day}T10:00:00"}

@@ -1,4 +1,4 @@
-"""The panels of the calibrated model: values and intervals along the track, and how visits narrow them."""
+"""The panels of the calibrated model show values and intervals along the track, and how visits narrow them."""
 
 import re
 from datetime import datetime
@@ -22,7 +22,7 @@ SOFT = state("pad@2.40", 2.4, np.log(0.3), 0.02, day=2)
 FIRST = [state(f"pad@{0.6 * k:.2f}", 0.6 * k, 0.5, 0.08, n_visits=1, day=1) for k in range(4)]
 
 
-def test_a_soft_pad_stands_out_with_its_factor_and_interval():
+def test_a_soft_pad_is_marked_with_its_factor_and_interval():
     svg = along_track_panels([*FIRST, *STATES, SOFT])
     assert svg.count('<svg class="chart"') == 1 and "pad stiffness over file; 2 visits, 8 recordings" in svg
     low, high = (f"{v:.3g}" for v in 0.3 * np.exp(np.array([-1.0, 1.0]) * 1.96 * 0.02))
@@ -31,26 +31,26 @@ def test_a_soft_pad_stands_out_with_its_factor_and_interval():
     assert "0.5" not in re.findall(r"pad@0.00: ([^ ]*)", svg)  # the newest state of each parameter
 
 
-def test_intervals_narrow_from_visit_to_visit():
+def test_the_panel_shows_how_intervals_narrow_from_visit_to_visit():
     svg = narrowing_panel([*FIRST, *STATES])
     assert "pad: 0.50" in svg  # 0.05 of 0.1 after two visits
     assert narrowing_panel(STATES) == ""
 
 
 @pytest.mark.parametrize("states", [[], [state("ballast_stiffness", None, 0.1, 0.02)], [STATES[0]]])
-def test_without_values_along_the_track_nothing_is_drawn(states):
+def test_no_panel_is_drawn_without_values_along_the_track(states):
     assert calibrated_panels(states) == ""
 
 
-def test_the_page_of_the_turnout_has_them():
+def test_the_page_of_the_turnout_has_the_panels():
     assert "Calibrated model</h2>" in page(calibrated=STATES) and "Calibrated model" not in page()
 
 
-def test_the_page_says_which_visits_count_and_what_red_means():
-    """The second of three visits had an open finding: the newest values rest on two."""
+def test_the_page_states_the_number_of_used_visits_and_the_meaning_of_red():
+    """The second of three visits has an open finding: the newest values are based on two visits."""
     later = [state(f"pad@{0.6 * k:.2f}", 0.6 * k, 0.0, 0.05, n_visits=2, day=3) for k in range(4)]
-    held = [{**row, "n_visits": 1} for row in STATES]
-    text = page(calibrated=[*FIRST, *held, *later])
+    unchanged = [{**row, "n_visits": 1} for row in STATES]
+    text = page(calibrated=[*FIRST, *unchanged, *later])
     assert "from the 2 visits without an open finding or an unexpected change (1 left out)" in text
     assert "Red: the whole interval is outside." in text and "all visits" not in text
     assert "from the 1 visit without an open finding or an unexpected change; shaded" in page(calibrated=FIRST)

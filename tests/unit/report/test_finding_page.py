@@ -1,4 +1,4 @@
-"""The page of mismatches: one sentence, one place, intervals, and every answer drawn without a number missing."""
+"""The page of mismatches: one sentence, one position, intervals, and a drawing of every answer without gaps."""
 
 import json
 import re
@@ -89,7 +89,7 @@ def page(*findings, parameters=(), quarantine=()):
 
 
 class Balanced(HTMLParser):
-    """Counts open elements."""
+    """Parser that counts open elements."""
 
     VOID = {"meta", "br", "img", "link"}
 
@@ -115,7 +115,7 @@ ROWS = {
 
 
 @pytest.mark.parametrize("verdict", ROWS)
-def test_every_answer_makes_a_sound_page(verdict):
+def test_the_page_of_every_answer_is_valid_html(verdict):
     text = page(ROWS[verdict])
     parser = Balanced()
     parser.feed(text)
@@ -126,7 +126,7 @@ def test_every_answer_makes_a_sound_page(verdict):
     ElementTree.fromstring(re.search(r'<svg class="diagram".*?</svg>', text, re.S)[0])
 
 
-def test_a_named_finding_says_what_where_how_much_and_what_to_check():
+def test_a_named_finding_states_effect_position_size_and_what_to_check():
     text = page(named())
     assert f"<h1>The sleeper at 24.6 m hangs 1.12 mm above its {BALLAST}.</h1>" in text.replace("\n", "")
     # 1.12 mm and 0.05 mm of standard error: 1.959964 * 0.05 = 0.098
@@ -143,7 +143,7 @@ def test_a_named_finding_says_what_where_how_much_and_what_to_check():
     assert "--accept" in text and "held out" in text and "evidence [nats]" in text
 
 
-def test_the_words_of_the_answers_are_those_of_the_documentation(repository):
+def test_the_names_of_the_answers_are_those_of_the_documentation(repository):
     table = (
         (repository / "docs" / "mismatch.md")
         .read_text(encoding="utf-8")
@@ -155,13 +155,13 @@ def test_the_words_of_the_answers_are_those_of_the_documentation(repository):
     assert all(f"<b>{word}</b>: {meaning}" in page(named()) for word, meaning in ANSWERS.values())
 
 
-def test_what_shows_beside_a_name_stands_in_its_sentence():
+def test_the_sentence_of_a_named_effect_states_a_second_effect_without_a_name():
     reason = "a second effect without a name remains in channel A8: the residual is larger than in the intact state"
     row = named() | {"evidence_json": json.dumps(EVIDENCE | {"reason": reason})}
-    said = f"{BALLAST}. A second effect without a name remains in channel A8: the residual"
-    assert said in headline(row) and headline(named()).endswith(f"above its {BALLAST}.")
+    expected = f"{BALLAST}. A second effect without a name remains in channel A8: the residual"
+    assert expected in headline(row) and headline(named()).endswith(f"above its {BALLAST}.")
     heading = page(row).split("<h1>")[1].split("</h1>")[0]
-    assert heading.endswith("1.22 mm).")  # the rest stands under "How sure"
+    assert heading.endswith("1.22 mm).")  # the reason is under "How sure"
     assert reason in dict(facts(row))["How sure"]
 
 
@@ -169,16 +169,16 @@ PAD = {"term": "local_pad", "fixed": {"sleeper": 8.4}, "probability": 0.97,
        "parameters": {"factor": {"value": 0.3, "se": 0.02, "unit": "-"}}}  # fmt: skip
 
 
-def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
+def test_each_of_two_effects_is_stated_with_its_probability_and_its_rival():
     gap = GAP | {"probability": 0.8, "or": "local_ballast"}
     first, second = ({"term": t["term"], "probability": t["probability"], "reason": ""} for t in (PAD, gap))
     row = named(probability=0.8) | {
         "term_json": json.dumps([PAD, gap]), "evidence_json": json.dumps(EVIDENCE | first | {"beside": [second]})
     }  # fmt: skip
-    said = headline(row)
-    assert "at 8.4 m is 0.30 times as stiff as its neighbours' (95 % interval: 0.26 to 0.34)" in said
-    torn = f"{BALLAST}, or the effect is “local ballast”: these recordings cannot distinguish the two."
-    assert said.endswith(torn)
+    expected = headline(row)
+    assert "at 8.4 m is 0.30 times as stiff as its neighbours' (95 % interval: 0.26 to 0.34)" in expected
+    rival_sentence = f"{BALLAST}, or the effect is “local ballast”: these recordings cannot distinguish the two."
+    assert expected.endswith(rival_sentence)
     sure = dict(facts(row))["How sure"]
     assert sure.startswith("probability 0.80") and "local pad 0.97, hanging sleeper 0.80" in sure
     with pytest.raises(SimulationError, match="hanging_sleeper is as probable as local_ballast"):
@@ -186,69 +186,69 @@ def test_of_two_effects_each_says_how_sure_it_is_and_what_else_it_may_be():
 
 
 @pytest.mark.parametrize(
-    ("delay", "said"),
+    ("delay", "expected"),
     [
         (9.3e-4, "A2 lags by 0.930 ms (95 % interval: 0.910 to 0.950 ms)"),
         (-9.3e-4, "A2 is early by 0.930 ms (95 % interval: 0.910 to 0.950 ms)"),
     ],
 )
-def test_a_channel_lags_or_is_early(delay, said):
+def test_the_sentence_states_whether_a_channel_lags_or_is_early(delay, expected):
     number = {"value": delay, "se": 1e-5, "unit": "s"}
     lag = {"term": "time_offset", "fixed": {"channel_name": "A2"}, "parameters": {"delay": number}}
-    assert said in headline(named() | {"term_json": json.dumps([lag])})
+    assert expected in headline(named() | {"term_json": json.dumps([lag])})
 
 
-def test_axes_carry_their_units():
+def test_axes_have_units():
     text = page(named())
     for label in ("time [s]", "frequency [Hz]", "displacement of the sleeper [m]", "force [N]"):
         assert label in text
 
 
-def test_one_of_two_says_which_measurement_would_tell():
+def test_the_answer_a_or_b_states_the_measurement_that_distinguishes_the_two():
     row = ROWS["a_or_b"] | {"next_measurement": "Measure passages of a lighter and a heavier train"}
     assert "or the effect is “local ballast”: these recordings cannot distinguish the two" in headline(row)
     assert check(row) == "Measure passages of a lighter and a heavier train."
 
 
-def test_unknown_is_located_and_offers_nothing_to_accept():
+def test_the_answer_unknown_states_the_position_and_offers_no_effect_to_accept():
     text = page(ROWS["unknown"])
     assert "Something is missing about 24.6 m, and no known effect explains it." in text
     assert "position 24.6 m (+6.1 dB, false discovery rate 0.002, n = 80)" in text and "--accept" not in text
 
 
-def test_an_unfinished_search_does_not_say_that_something_is_missing():
+def test_an_unfinished_search_does_not_state_that_an_effect_is_missing():
     row = ROWS["unknown"] | {"evidence_json": json.dumps(EVIDENCE | {"is_finished": False})}
     text = page(row)
     assert "Whether something is missing is open, as the search was not finished." in text
     assert "The simulation differs most about 24.6 m." in text and "Something is missing" not in text
 
 
-def test_none_and_numerics_send_nobody_out():
+def test_the_answers_none_and_numerics_require_no_inspection():
     assert check(ROWS["none"]) == "Nothing to check."
     assert "refine" in check(ROWS["numerics"]) and answer(ROWS["numerics"]) == "numerics"
 
 
-def test_the_worst_comes_first_and_the_rest_is_folded():
+def test_the_most_severe_finding_is_first_and_the_others_are_collapsed():
     text = page(finding("none", sections="OT"), named(), finding("unknown", sections="SP"))
     order = [text.index(words) for words in ("named, grade A", "unknown</span> SP", "simulation and recordings agree")]
     assert order[0] < order[1] and '<details><summary><span class="badge ok">OT' in text
 
 
 @pytest.mark.parametrize(("n_passages", "agreeing"), [(0, "hammer tests"), (3, "recordings")])
-def test_a_page_without_a_compared_passage_does_not_say_that_all_recordings_agree(n_passages, agreeing):
+def test_a_page_without_compared_passages_states_that_only_hammer_tests_agree(n_passages, agreeing):
     assert f"<h1>Simulation and {agreeing} agree</h1>" in page(finding("none", n_passages=n_passages))
 
 
-def test_the_arrow_points_at_the_place_or_the_sensor():
+def test_the_arrow_points_at_the_position_or_the_sensor():
     drawing = TurnoutDrawing(SECTIONS)
-    # ends lie 4 m beyond the sections, 20 pixels from the edges: -16 m at 20, 32.2 m at 900
+    # the drawing ends 4 m beyond the sections, 20 pixels from the edges: -16 m at 20, 32.2 m at 900
     assert drawing.px(-16.0) == 20 and drawing.px(32.2) == pytest.approx(900)
     assert marked_position(named(), SECTIONS) == (24.6, "24.6 m")
     assert marked_position(finding("named", channel="A9"), SECTIONS) == (28.2, "sensor A9")
     assert marked_position(finding("unknown"), SECTIONS) == (None, "")
 
 
-def test_what_was_accepted_is_shown_over_the_visits():
+def test_accepted_parameters_are_shown_over_the_visits():
     rows = [
         {
             "finding_id": "id-none-A7" if day == 25 else f"old{day}", "turnout_id": "t1", "parameter_no": 0,
@@ -272,23 +272,23 @@ def test_what_was_accepted_is_shown_over_the_visits():
     assert accepted_parameters([nose | {"accepted": False}]) == []
 
 
-def test_why_nothing_can_be_said_stands_on_the_page():
+def test_the_page_states_the_reason_for_no_answer():
     problem = "no channel with 2 accepted impacts"
     row = {"stage": "mismatch", "place": "sections A7", "found": problem, "remedy": "See docs"}
     text = page(quarantine=[row])
     assert "<h2>No answer</h2>" in text and "no channel with 2 accepted impacts" in text
 
 
-def test_numbers_read_as_engineers_write_them():
+def test_numbers_have_engineering_units_and_meaningful_digits():
     (row,) = parameters(named())
     assert (row["value"], row["interval"]) == ("1.12 mm", "1.02 to 1.22 mm")
     wide = GAP | {"parameters": {"gap": {"value": 1.12e-3, "se": 2.3e-3, "unit": "m"}}}
     (row,) = parameters(named() | {"term_json": json.dumps([wide])})
-    assert (row["value"], row["interval"]) == ("1 mm", "0 to 6 mm")  # two digits more were meaningless
+    assert (row["value"], row["interval"]) == ("1 mm", "0 to 6 mm")  # two more digits would be meaningless
     assert dict(facts(named()))["From"] == "1 hammer test, 6 passages, 1 installed sensor"
 
 
-def test_every_effect_of_the_catalogue_has_its_sentence():
+def test_every_effect_of_the_catalogue_has_a_sentence():
     from turnout.physics import TERMS
 
     for term in TERMS:
@@ -301,35 +301,35 @@ def test_every_effect_of_the_catalogue_has_its_sentence():
 
 
 @pytest.mark.parametrize(
-    "error, said",
+    "error, expected",
     [(1e-4, "1.12 mm above its ballast (95 % interval: 0.92 to 1.32 mm)"), (2e-3, "no train here closes the gap")],
 )
-def test_a_gap_that_is_only_known_from_below_has_no_size(error, said):
+def test_a_gap_with_only_a_lower_limit_has_no_size(error, expected):
     gap = {**GAP, "parameters": {**GAP["parameters"], "gap": {**GAP["parameters"]["gap"], "se": error}}}
-    assert said in headline(named() | {"term_json": json.dumps([gap])})
+    assert expected in headline(named() | {"term_json": json.dumps([gap])})
 
 
 @pytest.mark.parametrize(
-    "gain, said", [(1.3, "A2 reads 1.30 times"), (-1.0, "A2 has the wrong polarity: it reads -1.00 times")]
+    "gain, expected", [(1.3, "A2 reads 1.30 times"), (-1.0, "A2 has the wrong polarity: it reads -1.00 times")]
 )
-def test_a_sensor_with_the_wrong_sign_is_said_so(gain, said):
+def test_the_sentence_states_the_gain_or_the_wrong_polarity_of_a_sensor(gain, expected):
     term = {
         "term": "sensor_gain",
         "fixed": {"channel_name": "A2"},
         "parameters": {"gain": {"value": gain, "se": 0.03, "unit": "-"}},
     }
-    assert said in headline(named() | {"term_json": json.dumps([term])})
+    assert expected in headline(named() | {"term_json": json.dumps([term])})
 
 
-def test_a_rejected_name_is_not_offered_as_what_was_left_out():
-    """An unknown may hold the term that was tried: it is said to be rejected, and nobody is told to accept it."""
+def test_a_rejected_effect_is_not_offered_for_acceptance():
+    """The answer unknown may contain a tested effect: the page states that it is rejected."""
     shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
     assert "with the rejected effect" in shown and "with the effect" not in shown and "--accept" not in shown
     assert "base model with the effect" in page(named()) and "--accept" in page(named())
 
 
-def test_one_fit_alone_is_a_sentence_and_no_chart():
-    """Nothing is compared with the fit of an intact turnout; of a named effect four are compared."""
+def test_a_single_fit_is_a_sentence_and_no_chart():
+    """The fit of an intact turnout is compared with nothing; four fits of a named effect are compared."""
     quiet = page(finding("none"))
     assert re.search(r"examined: [\d.]+ to [\d.]+ m", quiet) and "somewhere in" not in quiet
     assert "Fit on held-out recordings" not in quiet and "fit 41 % on 2 held-out recordings" in quiet
@@ -338,8 +338,8 @@ def test_one_fit_alone_is_a_sentence_and_no_chart():
     assert "Fit on held-out recordings" in text and "fit 41 % on 2" not in text and "It is fixed to" in text
 
 
-def test_the_residual_is_what_was_measured_less_what_was_simulated():
-    """A sine of which the base model predicts four fifths: 4 % of its energy are left, and nothing with the effect."""
+def test_the_residual_is_the_recording_less_the_prediction():
+    """The base model predicts four fifths of a sine: the residual has 4 % of the energy, and none with the effect."""
     x = np.linspace(0.0, 1.0, 201)
     row = {"curve": "waveform", "x": x, "x_label": "time", "x_unit": "s", "y_unit": "m/s²", "label": "passage 1"}
     row |= {"measured": np.sin(40 * x), "before": 0.8 * np.sin(40 * x), "after": np.sin(40 * x)}
@@ -352,16 +352,16 @@ def test_the_residual_is_what_was_measured_less_what_was_simulated():
     assert residual_panel(row, "") == "" and residual_panel(row | {"curve": "spectrum"}, "it") == ""
 
 
-def test_a_second_effect_on_a_wheel_has_its_own_axle_in_the_sentence():
-    """The columns of a finding hold the position of the first effect, which is at a place here."""
+def test_the_sentence_of_a_second_effect_on_a_wheel_states_its_axle():
+    """The columns of a finding contain the position of the first effect, which is fixed to a position here."""
     length = {"length": {"value": 0.04, "se": 0.008, "unit": "m"}}
     flat = {"term": "wheel_flat", "fixed": {"wheel": 3, "train": "loaded"}, "parameters": length}
     text = headline(finding(term="hanging_sleeper", position_m=24.6, term_json=json.dumps([GAP, flat])))
     assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text
 
 
-def test_an_effect_without_a_size_in_its_sentence_has_it_behind_the_sentence():
-    """0.3 ± 0.05: 0.3 ± 1.96 * 0.05 = 0.20 to 0.40."""
+def test_the_size_follows_in_parentheses_if_the_sentence_of_an_effect_does_not_contain_it():
+    """0.3 ± 0.05: the interval is 0.3 ± 1.96 * 0.05 = 0.20 to 0.40."""
     hardening = {"hardening": {"value": 0.3, "se": 0.05, "unit": "-"}}
     term = {"term": "ballast_hardening", "fixed": {"first": 24.0, "last": 25.2}, "parameters": hardening}
     assert headline(named() | {"term_json": json.dumps([term])}) == (

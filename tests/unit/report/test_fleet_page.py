@@ -1,4 +1,4 @@
-"""The page of the fleet: counts that add up, a diagram of each line, the alert and the long-term score."""
+"""The page of the fleet: consistent counts, a diagram of each line, the alert and the long-term score."""
 
 import math
 import re
@@ -10,7 +10,7 @@ from turnout.report.site import page_environment, shared_by_pages
 
 
 class Source:
-    """Rows by hand in place of a registry."""
+    """Rows given by the test, in place of a registry."""
 
     day = "timestamp '2026-07-25'"
 
@@ -44,7 +44,7 @@ def cards(text):
     return {words: int(n) for n, words in re.findall(r"<b>(\d+)</b><span[^>]*>([^<]*)", text)}
 
 
-def test_the_cards_add_up_to_the_turnouts_and_the_charts_to_their_number():
+def test_the_cards_add_up_to_all_turnouts_and_the_kinds_to_all_charts():
     states = [
         state("a", "plan"),
         state("a", "inspect this week", 2),
@@ -57,11 +57,11 @@ def test_the_cards_add_up_to_the_turnouts_and_the_charts_to_their_number():
     counts = cards(text)
     expected = {"inspect this week": 1, "plan": 0, "cannot tell": 1, "not measured": 1, "ok": 1, "no chart yet": 1}
     assert counts == expected and sum(counts.values()) == 5
-    kinds_said = "10 charts (6 frequencies of resonances, 3 damping ratios, 1 of a whole turnout)"
-    assert kinds_said + ": 2 inspect this week, 1 plan, 4 not measured, 3 ok" in text
+    kinds_expected = "10 charts (6 frequencies of resonances, 3 damping ratios, 1 of a whole turnout)"
+    assert kinds_expected + ": 2 inspect this week, 1 plan, 4 not measured, 3 ok" in text
 
 
-def test_the_most_urgent_turnout_comes_first_and_of_two_alike_the_one_that_drifts_faster():
+def test_turnouts_are_sorted_by_urgency_and_then_by_drift():
     scores = [
         {"turnout_id": t, "score": s, "section_id": f"{t}/A7", "band": "ballast"} for t, s in (("b", 9.0), ("c", 31.4))
     ]
@@ -76,20 +76,20 @@ def test_the_most_urgent_turnout_comes_first_and_of_two_alike_the_one_that_drift
     assert '<td class="n" data-key="–">–</td>' in rows[0]
 
 
-def test_a_first_campaign_is_progress_and_no_failure():
+def test_a_first_campaign_is_reported_as_progress():
     states = [state("a", "learning", 2), state("a", "not measured", 10)]
     text = page([turnout("a")], states, learning={"n": 2, "n_campaigns": 1})
     assert "Your measurements are in. 2 charts learn what is normal. The most advanced one has 1 campaign in" in text
     assert "Nothing to do" not in text and "10 charts without a recent campaign" in text
 
 
-def test_charts_that_are_all_without_recent_measurements_are_no_all_clear():
+def test_a_fleet_without_recent_measurements_is_not_reported_as_intact():
     text = page([turnout("a")], [state("a", "not measured", 12)])
     assert "No answer: no chart has recent measurements by which it can be judged." in text
     assert "Nothing to do" not in text and "12 charts without a recent campaign" in text
 
 
-def test_weekly_campaigns_of_half_a_year_are_more_than_a_baseline_needs_but_not_long_enough():
+def test_weekly_campaigns_of_half_a_year_are_enough_in_number_but_too_short_for_a_baseline():
     learning = {"n": 2, "n_campaigns": 20, "n_days": 133, "n_again": 3}
     text = page([turnout("a")], [state("a", "learning", 5)], learning=learning)
     needs = f"at least {TrendSettings().baseline_campaigns} campaigns with a rail temperature, over at least 357 days"
@@ -99,8 +99,8 @@ def test_weekly_campaigns_of_half_a_year_are_more_than_a_baseline_needs_but_not_
     assert "Your measurements are in" not in after_work and "No answer" not in after_work
 
 
-def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():
-    """Kilometres 10, 11 and 14: the second lies a quarter of the way from the first to the third."""
+def test_the_diagram_of_a_line_is_to_scale_and_has_a_link_for_each_turnout():
+    """Kilometres 10, 11 and 14: the second is at a quarter of the distance from the first to the third."""
     fleet = [turnout("a", 10.0), turnout("b", 11.0), turnout("c", 14.0), turnout("d", None), turnout("e", 3.0, "L2")]
     worst = {"a": "ok", "b": "ok", "c": "ok", "d": "ok", "e": "inspect this week"}
     first, second = line_diagrams([t | {"worst": worst[t["turnout_id"]]} for t in fleet])
@@ -110,13 +110,13 @@ def test_a_line_is_drawn_to_scale_with_a_link_for_each_turnout():
     assert re.findall(r"turnouts/(\w)\.html", second["svg"]) == ["a", "b", "c"]
 
 
-def test_of_two_turnouts_too_close_for_both_names_the_urgent_one_is_named():
+def test_the_more_urgent_of_two_close_turnouts_is_labelled():
     fleet = [turnout("calm", 12.4) | {"worst": "cannot tell"}, turnout("urgent", 12.5) | {"worst": "inspect this week"}]
     (drawing,) = line_diagrams([*fleet, turnout("far", 50.0) | {"worst": "ok"}])
     assert re.findall(r'class="place"[^>]*>(\w+)<', drawing["svg"]) == ["urgent", "far"]
 
 
-def test_turnouts_of_one_station_do_not_lie_on_each_other():
+def test_turnouts_of_one_station_do_not_overlap_in_the_diagram():
     fleet = [turnout(f"t{k}", 5.0 + 0.01 * k) | {"worst": "ok"} for k in range(9)]
     (drawing,) = line_diagrams([*fleet, turnout("far", 99.0) | {"worst": "ok"}])
     dots = [(float(x), float(y)) for x, y in re.findall(r'cx="([\d.]+)" cy="([\d.]+)"', drawing["svg"])]
@@ -124,10 +124,10 @@ def test_turnouts_of_one_station_do_not_lie_on_each_other():
     assert min(math.dist(a, b) for k, a in enumerate(dots) for b in dots[:k]) >= 14.0  # two radii
 
 
-def test_a_fleet_of_which_everything_was_used_says_so_in_place_of_an_empty_table():
-    said = "Nothing: no impact was rejected, and nothing is in quarantine."
+def test_the_page_states_that_everything_was_used_in_place_of_an_empty_table():
+    sentence = "Nothing: no impact was rejected, and nothing is in quarantine."
     source = Source([turnout("a")])
-    assert said in page([turnout("a")])
+    assert sentence in page([turnout("a")])
     source.rows["reasons"] = [{"reason": "overload", "impacts": 2, "rows": 0}]
     text = fleet_page(source, page_environment().get_template("fleet.html"), shared_by_pages(1))
-    assert said not in text and "<td>overload</td>" in text
+    assert sentence not in text and "<td>overload</td>" in text

@@ -1,4 +1,4 @@
-"""Pages in headless Chromium: nothing fails, nothing scrolls sideways, charts zoom and tell the registry's numbers."""
+"""Pages in headless Chromium: no errors, no horizontal scrolling, zoom and values of the charts."""
 
 import json
 import os
@@ -33,7 +33,7 @@ document.documentElement.innerHTML = '<body><pre id=out>' + text + '</pre></body
 
 
 def in_browser(html, script, folder, *flags):
-    """Value of ``result`` after ``script`` ran in the page, and what the console said."""
+    """Value of ``result`` after ``script`` ran in the page, and the messages of the console."""
     path = folder / "page.html"
     report = REPORT.replace("SCRIPT", script)
     path.write_text(html.replace("</body>", f"{report}</body>"), encoding="utf-8")
@@ -252,7 +252,7 @@ KINDS = ("index", "glossary", "turnout", "finding")
 
 
 def in_frames(pages, script, folder, *flags, more=""):
-    """As ``in_browser``, with each page in a frame of 390 px: a window of Chromium has at least 500 px."""
+    """Run ``in_browser`` with each page in a frame of 390 px, as a window of Chromium has at least 500 px."""
     frames = ""
     for kind in KINDS:
         (folder / f"{kind}.html").write_text(pages[kind].replace("</body>", more + "</body>"), encoding="utf-8")
@@ -261,7 +261,7 @@ def in_frames(pages, script, folder, *flags, more=""):
     return in_browser(f"<body>{frames}</body>", kinds + script, folder, *flags)
 
 
-def test_no_page_says_an_error_or_scrolls_sideways_on_a_telephone(pages, tmp_path):
+def test_no_page_has_an_error_or_scrolls_horizontally_on_a_telephone(pages, tmp_path):
     script = "kinds.forEach(kind => { result[kind] = frame(kind).contentDocument.documentElement.scrollWidth; });"
     widths, console = in_frames(pages, script, tmp_path)
     assert max(widths.values()) <= 390 and not console, widths
@@ -308,15 +308,15 @@ KEYS = """var plots = Array.from(document.querySelectorAll('svg.chart')).map(svg
 
 @pytest.fixture(scope="module")
 def charts(tmp_path_factory):
-    """What a receptance, a history and a stabilisation diagram say to keys and clicks, and the console."""
+    """Texts of a receptance, a history and a stabilization diagram after keys and clicks, and the console."""
     test = HammerTest(receptance_row(), MODEL, [], [])
     drawings = receptance_panel(test) + history_panel("ballast", MODES, CHARTS, []) + stabilisation_panel(test)
     html = CHARTS_PAGE.format(charts=drawings, **shared_by_pages(1))
     return in_browser(html, KEYS, tmp_path_factory.mktemp("charts"))
 
 
-def test_the_values_on_a_curve_are_those_of_the_registry(charts):
-    """Each reading of a receptance at 50 points is the value of that frequency line, to the printed digits."""
+def test_the_values_shown_on_a_curve_are_those_of_the_registry(charts):
+    """Each of 50 values read from the receptance equals that of its frequency line, to the printed digits."""
     result, console = charts
     assert not console and len(result["curve"]) == 50
     back = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -331,24 +331,24 @@ def test_the_values_on_a_curve_are_those_of_the_registry(charts):
         assert float(mantissa) * 10.0 ** int(power.translate(back)) == pytest.approx(size[line], rel=2e-3)
 
 
-def test_a_dot_says_the_words_of_its_campaign(charts):
+def test_a_dot_shows_the_text_of_its_campaign(charts):
     result, _ = charts
     assert result["focused"]
     assert result["dot"] == ["2025-12-31: 155.37 Hz ± 0.9 (95 %), damping 0.0500, n = 10, 12 °C"]
 
 
-def test_a_pole_says_frequency_damping_coherence_and_energy(charts):
+def test_a_pole_shows_frequency_damping_coherence_and_energy(charts):
     words = "order 2, stable: 155.2 Hz, damping 0.050, amplitude coherence 0.99, 42.0 % of the energy"
     assert charts[0]["pole"] == [words]
 
 
-def test_plus_halves_the_range_about_its_middle_and_zero_shows_all(charts):
+def test_the_key_plus_halves_the_range_and_the_key_zero_shows_all(charts):
     """30 to 1600 Hz, logarithmic: the middle half is 30 * (1600 / 30) ** 0.25 to ** 0.75, 81 to 592 Hz."""
     all_of_it, half, again = charts[0]["ticks"]
     assert again == all_of_it == ["50", "100", "200", "500", "1000"] and half == ["100", "200", "500"]
 
 
-def test_a_series_is_hidden_and_shown_by_its_button(charts):
+def test_a_button_hides_and_shows_its_series(charts):
     result, _ = charts
     assert result["names"] == ["between H1 and H2", "H1, fails the gate", "H1"]
     assert result["hidden"] == ["false", ["none"]] and result["shown"] == [""]

@@ -1,4 +1,4 @@
-"""Tables 1 to 4 of the paper from a registry, in three forms."""
+"""Tables 1 to 4 of the paper from a registry, in three formats."""
 
 import csv
 import io
@@ -24,7 +24,7 @@ BLOCK = {
 
 @pytest.fixture
 def registry(tmp_path):
-    """Two campaigns of a section with the numbers of the paper's A7, low frequencies."""
+    """Two campaigns of a section with the values of A7 in the paper, low frequencies."""
     (tmp_path / "work").mkdir()
     bench = Bench(tmp_path)
     results = [
@@ -40,7 +40,7 @@ def registry(tmp_path):
     return str(bench.registry)
 
 
-def test_the_text_names_each_value_with_error_and_number(registry, capsys):
+def test_the_text_contains_each_value_with_error_and_number(registry, capsys):
     assert main(["paper", "t1", "--registry", registry]) == 0
     text = capsys.readouterr().out
     assert [line[:8] for line in text.splitlines() if line.startswith("Table")] == [f"Table {k}:" for k in (1, 2, 3, 4)]
@@ -49,7 +49,7 @@ def test_the_text_names_each_value_with_error_and_number(registry, capsys):
     assert "61 ± 3" in text
 
 
-def test_a_campaign_is_chosen_by_its_date(registry, capsys):
+def test_a_campaign_can_be_chosen_by_its_date(registry, capsys):
     assert main(["paper", "t1", "--campaign", "2017-10-02", "--registry", registry, "--format", "csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     (frequency,) = (r for r in rows if r["quantity"] == "frequency [Hz]")
@@ -100,12 +100,12 @@ def test_table_4_has_the_trains_of_the_paper_beside_random_models(registry_with_
     assert (rows["main track"]["value"], rows["main track"]["n"]) == ("20", "1") and "diverging track" not in rows
 
 
-def test_bars_are_a_page_with_the_numbers_of_table_5(registry_with_trains, tmp_path, capsys):
+def test_the_page_of_bars_has_the_values_of_table_5(registry_with_trains, tmp_path, capsys):
     page = tmp_path / "bars.html"
     assert main(["paper", "t1", "--registry", registry_with_trains, "--table", "5", "--bars", str(page)]) == 0
     text = capsys.readouterr().out
     assert text.startswith("Table 5:") and "train type" in text and "160-180 km/h" in text
-    assert "10.0-12.5 t 36 ± 21 5 41 5" in " ".join(text.split())  # mean of all five, and of their nulls
+    assert "10.0-12.5 t 36 ± 21 5 41 5" in " ".join(text.split())  # means of all five scores and of their null models
     html = page.read_text(encoding="utf-8")
     assert html.count("<svg") >= 3 and "fit by speed" in html and "http" not in html.split("</style>")[-1][:50]
 
@@ -115,7 +115,7 @@ def test_bars_without_a_passage_are_an_error(registry, tmp_path, capsys):
     assert "no scored passage of t1" in capsys.readouterr().err
 
 
-def test_latex_has_four_tables_and_no_bare_sign(registry, capsys):
+def test_latex_output_has_four_tables_and_no_unescaped_sign(registry, capsys):
     assert main(["paper", "t1", "--registry", registry, "--format", "latex"]) == 0
     text = capsys.readouterr().out
     assert text.count(r"\begin{tabular}") == text.count(r"\end{table}") == 4

@@ -1,4 +1,4 @@
-"""Panels of one passage: measured and predicted, two wheelsets, and a spectrogram with a line per axle."""
+"""The panels of one passage: recording and prediction, two wheelsets, and a spectrogram with a line per axle."""
 
 import numpy as np
 import pytest
@@ -12,12 +12,12 @@ AXLES = np.array([0.8, 0.85, 1.2, 1.25])
 
 
 def tone(low, high):
-    """208.3 Hz before 1 s and 604.2 Hz after it, both in the middle of a cell."""
+    """A tone of 208.3 Hz before 1 s and of 604.2 Hz after it, both in the middle of a cell."""
     f, g = 5000.0 / 24, 14500.0 / 24
     return np.where(TIME < 1.0, low * np.sin(2 * np.pi * f * TIME), high * np.sin(2 * np.pi * g * TIME))
 
 
-def test_the_spectrogram_finds_a_tone_where_it_sounds():
+def test_the_spectrogram_shows_a_tone_at_its_time_and_frequency():
     level, time, frequency = spectrogram(SensorPassage("A7", tone(1.0, 2.0), RATE, AXLES))
     assert time[0] >= 0.5 and time[-1] <= 1.55 and frequency[-1] <= 1000.0
     loudest = frequency[np.argmax(level, axis=0)]
@@ -27,7 +27,7 @@ def test_the_spectrogram_finds_a_tone_where_it_sounds():
     assert gain == pytest.approx(20 * np.log10(2.0), abs=0.2)
 
 
-def test_every_axle_is_a_line():
+def test_the_spectrogram_has_a_line_for_every_axle():
     svg = spectrogram_panel(SensorPassage("A7", tone(1.0, 1.0), RATE, AXLES))
     assert svg.count('class="limit"') == len(AXLES)
 

@@ -1,4 +1,4 @@
-"""Charts put values where they belong: pixels are worked out by hand from the margins."""
+"""Charts draw values at the right pixels, which are computed by hand from the margins."""
 
 import re
 from datetime import UTC, datetime
@@ -19,7 +19,7 @@ def chart(scale="linear"):
     return Chart(Axis(10.0, 1000.0, "f [Hz]", scale), Axis(0.0, 4.0, "y"), "A <title> & more", width=476, height=266)
 
 
-def test_corners_of_the_data_are_corners_of_the_frame():
+def test_the_corners_of_the_data_are_the_corners_of_the_frame():
     c = chart()
     assert c.px([10.0, 1000.0]) == pytest.approx([LEFT, 476 - RIGHT])
     assert c.py([0.0, 4.0]) == pytest.approx([266 - BOTTOM, TOP])
@@ -30,14 +30,14 @@ def test_the_geometric_mean_is_in_the_middle_of_a_logarithmic_axis():
     assert float(c.px(100.0)) == pytest.approx((LEFT + 476 - RIGHT) / 2)
 
 
-def test_a_missing_value_breaks_the_line_and_is_not_bridged():
+def test_a_missing_value_interrupts_the_line():
     c = chart()
     c.line([10.0, 200.0, 400.0, 1000.0], [1.0, np.nan, 2.0, 3.0], "curve")
     assert c.elements[0].count("M") == 2 and c.elements[0].count("l") == 2
 
 
 def test_shaded_intervals_are_one_path_within_the_frame():
-    """800 to 2000 Hz of an axis to 1000 Hz ends at its frame; an interval outside is not drawn."""
+    """An interval of 800 to 2000 Hz on an axis to 1000 Hz ends at the frame; an interval outside is not drawn."""
     c = chart()
     c.span(np.array([10.0, 800.0, 1200.0]), np.array([208.0, 2000.0, 1400.0]), "gated", "left out")
     (element,) = c.elements
@@ -58,7 +58,7 @@ def test_dots_of_a_series_are_one_group():
     assert c.elements == [f'<g data-series="campaign">{first}{second}</g>']
 
 
-def test_a_band_with_a_hole_is_drawn_in_two_pieces():
+def test_a_band_with_a_missing_value_is_drawn_in_two_pieces():
     c = chart()
     c.band([10, 200, 400, 600, 1000], [1, 1, np.nan, 1, 1], [2, 2, 2, 2, 2], "interval")
     assert len(c.elements) == 2
@@ -71,7 +71,7 @@ def test_error_bars_span_low_to_high():
     assert (bottom, top) == pytest.approx((float(c.py(1.0)), float(c.py(3.0))), abs=0.05)
 
 
-def test_the_drawing_is_sound_xml_and_escapes_words():
+def test_the_drawing_is_valid_xml_with_escaped_text():
     c = chart("log")
     c.line([10, 100], [1, 2], "curve", 'say "<this>"')
     c.vertical(100.0, "event", "pads & clips")
@@ -81,13 +81,13 @@ def test_the_drawing_is_sound_xml_and_escapes_words():
     assert any(t.text == "pads & clips" for t in root.iter("{http://www.w3.org/2000/svg}text"))
 
 
-def test_a_constant_quantity_still_gives_an_axis_with_width():
+def test_the_axis_of_a_constant_quantity_has_a_width_above_zero():
     axis = Axis(5.0, 5.0)
     assert axis.low < 5.0 < axis.high
 
 
 @pytest.mark.parametrize("low,high", [(0.0, 1e-9), (98.2, 103.9), (-7.0, 13.0), (1e6, 1.0001e6)])
-def test_ticks_lie_inside_and_are_evenly_spaced(low, high):
+def test_ticks_are_inside_the_axis_and_evenly_spaced(low, high):
     ticks = linear_ticks(low, high)
     steps = np.diff(ticks)
     # ticks are rounded to 12 decimals, which bounds both errors
@@ -96,8 +96,8 @@ def test_ticks_lie_inside_and_are_evenly_spaced(low, high):
 
 
 @pytest.mark.parametrize(("low", "high"), [(530.0, 530.00005), (-1e-3, 1e-3), (123456.0, 123460.0), (1e-9, 1.0004e-9)])
-def test_no_two_ticks_say_the_same(low, high):
-    """Each text, read back, is its tick to a tenth of the step."""
+def test_no_two_ticks_have_the_same_text(low, high):
+    """Each text, read as a number, equals its tick to a tenth of the step."""
     ticks = Axis(low, high).ticks()
     texts = [text for _, text in ticks]
     assert len(ticks) >= 3 and len(set(texts)) == len(texts)
@@ -114,14 +114,14 @@ def test_logarithmic_ticks_are_one_two_five():
 
 
 @pytest.mark.parametrize("days", [40, 200, 1100, 3700])
-def test_time_ticks_are_first_days_of_months_and_few(days):
+def test_time_ticks_are_at_most_nine_first_days_of_months(days):
     start = 1.7e9
     ticks = time_ticks(start, start + 86400 * days)
     dates = np.array(ticks).astype("int64").astype("datetime64[s]")
     assert (dates == dates.astype("datetime64[M]")).all() and 1 <= len(ticks) <= 9
 
 
-def test_a_long_curve_keeps_every_peak_and_at_most_four_points_for_each_pixel():
+def test_a_long_curve_keeps_every_peak_with_at_most_four_points_per_pixel():
     px = np.linspace(0.0, 99.99, 20_000)
     py = np.sin(px) + 0.01 * np.cos(7000.0 * px)
     py[[1234, 15_000]] = 5.0, -5.0
@@ -132,25 +132,25 @@ def test_a_long_curve_keeps_every_peak_and_at_most_four_points_for_each_pixel():
         assert (before.min(), before.max()) == (after.min(), after.max())
 
 
-def test_a_short_curve_and_one_that_turns_back_are_drawn_whole():
+def test_a_short_curve_and_a_curve_that_turns_back_keep_all_points():
     assert len(reduce_points(np.arange(10.0), np.arange(10.0))[0]) == 10
     back = np.concatenate([np.linspace(0, 1, 500), np.linspace(1, 0, 500)])
     assert len(reduce_points(back, back)[0]) == 1000
 
 
-@pytest.mark.parametrize(("decay", "said"), [(None, False), (0.0, False), (25.0, True)])
-def test_a_curve_behind_an_exponential_window_says_so(decay, said):
+@pytest.mark.parametrize(("decay", "is_stated"), [(None, False), (0.0, False), (25.0, True)])
+def test_the_panel_states_the_exponential_window_of_a_receptance(decay, is_stated):
     n = 40
     row = dict.fromkeys(("h1_real_m_n", "h1_imag_m_n", "h2_abs_m_n"), np.full(n, 1e-9)) | {
         "frequency_hz": np.linspace(0.0, 1000.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
         "valid_to_hz": None, "window_decay_per_s": decay,
     }  # fmt: skip
-    assert ("exp(-25/s t)" in receptance_panel(HammerTest(row, {}, [], []))) is said
+    assert ("exp(-25/s t)" in receptance_panel(HammerTest(row, {}, [], []))) is is_stated
 
 
 @pytest.mark.parametrize(("required", "drawn_at"), [(0.9, "M62 40.59l386 0"), (None, "")])
 def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
-    """0.9 of an axis to 1.02 in a panel of 190: 150 - 124 * 0.9 / 1.02. Rows of earlier versions do not know it."""
+    """0.9 on an axis to 1.02 in a panel of 190: 150 - 124 * 0.9 / 1.02. Rows of earlier versions have no limit."""
     n = 40
     row = dict.fromkeys(("coherence", "coherence_low", "coherence_high"), np.full(n, 0.95)) | {
         "frequency_hz": np.linspace(20.0, 1600.0, n), "passed": np.ones(n, dtype=bool), "n_impacts": 7,
@@ -161,14 +161,14 @@ def test_the_limit_of_the_coherence_is_that_of_the_settings(required, drawn_at):
     assert limits == ([(drawn_at, "0.9")] if required else [])
 
 
-def test_an_axis_of_two_days_names_its_day():
+def test_a_time_axis_of_two_days_has_a_date():
     noon = datetime(2026, 5, 13, 12, tzinfo=UTC).timestamp()
     axis = Axis(noon - 86400, noon + 86400, "", "time")
     assert axis.ticks() == [(noon, "2026-05-13")]
 
 
-def test_the_phase_of_a_resonator_falls_from_0_to_minus_180_degrees():
-    """1 / (k - m w^2 + i w c): 0 far below its resonance, -90 at it, -180 far above."""
+def test_the_phase_of_a_resonance_falls_from_0_to_minus_180_degrees():
+    """1 / (k - m w^2 + i w c): 0 far below the resonance, -90 at it, -180 far above."""
     frequency = np.geomspace(30.0, 1600.0, 400)
     w, w0 = 2 * np.pi * frequency, 2 * np.pi * 200.0
     response = 1.0 / (w0**2 - w**2 + 2j * 0.05 * w0 * w)
@@ -186,7 +186,7 @@ def test_the_phase_of_a_resonator_falls_from_0_to_minus_180_degrees():
     assert phase[at_resonance] == pytest.approx(-90.0, abs=12.0)
 
 
-def test_a_long_title_has_two_lines_and_leaves_the_plot_area_as_it_was():
+def test_a_long_title_has_two_lines_and_does_not_change_the_plot_area():
     short, long = (
         Chart(Axis(0.0, 1.0), Axis(0.0, 1.0), words) for words in ("Phase", "Free decay of one impact, " * 3)
     )
@@ -197,7 +197,7 @@ def test_a_long_title_has_two_lines_and_leaves_the_plot_area_as_it_was():
 
 
 def boxes_of_labels(svg):
-    """(row, left, right) of each label that is written across, (None, px, px) of each along its line."""
+    """(row, left, right) of each horizontal label, (None, px, px) of each label along its line."""
     found = re.findall(
         r'<g data-px="([\d.]+)"[^>]*><text class="\w+" (?:x="(-?\d+)" y="(\d+)" text-anchor="(\w+)"|'
         r"transform[^>]*)>([^<]*)",
@@ -210,7 +210,7 @@ def boxes_of_labels(svg):
 
 
 @pytest.mark.parametrize("edge", [650.0, 905.0, 1500.0])
-def test_no_label_lies_on_another_one_or_across_a_line(edge):
+def test_no_label_overlaps_another_label_or_a_line(edge):
     c = Chart(Axis(30.0, 1600.0, "f", "log"), Axis(0.0, 1.0))
     lines = {"ballast 104 Hz": 104.0, "railpad 614 Hz": 614.0, "band edge of the hammer": edge}
     for words, frequency in lines.items():
@@ -223,7 +223,7 @@ def test_no_label_lies_on_another_one_or_across_a_line(edge):
         assert sum(r == row and a < high and low < b for r, a, b in boxes if row) <= 1
 
 
-def test_one_campaign_without_an_error_has_short_numbers_at_its_axis():
+def test_the_axis_of_one_campaign_without_an_error_has_short_numbers():
     mode = {
         "measured_at_utc": datetime(2026, 5, 13), "frequency_hz": 102.13, "frequency_se_hz": None, "n_impacts": 1,
         "damping_ratio": 0.05, "damping_se": None, "rail_temperature_c": None,
@@ -233,8 +233,8 @@ def test_one_campaign_without_an_error_has_short_numbers_at_its_axis():
     assert len(ticks) >= 3 and max(map(len, ticks)) <= 5
 
 
-def test_values_of_a_history_have_the_digits_that_their_intervals_leave():
-    """Half widths are 2.306 errors: 0.0461 of the damping ratio and 11.5 Hz, of which two digits are stated."""
+def test_values_of_a_history_have_as_many_digits_as_their_intervals_justify():
+    """Half widths are 2.306 standard errors: 0.0461 of the damping ratio and 11.5 Hz, stated with two digits."""
     mode = {
         "measured_at_utc": datetime(2026, 5, 13), "frequency_hz": 102.1326, "frequency_se_hz": 5.0, "n_impacts": 9,
         "damping_ratio": 0.12345, "damping_se": 0.02, "rail_temperature_c": None,
@@ -246,7 +246,7 @@ def test_values_of_a_history_have_the_digits_that_their_intervals_leave():
 
 
 def test_one_uncertain_campaign_does_not_flatten_a_history():
-    """Its expected range, -200 to 400 Hz, is cut off: the axis stays within one span of the campaigns, and above 0."""
+    """Its expected range, -200 to 400 Hz, is cut off: the axis stays within one span of the campaigns and above 0."""
     mode = {
         "frequency_se_hz": 1.0,
         "damping_ratio": 0.1,

@@ -1,4 +1,4 @@
-"""Pages of a small registry that went through the whole chain, read as a reader would."""
+"""Pages of a small registry that all stages produced, as a reader sees them."""
 
 import re
 import shutil
@@ -30,8 +30,9 @@ DAYS = (date(2024, 5, 13), date(2024, 6, 17))
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory, repository):
-    """(folder of pages, open registry) of tommerup_s1 with two sections and two campaigns; the second SP is cut off,
-    and the hammer at a third section, OT, is reversed."""
+    """(folder of pages, open registry) of tommerup_s1 with two sections and two campaigns. The second SP is cut off,
+    and the force at a third section, OT, has the wrong sign.
+    """
     root = tmp_path_factory.mktemp("fleet")
     raw, notes = root / "raw", ["campaign,started_at_utc,rail_temperature_c"]
     rng = np.random.default_rng(3)
@@ -62,7 +63,7 @@ def pages(tmp_path_factory, repository):
 
 
 class Reader(HTMLParser):
-    """Text, links and anchors of a page."""
+    """Parser of the text, links and anchors of a page."""
 
     def __init__(self, text):
         super().__init__()
@@ -89,7 +90,7 @@ def read(path):
     return Reader(path.read_text())
 
 
-def test_every_link_leads_somewhere_and_nothing_comes_from_the_network(pages):
+def test_every_link_has_a_target_and_no_page_loads_from_the_network(pages):
     folder, _ = pages
     read_once = cache(read)  # pages have hundreds of links to others
     for path in folder.rglob("*.html"):
@@ -99,7 +100,7 @@ def test_every_link_leads_somewhere_and_nothing_comes_from_the_network(pages):
             assert target.exists(), f"{path.name} links to {link}"
             assert not anchor or anchor in read_once(target).ids, f"{path.name} links to {link}"
         text = re.sub(r"xmlns[^ >]*", "", path.read_text())
-        assert "http" not in text and "src=" not in text  # the only script is in the page itself
+        assert "http" not in text and "src=" not in text  # the only script is inside the page
 
 
 def test_no_page_shows_a_missing_value_as_none_or_nan(pages):
@@ -111,7 +112,7 @@ def test_no_page_shows_a_missing_value_as_none_or_nan(pages):
         assert not re.search(r"\b(nan|NaN|None|null)\b", text), path.name
 
 
-def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(pages):
+def test_the_page_shows_the_resonance_of_the_registry_with_interval_and_n(pages):
     from scipy.stats import t as student
 
     folder, connection = pages
@@ -122,12 +123,12 @@ def test_the_resonance_on_the_page_is_the_registrys_with_its_interval_and_n(page
     words = " ".join(read(folder / "turnouts" / "tommerup_s1.html").words)
     half = student.ppf(0.975, n - 1) * error
     assert f"{frequency:.1f} ± {half:.1f}" in words
-    # the paper's 99.4 Hz with its impact-to-impact spread of 0.6 %
+    # 99.4 Hz of the paper, with a spread between impacts of 0.6 %
     assert abs(frequency - 99.4) < 1.0
 
 
-def test_a_line_without_a_change_says_of_which_sections_and_resonance_it_speaks():
-    silent = {
+def test_a_line_without_a_change_names_its_sections_and_resonance():
+    without_change = {
         "turnout_id": "W1",
         "state": "cannot tell",
         "sections": "A8",
@@ -135,11 +136,18 @@ def test_a_line_without_a_change_says_of_which_sections_and_resonance_it_speaks(
         "change_pct": None,
         "sentence": "too little",
     }
-    told = silent | {"state": "inspect this week", "change_pct": -9.2, "sentence": "railpad resonance of A8 fell"}
-    assert [line["words"] for line in lines_of([silent, told])] == ["A8, railpad: too little", told["sentence"]]
+    with_change = without_change | {
+        "state": "inspect this week",
+        "change_pct": -9.2,
+        "sentence": "railpad resonance of A8 fell",
+    }
+    assert [line["words"] for line in lines_of([without_change, with_change])] == [
+        "A8, railpad: too little",
+        with_change["sentence"],
+    ]
 
 
-def test_a_diagnosis_on_which_two_alarms_rest_is_shown_once():
+def test_a_diagnosis_of_two_alarms_is_shown_once():
     row = {
         "turnout_id": "W1",
         "state": "plan",
@@ -152,13 +160,13 @@ def test_a_diagnosis_on_which_two_alarms_rest_is_shown_once():
     assert [line["diagnosis"] for line in lines_of(rows)] == ["local pad; 4 tests", "", "as above for this turnout"]
 
 
-def test_what_was_not_used_is_named_with_its_reason_and_remedy(pages):
+def test_files_that_were_not_used_are_listed_as_in_quarantine(pages):
     folder, _ = pages
     words = " ".join(read(folder / "turnouts" / "tommerup_s1.html").words)
     assert "SP_1.npz" in words and "In quarantine" in words
 
 
-def test_a_section_without_measurements_says_so(pages):
+def test_the_page_states_that_a_section_has_no_measurements(pages):
     folder, _ = pages
     page = read(folder / "turnouts" / "tommerup_s1.html")
     words = " ".join(page.words)
@@ -166,15 +174,15 @@ def test_a_section_without_measurements_says_so(pages):
     assert "Latest hammer test, none" not in words and words.count("Without a hammer test") == 1
 
 
-def test_a_section_whose_test_was_rejected_says_why_without_a_click(pages):
+def test_the_reason_of_a_rejected_test_is_visible_without_a_click(pages):
     text = (pages[0] / "turnouts" / "tommerup_s1.html").read_text()
     own = text[text.index('<h2 id="OT"') : text.index('<h2 id="SP"')]
     assert "No model yet." in own and "Latest hammer test, 2024-06-17: 0 of 10 impacts accepted" in own
     assert "<details" not in own
 
 
-def test_the_diverging_track_leaves_the_main_one_at_the_switch_toe():
-    """Without a sensor at the switch panel it did so beside the first sensor, wherever that was."""
+def test_the_diverging_track_starts_at_the_switch_toe_in_the_diagram():
+    """Formerly, without a sensor at the switch panel, it started at the first sensor, wherever that was."""
     one = {"section_id": "t/A", "label": "A", "panel": "CP", "track": "main", "position_m": 24.0}
     rows = [one, one | {"position_m": 26.0}]
     main, branch = re.findall(r'class="rail" d="M([\d.]+)', diagram(rows, {}))
@@ -182,7 +190,7 @@ def test_the_diverging_track_leaves_the_main_one_at_the_switch_toe():
     assert float(main) == left and float(branch) == pytest.approx(left + (right - left) * 4.0 / 34.0, abs=0.1)
 
 
-def test_a_fleet_without_data_has_a_page(tmp_path):
+def test_a_fleet_page_is_written_without_data(tmp_path):
     register([], tmp_path / "registry", read=read_results)
     with open_registry(tmp_path / "registry") as connection:
         assert write_pages(connection, tmp_path / "pages", progress=False) == 1
@@ -191,7 +199,7 @@ def test_a_fleet_without_data_has_a_page(tmp_path):
 
 @pytest.fixture
 def copied(pages, tmp_path):
-    """(folder of pages, folder of the registry) of one's own."""
+    """Copies for a test to change: (folder of pages, folder of the registry)."""
     for name in ("pages", "registry"):
         shutil.copytree(pages[0].parent / name, tmp_path / name, ignore=shutil.ignore_patterns(".spill"))
     rebuild_database(tmp_path / "registry")
@@ -199,14 +207,14 @@ def copied(pages, tmp_path):
 
 
 def written(folder, action):
-    """Names of the turnouts' pages that ``action`` has written."""
+    """Names of the turnout pages that ``action`` writes."""
     before = {p: p.stat().st_mtime_ns for p in folder.glob("turnouts/*.html")}
     action()
     after = {p: p.stat().st_mtime_ns for p in folder.glob("turnouts/*.html")}
     return sorted(p.stem for p in after if after[p] != before.get(p))
 
 
-def test_pages_are_written_once_and_again_only_where_the_registry_says_something_new(copied):
+def test_a_page_is_written_again_only_if_its_rows_in_the_registry_change(copied):
     folder, registry = copied
     assert written(folder, lambda: report_job(registry, folder, log=folder / "log")) == []
     assert "1 pages of generation" in (folder / "log").read_text()
@@ -220,20 +228,20 @@ def test_pages_are_written_once_and_again_only_where_the_registry_says_something
     assert "tamping" in (folder / "turnouts/tommerup_s2.html").read_text()
 
 
-def test_a_page_that_somebody_deleted_or_cut_off_is_written_again(copied):
+def test_a_deleted_or_truncated_page_is_written_again(copied):
     folder, registry = copied
     (folder / "turnouts/tommerup_s1.html").unlink()
     (folder / "turnouts/tommerup_s2.html").write_text("<!doctype html>")
     assert written(folder, lambda: report_job(registry, folder)) == ["tommerup_s1", "tommerup_s2"]
 
 
-def test_the_page_of_a_turnout_that_is_no_more_goes_and_other_files_stay(copied):
+def test_the_page_of_a_removed_turnout_is_deleted_and_other_files_are_kept(copied):
     folder, registry = copied
     page = (folder / "turnouts/tommerup_s1.html").read_text()
     (folder / "turnouts/gone.html").write_text(page)
     (folder / "turnouts/notes.html").write_text("<p>mine</p>")
     report_job(registry, folder, ["tommerup_s1"])
-    assert (folder / "turnouts/gone.html").exists(), "asked for one turnout, it leaves the others alone"
+    assert (folder / "turnouts/gone.html").exists(), "a report of one turnout must not change the pages of others"
     report_job(registry, folder)
     assert not (folder / "turnouts/gone.html").exists() and (folder / "turnouts/notes.html").exists()
 
@@ -249,7 +257,7 @@ def test_several_processes_write_the_same_pages(copied, tmp_path, monkeypatch):
 
 
 def test_tables_can_be_read_by_keyboard_and_screen_reader(pages):
-    """Every table lies in a named region that scrolls, every head cell says what it heads, every drawing has a name."""
+    """Every table is in a named region that scrolls, every header cell has a scope, every drawing has a name."""
     folder, _ = pages
     for path in folder.rglob("*.html"):
         text = path.read_text()

@@ -1,4 +1,4 @@
-"""Path data of curves: the steps add up to the points, rounded to hundredths of a pixel."""
+"""Path data of curves: the sums of the steps are the points, rounded to hundredths of a pixel."""
 
 import re
 
@@ -43,5 +43,5 @@ def test_long_and_short_paths_have_the_same_texts():
     assert together.startswith(short) and " 0 0 0" in short
 
 
-def test_bars_start_and_end_where_they_belong():
+def test_bars_start_and_end_at_the_given_positions():
     assert path_bars(np.array([10.0, 0.5]), np.array([20.254, 3.0]), np.array([1.0, 0.0])) == "M10 20.25V1M.5 3V0"

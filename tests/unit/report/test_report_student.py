@@ -1,4 +1,4 @@
-"""Intervals on pages use Student's t: its quantiles are those of printed tables and of scipy."""
+"""Intervals on pages use quantiles of Student's t, which are compared with printed tables and with scipy."""
 
 import math
 

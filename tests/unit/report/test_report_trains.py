@@ -1,4 +1,4 @@
-"""The part about trains of a turnout's page: bars, words and effects say what the rows say."""
+"""The part about trains on the page of a turnout: bars, texts and effects agree with the rows."""
 
 import re
 from datetime import datetime
@@ -26,16 +26,16 @@ def heights(svg):
     return [float(h) for h in re.findall(r'<rect x="[\d.]+" y="[-\d.]+" width="[\d.]+" height="([\d.]+)" fill', svg)]
 
 
-def test_bars_are_as_high_as_their_scores_and_say_them():
+def test_bars_have_the_height_and_the_text_of_their_scores():
     svg = train_bars("train type", [bar("OT", "IC3", 10.0), bar("OT", "freight", 30.0)], SECTIONS)
     low, high = sorted(heights(svg)[:2])
     assert high == pytest.approx(3.0 * low, rel=0.02)
     assert "freight: 30.0 %, n = 20, spread 4.0; others held fixed 29.0" in svg
-    assert ">OT<" in svg and ">A7<" not in svg, "a section without scores takes no room"
+    assert ">OT<" in svg and ">A7<" not in svg, "a section without scores has no space in the chart"
 
 
-def test_of_more_classes_than_colours_those_with_most_passages_are_drawn_and_the_others_are_said():
-    """Speeds from 20 to 200 km/h in classes of 20: nine of them, and nearly all trains are in the fastest."""
+def test_the_classes_with_most_passages_are_drawn_and_the_number_of_others_is_stated():
+    """Nine classes of 20 km/h from 20 to 200 km/h; nearly all trains are in the fastest class."""
     rows = [
         bar("OT", f"{v}-{v + 20} km/h", 10.0, factor="speed", class_from=float(v), n_passages=1 if v < 180 else 500)
         for v in range(20, 200, 20)
@@ -45,7 +45,7 @@ def test_of_more_classes_than_colours_those_with_most_passages_are_drawn_and_the
     assert svg.count("others held fixed 9.0") == 8 and "not drawn" not in train_bars("speed", rows[1:], SECTIONS)
 
 
-def test_a_factor_that_nobody_knows_has_no_chart():
+def test_a_factor_without_data_has_no_chart():
     assert train_bars("axle load", [bar("OT", "IC3", 10.0)], SECTIONS) == ""
 
 
@@ -55,7 +55,7 @@ def test_one_passage_has_a_bar_without_spread_or_interval():
     assert "nan" not in svg and "spread" not in svg.split("</text>", 2)[2]
 
 
-def test_the_words_count_what_the_scores_are_worth():
+def test_the_text_states_how_many_scores_exceed_those_of_random_models():
     shared = {"n_best": 3, "n_compared": 10, "n_no_impulse": 7}
     words = score_words([{"status": "null_explains", "n": 10} | shared, {"status": "accepted", "n": 2} | shared])
     assert words.startswith("12 records of single sensors, compared with the model of the section.")
@@ -72,7 +72,7 @@ PASSAGE = {
 }  # fmt: skip
 
 
-def test_the_part_says_speed_and_load_with_intervals_and_effects_with_what_was_held_fixed():
+def test_the_part_states_speed_and_load_with_intervals_and_effects_with_the_factors_held_fixed():
     effect = {
         "section_id": "t/A7", "score": "fit", "factor": "speed", "per": "10 km/h", "held_fixed": "train type", "n": 40,
         "raw_change_pct": 0.5, "change_pct": -1.0, "low_pct": -1.5, "high_pct": -0.5,
@@ -103,14 +103,14 @@ def test_an_axle_load_of_the_train_data_is_not_shown_as_measured(source, error, 
     assert (row["load"], row["listed"]) == (load, "140 km/h, IC3" + (", 13.9 t" if listed else ""))
 
 
-def test_names_with_quotes_ask_for_themselves():
-    asked = []
-    train_rows(lambda sql: asked.append(sql) or [], ["o'hara"])
-    assert all("'o''hara'" in sql for sql in asked) and len(asked) == 5
+def test_names_with_quotes_are_escaped_in_queries():
+    queries = []
+    train_rows(lambda sql: queries.append(sql) or [], ["o'hara"])
+    assert all("'o''hara'" in sql for sql in queries) and len(queries) == 5
     assert train_rows(lambda sql: 1 / 0, [])["bars"] == {}
 
 
-def test_no_bar_lies_behind_the_legend():
+def test_no_bar_overlaps_the_legend():
     rows = [bar("OT", name, 95.0) for name in ("IC3", "freight", "regional")]
     svg = train_bars("train type", rows, SECTIONS)
     swatches = [float(y) for y in re.findall(r'<rect x="\d+" y="(\d+)" width="10"', svg)]
@@ -119,8 +119,8 @@ def test_no_bar_lies_behind_the_legend():
     assert len(swatches) == 3 and max(swatches) + 10 <= window <= min(t for t in tops if t not in swatches)
 
 
-def test_weekly_peaks_come_before_the_scores_which_are_folded():
-    """Four weeks of which the last two are in alarm: their values are in the picture, the scores behind a summary."""
+def test_weekly_peaks_are_shown_before_the_collapsed_scores():
+    """Four weeks, the last two in alarm: the chart shows their values; the scores are below a closed summary."""
     weeks = [
         {"section_id": "W1/OT", "week_utc": datetime(2026, 1, 5 + 7 * k), "peak_ms2": value, "peak_se_ms2": 2.0,
          "state": state}

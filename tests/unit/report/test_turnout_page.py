@@ -1,4 +1,4 @@
-"""The page of one turnout from rows by hand: what it shows is of the test that it names, and it has an end."""
+"""The page of one turnout from given rows: curves belong to the test that is named, and long lists are shortened."""
 
 import errno
 import re
@@ -34,7 +34,7 @@ def page(**rows):
     return turnout_page(rows, turnout, page_environment().get_template("turnout.html"), shared_by_pages(1))
 
 
-def test_a_rejected_test_is_not_shown_with_the_curves_of_an_earlier_one():
+def test_a_rejected_test_is_not_shown_with_the_curves_of_an_earlier_test():
     text = page(models=[REJECTED], receptances=[RECEPTANCE])
     assert "Latest hammer test, 2026-07-01: 2 of 10 impacts accepted, 5 needed." in text
     assert "n = 30 impacts" not in text and "<details" not in text
@@ -49,7 +49,7 @@ def test_the_curves_of_the_latest_test_are_shown():
 @pytest.mark.parametrize(("mac", "words"), [
     (None, ""), (0.034, "; shape at both responses: modal assurance criterion 0.03 with theirs"),
 ])  # fmt: skip
-def test_a_mode_off_its_track_has_its_shape_where_there_is_a_second_response(mac, words):
+def test_a_mode_off_its_history_is_shown_with_its_shape_if_there_is_a_second_response(mac, words):
     mode = {
         "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 162.0,
         "damping_ratio": 0.05, "frequency_track_hz": 150.0, "damping_track": 0.067, "residue_ratio": None,
@@ -59,7 +59,7 @@ def test_a_mode_off_its_track_has_its_shape_where_there_is_a_second_response(mac
     assert f"(median of 9 campaigns before: 150.0 Hz, 0.067{words})." in text
 
 
-def test_a_mode_with_a_useless_error_is_stated_as_uncertain():
+def test_a_mode_with_a_large_error_is_reported_as_uncertain():
     mode = {
         "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 307.37,
         "damping_ratio": 0.417, "frequency_track_hz": 102.2, "damping_track": 0.209, "residue_ratio": None,
@@ -74,7 +74,7 @@ def test_a_mode_with_a_useless_error_is_stated_as_uncertain():
     assert "another mode, or the track has changed" not in text
 
 
-def test_a_new_panel_is_a_function_and_one_line(monkeypatch):
+def test_a_new_panel_needs_a_function_and_one_line(monkeypatch):
     def count_panel(test):
         return f"<svg><text>{len(test.impacts)} impacts in a new panel</text></svg>"
 
@@ -85,13 +85,13 @@ def test_a_new_panel_is_a_function_and_one_line(monkeypatch):
     assert "3 impacts in a new panel" in text
 
 
-def test_a_section_that_the_configuration_does_not_know_spoils_no_page():
-    """It was measured, and left the layout before it was registered."""
+def test_the_page_shows_a_section_that_the_configuration_does_not_have():
+    """The section was measured and left the layout before its registration."""
     text = page(sections=[SECTION | dict.fromkeys(("panel", "track", "position_m"))])
     assert "A7 (panel not configured, track not configured" in text and "None" not in text
 
 
-def test_a_dead_sensor_of_years_does_not_bury_what_else_is_in_quarantine():
+def test_many_rows_of_a_dead_sensor_do_not_hide_other_rows_of_the_quarantine():
     with duckdb.connect() as con:
         con.execute("""
             create table quarantine_open as
@@ -114,8 +114,8 @@ def test_a_dead_sensor_of_years_does_not_bury_what_else_is_in_quarantine():
     assert shown < 50 and f"and {1000 - shown} more of dead_channel" in text and "more of truncated" not in text
 
 
-def test_what_is_folded_is_printed():
-    """A closed fold hides its content by ``content-visibility`` of ``::details-content``, whatever its children say."""
+def test_collapsed_parts_are_printed():
+    """A closed element hides its content by ``content-visibility`` of ``::details-content``."""
     printed = shared_by_pages(1)["css"].partition("@media print")[2]
     assert "details::details-content{display:block;content-visibility:visible}" in printed
 
@@ -141,14 +141,14 @@ def colours(scheme):
 
 
 def style(selector, scheme="light"):
-    """The rule of the pages' style, with the colours that its variables stand for."""
+    """The rule of the style of the pages, with the values of its colour variables."""
     rule = shared_by_pages(1)["css"].partition(selector + "{")[2].partition("}")[0]
     return re.sub(r"var\(--([\w-]+)\)", lambda m: colours(scheme)[m[1]], rule)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("state", ["inspect", "plan", "learning", "ok"])
-def test_the_words_of_a_badge_can_be_read(state, scheme):
+def test_the_text_of_a_badge_has_enough_contrast(state, scheme):
     """WCAG 2.2, success criterion 1.4.3: at least 4.5 to 1."""
     words = colours(scheme)["badge-ink"]
     assert contrast(words, re.search("background:(#[0-9a-f]+)", style(f".badge.{state}", scheme))[1]) >= 4.5
@@ -156,19 +156,19 @@ def test_the_words_of_a_badge_can_be_read(state, scheme):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", ["ink", "soft", "blue", "orange", "red", "violet"])
-def test_words_can_be_read_on_the_page_and_on_its_panels(name, scheme):
+def test_text_has_enough_contrast_on_the_page_and_on_its_panels(name, scheme):
     table = colours(scheme)
     assert min(contrast(table[name], table[ground]) for ground in ("ground", "panel")) >= 4.5
 
 
-def test_an_alarm_differs_from_an_intact_section_by_more_than_red_and_green():
-    """One man in twelve sees them alike, and so does a printer: they differ 3 to 1 in lightness, or in an outline."""
-    alarm, sound = style(".state-inspect"), style(".state-ok")
-    fills = (re.search("fill:(#[0-9a-f]+)", rule)[1] for rule in (alarm, sound))
-    assert contrast(*fills) >= 3.0 or ("stroke" in alarm and "stroke" not in sound)
+def test_an_alarm_differs_from_an_intact_section_in_lightness_or_outline():
+    """Some readers and printers do not distinguish red and green: lightness differs 3 to 1, or the outline."""
+    alarm, intact = style(".state-inspect"), style(".state-ok")
+    fills = (re.search("fill:(#[0-9a-f]+)", rule)[1] for rule in (alarm, intact))
+    assert contrast(*fills) >= 3.0 or ("stroke" in alarm and "stroke" not in intact)
 
 
-def test_a_full_disk_leaves_the_old_page_and_nothing_beside_it(tmp_path, monkeypatch):
+def test_a_full_disk_leaves_only_the_old_page(tmp_path, monkeypatch):
     (tmp_path / "t.html").write_text("old")
 
     def full(descriptor):
@@ -180,7 +180,7 @@ def test_a_full_disk_leaves_the_old_page_and_nothing_beside_it(tmp_path, monkeyp
     assert [p.name for p in tmp_path.iterdir()] == ["t.html"] and (tmp_path / "t.html").read_text() == "old"
 
 
-def test_the_records_of_one_file_that_fail_alike_have_one_row_of_the_quarantine():
+def test_records_of_one_file_that_fail_in_the_same_way_share_one_row_of_the_quarantine():
     row = {
         "turnout_id": "t", "kind": "hammer", "path": "t/ASM_1.h5", "record": 0, "reason_code": "not_finite",
         "place": "record 1 of 10", "found": "5 samples are not finite", "remedy": "Export it again", "n_alike": 5,
@@ -201,13 +201,13 @@ def test_the_records_of_one_file_that_fail_alike_have_one_row_of_the_quarantine(
         ("passage", "t/A7", "not measured"),
     ],
 )
-def test_a_section_whose_files_cannot_be_read_is_not_called_unmeasured(kind, section, status):
+def test_a_section_whose_files_cannot_be_read_is_not_reported_as_not_measured(kind, section, status):
     row = {
         "turnout_id": "t", "kind": kind, "section_id": section, "path": "t/A7_1.csv", "record": None, "place": "line 1",
         "reason_code": "truncated", "found": "no line break", "remedy": "Copy it again", "n_alike": 1,
     }  # fmt: skip
     measured = SECTION | {"section_id": "t/A9", "label": "A9"}
-    tested = REJECTED | {"section_id": "t/A9"}  # without any test the page has no table of resonances
+    tested = REJECTED | {"section_id": "t/A9"}  # a page without any test has no table of resonances
     text = page(sections=[SECTION, measured], models=[tested], quarantine=[row])
     assert text.count(f"<td>{status}</td>") == 1 and text.count("<td>rejected: too_few_impacts</td>") == 1
 

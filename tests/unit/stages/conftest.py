@@ -1,4 +1,4 @@
-"""The small turnout is a module of its own."""
+"""The folder of the tests is on the path, so that they can import the module ``small_turnout``."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A turnout small enough to be diagnosed in a test: two sections on 36 m of even track, impacts, a locomotive."""
+"""A turnout that is small enough for a diagnosis in a test: two sections on 36 m of uniform track, a locomotive."""
 
 import shutil
 from dataclasses import replace
@@ -65,8 +65,8 @@ locations:
 """
 
 
-def lay_out(folder, repository):
-    """Configuration of the turnout "t1"; returns its folder."""
+def write_configuration(folder, repository):
+    """Write the configuration of the turnout "t1"; return its folder."""
     config = Path(folder) / "config"
     for sub in ("layouts", "tracks"):
         (config / sub).mkdir(parents=True, exist_ok=True)
@@ -78,8 +78,8 @@ def lay_out(folder, repository):
     return config
 
 
-def hangs(gap):
-    """A gap [m] under the sleeper at section A as terms on any stretch of track."""
+def hanging_sleeper(gap):
+    """A gap [m] under the sleeper at section A, as effects on any part of the track."""
     return lambda track: (physics.HangingSleeper(track.nearest_support(SLEEPER), gap),)
 
 
@@ -89,7 +89,7 @@ def soft_pad(track):
 
 
 def write_hammer_tests(folder, terms=None, labels=("A", "B"), day=DAY, impacts=3, seed=1, turnout="t1"):
-    """Hammer tests of a campaign."""
+    """Write the hammer tests of a campaign."""
     config, raw = Path(folder) / "config", Path(folder) / "raw" / turnout
     track = load_track("small", folder=config / "tracks")
     for k, label in enumerate(labels):
@@ -105,8 +105,10 @@ def write_hammer_tests(folder, terms=None, labels=("A", "B"), day=DAY, impacts=3
         write([replace(r, conditions={}) for r in recordings], path, "hdf5")
 
 
-def roll(folder, terms=None, speeds=(90.0, 110.0), day=DAY, change=None, seed=1, vehicle="locomotive", noted=True):
-    """Passages of a locomotive, one an hour; ``change`` (recording) -> recording is what befalls each file."""
+def write_passages(
+    folder, terms=None, speeds=(90.0, 110.0), day=DAY, change=None, seed=1, vehicle="locomotive", noted=True
+):
+    """Write passages of a locomotive, one an hour; ``change`` (recording) -> recording alters each file."""
     config, raw = Path(folder) / "config", Path(folder) / "raw" / "t1"
     track = load_track("small", folder=config / "tracks")
     sensors = tuple(Sensor(name, x, "rail web", noise=0.02) for name, x in PLACES.items())

@@ -1,4 +1,4 @@
-"""A finding written into a track file: readable, rejected where it is not sure, replaced and not doubled."""
+"""An accepted finding is written into a track file: readable, only if it is certain, once per effect and position."""
 
 import json
 import re
@@ -27,10 +27,10 @@ from turnout.stages.mismatch_results import Results
 from turnout.stages.track_files import digest_of_model
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
-HANGS = {"term": "hanging_sleeper", "fixed": {"sleeper": 18.0}, "parameters": {"gap": GAP}}
+HANGING_SLEEPER = {"term": "hanging_sleeper", "fixed": {"sleeper": 18.0}, "parameters": {"gap": GAP}}
 
 
-def finding(term=HANGS, **more):
+def finding(term=HANGING_SLEEPER, **more):
     row = {
         "finding_id": "0123456789abcdef", "sections": "A, B", "verdict": "named", "grade": "A",
         "found_at_utc": datetime(2026, 7, 25, 10), "term_json": json.dumps([term]),
@@ -40,14 +40,14 @@ def finding(term=HANGS, **more):
 
 @pytest.fixture
 def config(tmp_path, repository):
-    return small.lay_out(tmp_path, repository)
+    return small.write_configuration(tmp_path, repository)
 
 
-def own(config):
+def track_of_turnout(config):
     return load_track("t1", folder=config / "tracks")
 
 
-def test_a_file_of_its_own_extends_that_of_the_layout(config):
+def test_the_track_file_of_the_turnout_extends_that_of_the_layout(config):
     before = (config / "tracks/small.yaml").read_text()
     path, words = accept(finding(), config, "t1")
     assert (config / "tracks/small.yaml").read_text() == before
@@ -57,67 +57,71 @@ def test_a_file_of_its_own_extends_that_of_the_layout(config):
         assert part in text
     # 1.12 ± 1.96 * 0.05
     assert "95 %: 1.02 to 1.22 mm" in text
-    (entry,) = accepted_of(own(config).terms)
+    (entry,) = accepted_of(track_of_turnout(config).terms)
     assert (entry.family, entry.place) == ("hanging_sleeper", 18.0)
     assert entry.values["gap"] == pytest.approx((1.12e-3, 0.05e-3), rel=0.01)
     base = load_track("small", folder=config / "tracks")
-    assert np.array_equal(own(config).track.ballast_stiffness, base.track.ballast_stiffness)
+    assert np.array_equal(track_of_turnout(config).track.ballast_stiffness, base.track.ballast_stiffness)
 
 
-def test_comments_and_all_other_lines_of_a_file_stay(config, repository):
+def test_comments_and_all_other_lines_of_a_file_are_kept(config, repository):
     path = config / "tracks/t1.yaml"
     shutil.copy(repository / "config/tracks/tommerup.yaml", path)
     before = path.read_text()
-    at = HANGS | {"fixed": {"sleeper": 24.6}}
+    at = HANGING_SLEEPER | {"fixed": {"sleeper": 24.6}}
     accept(finding(at), config, "t1")
     assert path.read_text().startswith(before) and "extends" not in path.read_text()
-    place = own(config).track.support[accepted_of(own(config).terms)[0].term(own(config).track).sleeper]
+    place = track_of_turnout(config).track.support[
+        accepted_of(track_of_turnout(config).terms)[0].term(track_of_turnout(config).track).sleeper
+    ]
     assert place == pytest.approx(24.6)
 
 
-def test_the_same_effect_at_the_same_place_is_replaced_another_is_added(config):
+def test_the_same_effect_at_the_same_position_is_replaced_and_another_is_added(config):
     accept(finding(), config, "t1")
-    accept(finding(HANGS | {"parameters": {"gap": GAP | {"value": 1.5e-3}}}), config, "t1")
-    accept(finding(HANGS | {"fixed": {"sleeper": 18.6}}), config, "t1")
+    accept(finding(HANGING_SLEEPER | {"parameters": {"gap": GAP | {"value": 1.5e-3}}}), config, "t1")
+    accept(finding(HANGING_SLEEPER | {"fixed": {"sleeper": 18.6}}), config, "t1")
     gain = {
         "term": "sensor_gain",
         "fixed": {"channel_name": "A"},
         "parameters": {"gain": GAP | {"value": 1.2, "unit": "-"}},
     }
     accept(finding(gain), config, "t1")
-    found = accepted_of(own(config).terms)
+    found = accepted_of(track_of_turnout(config).terms)
     assert [(a.key, round(next(iter(a.values.values()))[0], 6)) for a in found] == [
         ("hanging_sleeper[18.0 m]", 1.5e-3), ("hanging_sleeper[18.6 m]", 1.12e-3), ("sensor_gain[A]", 1.2),
     ]  # fmt: skip
 
 
-def test_behind_the_crossing_an_effect_is_on_the_track_of_its_route_alone(config, repository):
+def test_an_effect_behind_the_crossing_is_only_on_the_track_of_its_route(config, repository):
     shutil.copy(repository / "config/tracks/tommerup.yaml", config / "tracks/t1.yaml")
     at = {"main": 0.5e-3, "diverging": 1.5e-3}
     for route, gap in (*at.items(), *at.items()):
-        term = HANGS | {"fixed": {"sleeper": 28.2}, "parameters": {"gap": GAP | {"value": gap}}}
+        term = HANGING_SLEEPER | {"fixed": {"sleeper": 28.2}, "parameters": {"gap": GAP | {"value": gap}}}
         accept(finding(term, route=route), config, "t1")
-    accept(finding(HANGS | {"fixed": {"sleeper": 13.8}}, route="main"), config, "t1")
-    track = own(config)
+    accept(finding(HANGING_SLEEPER | {"fixed": {"sleeper": 13.8}}, route="main"), config, "t1")
+    track = track_of_turnout(config)
     for route, gap in at.items():
         terms = terms_on(track, track.track_of(route), route=route)
-        assert [t.gap for t in terms] == pytest.approx([gap, 1.12e-3])  # the closure's bearers carry both
+        assert [t.gap for t in terms] == pytest.approx(
+            [gap, 1.12e-3]
+        )  # the bearers of the closure panel carry both tracks
     (entry,) = [a for a in accepted_of(track.terms) if a.place == 13.8]
     assert entry.is_on("main") and entry.is_on("diverging")
 
 
-def test_an_entry_without_a_route_is_replaced_by_the_same_effect_on_one(config, repository):
+def test_an_entry_without_a_route_is_replaced_by_the_same_effect_with_a_route(config, repository):
     path = config / "tracks/t1.yaml"
     shutil.copy(repository / "config/tracks/tommerup.yaml", path)
-    term = HANGS | {"fixed": {"sleeper": 28.2}}
+    term = HANGING_SLEEPER | {"fixed": {"sleeper": 28.2}}
     accept(finding(term, route="main"), config, "t1")
     path.write_text(path.read_text().replace("    route: main\n    sleeper", "    sleeper"))
-    assert [a.route for a in accepted_of(own(config).terms)] == [""]
+    assert [a.route for a in accepted_of(track_of_turnout(config).terms)] == [""]
     accept(finding(term, route="main"), config, "t1")
-    assert [a.route for a in accepted_of(own(config).terms)] == ["main"]
+    assert [a.route for a in accepted_of(track_of_turnout(config).terms)] == ["main"]
 
 
-def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypatch, tmp_path):
+def test_a_diagnosis_does_not_use_effects_that_were_accepted_on_the_other_route(monkeypatch, tmp_path):
     given = []
 
     def case_of(campaign, settings, accepted, cache):
@@ -126,23 +130,27 @@ def test_what_was_accepted_on_the_other_route_is_no_part_of_a_diagnosis(monkeypa
 
     monkeypatch.setattr(mismatch, "TrackCase", case_of)
     turnout = SimpleNamespace(id="t1", raw="raw", settings={"mismatch": None})
-    standing = [AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")]
-    about = {"visit": "2026-07-25", "identity": "one", "notes": [], "changes": ()}
+    already_accepted = [
+        AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")
+    ]
+    description = {"visit": "2026-07-25", "identity": "one", "notes": [], "changes": ()}
     options = mismatch.Options(fits=tmp_path)
-    rows = mismatch._diagnose_group(Group(("B",), "diverging", None), turnout, standing, about, options, (0, 1))
+    rows = mismatch._diagnose_group(
+        Group(("B",), "diverging", None), turnout, already_accepted, description, options, (0, 1)
+    )
     assert given == ["", "diverging"] and "that is all" in rows["quarantine"][0]["found"]
 
 
 @pytest.mark.parametrize("more", [{"verdict": "unknown", "grade": None}, {"verdict": "a_or_b"}, {"grade": None}])
-def test_what_is_not_named_is_rejected_unless_asked_for(config, more):
+def test_a_finding_without_a_name_is_accepted_only_with_the_option_anyway(config, more):
     with pytest.raises(SimulationError, match="--anyway"):
         accept(finding(**more), config, "t1")
     assert not (config / "tracks/t1.yaml").exists()
     accept(finding(**more), config, "t1", anyway=True)
-    assert len(own(config).terms) == 1
+    assert len(track_of_turnout(config).terms) == 1
 
 
-def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_rejected(config):
+def test_a_finding_without_effect_and_an_effect_of_a_wheelset_are_rejected(config):
     with pytest.raises(SimulationError, match="no effect that could be accepted"):
         accept(finding(term_json=None, verdict="none"), config, "t1", anyway=True)
     flat = {"term": "wheel_flat", "fixed": {"wheel": 1}, "parameters": {"length": GAP}}
@@ -150,27 +158,27 @@ def test_nothing_to_accept_and_what_belongs_to_a_wheelset_are_rejected(config):
         accept(finding(flat), config, "t1", anyway=True)
 
 
-def test_a_place_off_the_track_or_a_value_out_of_bounds_changes_nothing(config):
+def test_a_position_off_the_track_or_a_value_out_of_bounds_changes_no_file(config):
     for wrong in ({"fixed": {"sleeper": 99.0}}, {"parameters": {"gap": GAP | {"value": 0.2}}}):
         with pytest.raises(SimulationError):
-            accept(finding(HANGS | wrong), config, "t1")
+            accept(finding(HANGING_SLEEPER | wrong), config, "t1")
         assert [p.name for p in (config / "tracks").iterdir()] == ["small.yaml"]
 
 
-def test_an_entry_by_hand_that_makes_no_sense_is_named(config):
+def test_a_wrong_entry_in_a_track_file_is_reported(config):
     accept(finding(), config, "t1")
     path = config / "tracks/t1.yaml"
     text = path.read_text()
     without = "".join(line for line in text.splitlines(keepends=True) if "gap" not in line)
-    for changed, said in (
+    for changed, expected_message in (
         (text.replace("term: hanging_sleeper", "term: hanging"), "no effect"),
         (text.replace("    gap:", "    depth:"), "has no 'depth'"),
         (text.replace("    gap:", "    route: siding\n    gap:"), "'siding' is no route"),
         (without, "needs gap"),
     ):
         path.write_text(changed)
-        with pytest.raises(TurnoutError, match=said):
-            accepted_of(own(config).terms)
+        with pytest.raises(TurnoutError, match=expected_message):
+            accepted_of(track_of_turnout(config).terms)
 
 
 def test_a_track_that_extends_itself_is_rejected(config):
@@ -184,14 +192,14 @@ OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name != "roughness_level" 
 
 
 @pytest.mark.parametrize("term", OF_TRACK_AND_SENSORS, ids=lambda t: t.name)
-def test_every_effect_comes_back_from_the_file_as_it_was_written(config, term):
-    """The file carries four digits: nothing may be further off than that."""
+def test_every_effect_is_read_from_the_file_as_it_was_written(config, term):
+    """The file has four digits, which bounds the difference."""
     made = term.example()
     candidate = SimpleNamespace(family=term.name, parameters=term.parameters)
     track = own_track(config)
-    told = describe_term(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
-    accept(finding(told), config, "t1", anyway=True)
-    back = accepted_of(own(config).terms)[0].term(own(config).track)
+    described = describe_term(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
+    accept(finding(described), config, "t1", anyway=True)
+    back = accepted_of(track_of_turnout(config).terms)[0].term(track_of_turnout(config).track)
     for name, value in vars(made).items():
         assert getattr(back, name) == (pytest.approx(value, rel=1e-3) if isinstance(value, float) else value)
 
@@ -201,9 +209,9 @@ def own_track(config):
 
 
 def test_an_accepted_gap_is_simulated(config):
-    """An impact on a sleeper that hangs finds no ballast: the file's term does what the term itself does."""
+    """The effect of the file gives the same simulation as the effect itself: no ballast below the gap."""
     accept(finding(), config, "t1")
-    track = own(config)
+    track = track_of_turnout(config)
     short = {"n_impacts": 1, "half_length": 99.0, "duration": 0.1}
     by_file = simulate_hammer(track, 18.0, terms=terms_on(track, track.track), **short)
     index = track.track.nearest_support(18.0)
@@ -211,8 +219,8 @@ def test_an_accepted_gap_is_simulated(config):
     assert np.array_equal(by_file[0].samples, by_hand[0].samples)
 
 
-def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
-    """With the term in the case, the prediction is the one with the term given; its column is the derivative."""
+def test_accepted_effects_are_simulated_and_estimated_again_in_a_case(config):
+    """The prediction with the accepted effect is that with the given effect; its column is the derivative."""
     plan = small_plan((15.0,), passages=False, hammer_positions=(21.6, 24.0))
     campaign = measured_campaign(plan, seed=2)
     case = TrackCase(campaign, families=("local_ballast",))
@@ -222,40 +230,44 @@ def test_accepted_effects_are_simulated_and_estimated_anew_in_a_case(config):
         "parameters": {"factor": GAP | {"value": 0.5, "unit": "-"}},
     }
     accept(finding(entry), config, "t1", anyway=True)
-    accepted = accepted_of(own(config).terms)
-    alone = case.predictor.rail
-    guided = TrackCase(campaign, families=("local_ballast",), accepted=accepted)
-    # passages are simulated on the rail that impacts give with the effect in place, not on the one without it
-    assert guided.predictor.rail == {name: guided.start_values[name] for name in alone} != alone
-    (own_nuisance,) = guided.accepted.nuisances
+    accepted = accepted_of(track_of_turnout(config).terms)
+    rail_without_effect = case.predictor.rail
+    with_accepted = TrackCase(campaign, families=("local_ballast",), accepted=accepted)
+    # passages are simulated on the rail that the impacts give with the effect, not on that without it
+    assert (
+        with_accepted.predictor.rail
+        == {name: with_accepted.start_values[name] for name in rail_without_effect}
+        != rail_without_effect
+    )
+    (own_nuisance,) = with_accepted.accepted.nuisances
     assert own_nuisance.mean == 0.5 and own_nuisance.sd == pytest.approx(0.25)
-    assert len(guided.candidates) == len(case.candidates) - 1
-    values = {n.name: n.mean for n in guided.nuisances}
+    assert len(with_accepted.candidates) == len(case.candidates) - 1
+    values = {n.name: n.mean for n in with_accepted.nuisances}
     term = physics.LocalBallast(case.predictor.track().nearest_support(24.0), 0.5)
-    with_it = guided.predict(values, (), guided.observations)
+    with_it = with_accepted.predict(values, (), with_accepted.observations)
     assert all(np.array_equal(a, b) for a, b in zip(with_it, case.predict(values, (term,), case.observations)))
-    jacobian = guided.nuisance_jacobian(values, (), guided.observations, with_it)
-    moved = guided.predict({**values, own_nuisance.name: 0.501}, (), guided.observations)
-    for j, a, b in zip(jacobian, moved, with_it):
-        assert j.shape[1] == len(guided.nuisances)
-        # a secant of 0.005 against one of 0.001
+    jacobian = with_accepted.nuisance_jacobian(values, (), with_accepted.observations, with_it)
+    shifted = with_accepted.predict({**values, own_nuisance.name: 0.501}, (), with_accepted.observations)
+    for j, a, b in zip(jacobian, shifted, with_it):
+        assert j.shape[1] == len(with_accepted.nuisances)
+        # a difference quotient with step 0.005 against one with step 0.001
         assert j[:, -1] == pytest.approx((a - b) / 1e-3, abs=0.02 * np.abs((a - b) / 1e-3).max())
 
 
-def test_a_term_that_cannot_be_told_from_no_effect_is_rejected(config):
-    nothing = HANGS | {"parameters": {"gap": GAP | {"value": 1e-6}}}
+def test_an_effect_without_a_measurable_size_is_rejected(config):
+    nothing = HANGING_SLEEPER | {"parameters": {"gap": GAP | {"value": 1e-6}}}
     with pytest.raises(SimulationError, match="no parameter differs"):
         accept(finding(nothing), config, "t1")
     assert accept(finding(nothing), config, "t1", anyway=True)[0].exists()
 
 
-def test_another_track_is_another_diagnosis(config):
-    """What was kept of an interrupted run was simulated on the track that it was asked for."""
+def test_a_diagnosis_with_another_track_file_is_computed_again(config):
+    """Stored results of an interrupted run belong to the track file with which it was started."""
     turnout = SimpleNamespace(id="t1", folder=config, layout="small")
     for name in ("other", "ground"):
         shutil.copy(config / "tracks/small.yaml", config / f"tracks/{name}.yaml")
     own_file, found = digest_of_model(turnout), [digest_of_model(turnout, "other")]
-    for name in ("other", "ground"):  # the second may be what the first extends
+    for name in ("other", "ground"):  # the first may extend the second
         with open(config / f"tracks/{name}.yaml", "a", encoding="utf-8") as file:
             file.write("# measured again\n")
         found.append(digest_of_model(turnout, "other"))
@@ -263,24 +275,24 @@ def test_another_track_is_another_diagnosis(config):
     assert digest_of_model(turnout) == own_file
 
 
-def accepted_as(law, value, error):
-    """An accepted effect with one parameter, which the simulation below takes as it is."""
+def accepted_as(effect, value, error):
+    """An accepted effect with one parameter; the simulation below uses the parameter directly."""
     return SimpleNamespace(
-        key=law.name, parameters=law.parameters[:1], values={law.parameters[0].name: (value, error)},
+        key=effect.name, parameters=effect.parameters[:1], values={effect.parameters[0].name: (value, error)},
         term=lambda track, values=None: values or {}, is_of=lambda *_: False,
     )  # fmt: skip
 
 
-def test_an_accepted_limit_may_move_by_half_of_itself():
-    """80 m/s²: beside 100,000, which stands for no limit, it would be free from 0 to anything."""
+def test_the_prior_sd_of_an_accepted_limit_is_half_of_its_value():
+    """80 m/s²: half of the neutral value of 100,000, which stands for no limit, would make it free."""
     (limit,) = effects_on(None, (accepted_as(physics.Clipping, 80.0, 1.0),)).nuisances
     assert limit.sd == pytest.approx(40.0)
     (gap,) = effects_on(None, (accepted_as(physics.HangingSleeper, 1e-3, 1e-5),)).nuisances
     assert gap.sd == pytest.approx(5e-4)
 
 
-def test_the_derivative_by_an_accepted_gap_goes_to_the_side_where_the_simulation_can():
-    """The response is the gap in millimetres, squared; above a millimetre nothing converges: 2 less the step."""
+def test_the_derivative_by_an_accepted_gap_uses_the_side_where_the_simulation_converges():
+    """The response is the squared gap in mm; nothing converges above 1 mm: the derivative is 2 less the step."""
 
     class Squared:
         def predict(self, values, terms, observations):
@@ -300,8 +312,8 @@ def test_the_derivative_by_an_accepted_gap_goes_to_the_side_where_the_simulation
     assert column[0, 0] == pytest.approx(1e3 * (2.0 - 0.02 * 0.5), rel=1e-6)
 
 
-def test_searches_take_accepted_effects_as_part_of_the_base_model():
-    """Fixed as fitted: no nuisance, no column of the Jacobian, and every candidate is looked at."""
+def test_searches_include_accepted_effects_in_the_base_model():
+    """Fixed at their fitted values: no nuisance parameter, no column of the Jacobian; all candidates are tested."""
 
     class Doubled:
         def predict(self, values, terms, observations):
@@ -333,7 +345,7 @@ def fit_of(values, jacobian):
         (("gap", "pad"), "f", "several findings begin with f. Write one of them after --finding."),
     ],
 )
-def test_a_finding_that_is_not_there_or_not_the_only_one_is_named(tmp_path, monkeypatch, effects, finding_id, message):
+def test_a_missing_or_ambiguous_finding_is_an_error(tmp_path, monkeypatch, effects, finding_id, message):
     rows = [
         {"finding_id": f"f{k}", "sections": "A", "verdict": "named", "term": effect, "term_json": effect}
         for k, effect in enumerate(effects)

@@ -1,4 +1,4 @@
-"""An accepted change belongs to the calibrated model from its onset on; withdrawn, it leaves no trace."""
+"""The calibrated model contains an accepted change from its onset on; a withdrawn change leaves no trace."""
 
 import shutil
 from datetime import datetime
@@ -45,7 +45,7 @@ CANDIDATES = change_candidates(PARAMETERS)
 
 
 def history_of(sizes, seed=1, at=2):
-    """One visit every half year; the ballast at support ``at`` has changed by ``sizes`` at each."""
+    """One visit every half year; the ballast at support ``at`` differs by ``sizes`` at the visits."""
     rng = np.random.default_rng(seed)
     rows = np.array([[0.6 ** abs(i - j) for j in range(N_SUPPORT)] for i in range(6)])
     intact, visits = rng.normal(0.0, 0.1, N_SUPPORT), []
@@ -69,7 +69,7 @@ def accepted_of(answer, visits):
 
 @pytest.mark.parametrize("sizes", [(0, 0, -1, -1), (0, 0, -1, -1, -1, -1), (0, 0, -0.3, -0.6, -0.9, -1.2)])
 @pytest.mark.parametrize("seed", range(5))
-def test_an_accepted_step_or_growth_is_not_named_again(sizes, seed):
+def test_an_accepted_step_or_growth_is_not_reported_again(sizes, seed):
     visits = history_of(sizes, seed)
     before = answer_of(visits)
     assert "local_ballast" in before.names and before.position == pytest.approx(1.2)
@@ -80,7 +80,7 @@ def test_an_accepted_step_or_growth_is_not_named_again(sizes, seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_grows_on_or_changes_elsewhere_is_named_since_the_acceptance(seed):
+def test_further_growth_and_changes_elsewhere_are_reported_after_the_acceptance(seed):
     sizes = (0, 0, -1, -1)
     accepted = accepted_of(answer_of(history_of(sizes, seed)), history_of(sizes, seed))
     after = answer_of(history_of((*sizes, -1.8, -1.8), seed), accepted)
@@ -91,9 +91,11 @@ def test_what_grows_on_or_changes_elsewhere_is_named_since_the_acceptance(seed):
 
 
 @pytest.mark.parametrize("seed", range(100, 110))
-def test_growth_that_goes_on_after_the_acceptance_is_told_within_three_visits(seed):
-    """What happened until the acceptance is explained, so that the onset is not before it. Without this 16 of 60 are
-    "unknown": growth may then begin in years that the acceptance has made uninformative."""
+def test_growth_that_continues_after_the_acceptance_is_reported_within_three_visits(seed):
+    """The change up to the acceptance is explained, so that the onset is not before it.
+
+    Without this, 16 of 60 are "unknown": growth could then begin in years that the acceptance has made uninformative.
+    """
     sizes = [-0.3 * max(v - 1, 0) for v in range(9)]
     accepted = accepted_of(answer_of(history_of(sizes[:6], seed)), history_of(sizes[:6], seed))
     further = answer_of(history_of(sizes, seed), accepted)
@@ -101,8 +103,8 @@ def test_growth_that_goes_on_after_the_acceptance_is_told_within_three_visits(se
     assert further.size == pytest.approx(-0.6, abs=4.0 * further.sd + 0.05)
 
 
-def test_the_belief_follows_the_accepted_change_at_once_and_only_there():
-    """Noise of variance q at one support is the Kalman recursion with it: the update of a Gaussian, in closed form."""
+def test_the_estimate_follows_the_accepted_change_at_once_and_only_at_its_support():
+    """Process noise of variance q at one support: the closed-form Gaussian update of a Kalman filter."""
     visits = history_of((0, 0, -1.5))
     accepted = AcceptedChange("local_ballast", 1.2, 1.2, STEP, 2 * STEP)
     (event,) = change_events([accepted], PARAMETERS, CANDIDATES, visits)
@@ -117,7 +119,7 @@ def test_the_belief_follows_the_accepted_change_at_once_and_only_there():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_an_accepted_change_is_no_deviation_from_the_file(seed):
+def test_an_accepted_change_is_not_reported_as_a_deviation_from_the_file(seed):
     visits = history_of((0, 0, -1, -1, -1), seed)
     accepted = [AcceptedChange("local_ballast", 1.2, 1.2, STEP, 2 * STEP)]
     events = change_events(accepted, PARAMETERS, CANDIDATES, visits)
@@ -129,7 +131,7 @@ def test_an_accepted_change_is_no_deviation_from_the_file(seed):
     assert [a.verdict for a in answers] == ["none", "none"]
 
 
-def test_a_dip_opens_the_surface_within_reach_of_the_nose():
+def test_an_accepted_dip_makes_the_running_surface_near_the_nose_uncertain():
     depth = StateParameter("ln depth of nose at 5.00 m", 0.0, 0.2, 0.0, "depth", None, 5.0)
     number = StateParameter("length of nose at 5.00 m", 0.0, 0.2, 0.0, "surface", None, 5.0)
     dip = ChangeEffect("dip of 0.4 m@5.30", {"wave": 1.0}, 1e-3, False)
@@ -156,8 +158,8 @@ def row(**more):
     "more",
     [{"verdict": "a_or_b"}, {"term": None}, {"term": "rail_shear"}, {"position_m": None}, {"onset_by_utc": None}],
 )
-def test_what_is_not_named_or_has_no_place_is_not_accepted(tmp_path, repository, more):
-    small.lay_out(tmp_path, repository)
+def test_a_change_without_a_name_or_a_position_is_not_accepted(tmp_path, repository, more):
+    small.write_configuration(tmp_path, repository)
     with pytest.raises(SimulationError, match="t1, A, B"):
         accept(row(**more), tmp_path / "config", "t1")
     assert not (tmp_path / "config/tracks/t1.yaml").exists()
@@ -173,27 +175,27 @@ def test_a_further_change_at_the_same_position_is_a_second_entry():
 DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
 
 
-def row_of_night():
+def change_of_nightly_run():
     turnout = with_raw(load_configuration("config").turnout("t1"), Path("raw"))
     files = tuple(sorted(f for u in scan(turnout, Path("raw")).units for f in u.files))
     (change,) = change_unit(Unit("t1", "change", "A+B", files, ""), turnout, "raw", {}, "x")["change_findings"]
     return change
 
 
-def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the_same(
+def test_the_nightly_run_reports_no_change_after_the_acceptance_and_the_same_after_its_withdrawal(
     tmp_path, repository, monkeypatch, capsys
 ):
     from turnout.registry.derived_tables import publish
     from turnout.registry.job import register
 
-    small.lay_out(tmp_path, repository)
+    small.write_configuration(tmp_path, repository)
     monkeypatch.chdir(tmp_path)
     for k, day in enumerate(DAYS):
         soft = (lambda track: (physics.LocalBallast(track.nearest_support(small.SLEEPER), 0.4),)) if k > 1 else None
         small.write_hammer_tests(tmp_path, soft, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
-    before, model = row_of_night(), calibrate_turnout("t1")
+    before, model = change_of_nightly_run(), calibrate_turnout("t1")
     assert (before["verdict"], before["term"], before["position_m"]) == ("named", "local_ballast", 18.0)
-    either = {"verdict": "a_or_b", "rival_term": "hanging_sleeper"}  # which is accepted with --anyway alone
+    either = {"verdict": "a_or_b", "rival_term": "hanging_sleeper"}  # which is accepted only with --anyway
     register([], tmp_path / "registry", read=iter, tables={"turnouts": [{"turnout_id": "t1", "layout": "small"}]})
     publish(
         tmp_path / "registry",
@@ -207,10 +209,10 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     track, effects = track_of(turnout)
     (change,) = changes_of(track.terms)
     assert effects == () and change.words in ("local ballast at 18.0 m", "hanging sleeper at 18.0 m")
-    after = row_of_night()
+    after = change_of_nightly_run()
     assert after["verdict"] == "none" and f"accepted before: {change.words}" in after["sentence"]
     accepted = calibrate_turnout("t1")
-    change_in_model, against_file = model.answers  # with two visits before it, soft ballast may as well be a gap
+    change_in_model, against_file = model.answers  # two earlier visits do not distinguish soft ballast from a gap
     assert (change_in_model.question, change_in_model.verdict) == ("change", "a_or_b")
     assert change_in_model.names == ("local_ballast", "hanging_sleeper") and change_in_model.position == 18.0
     assert (against_file.question, against_file.verdict) == ("file", "none")
@@ -220,10 +222,10 @@ def test_a_night_after_the_acceptance_names_nothing_and_after_its_withdrawal_the
     contained = accepted.history.belief.mean[number]
     assert contained == pytest.approx(before["change"], abs=0.15)
     (tmp_path / "config/tracks/t1.yaml").unlink()
-    assert row_of_night() == before
+    assert change_of_nightly_run() == before
     withdrawn = calibrate_turnout("t1")
     for name in ("mean", "covariance"):
         assert getattr(withdrawn.history.belief, name).tobytes() == getattr(model.history.belief, name).tobytes()
     assert withdrawn.answers == model.answers
     shutil.rmtree("work")
-    assert row_of_night() == before
+    assert change_of_nightly_run() == before

@@ -1,4 +1,4 @@
-"""Effects of a track's file on a part of that track."""
+"""Effects of a track file on a part of that track."""
 
 import pytest
 
@@ -10,40 +10,40 @@ from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, effects_of, terms_on
 
 TRACK = uniform_track(60.0)
-LIFTS = AcceptedEffect("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})
+LIFTING_SLEEPERS = AcceptedEffect("lifting_sleepers", {"first": 12.0, "last": 55.8}, {"share": (1.0, None)})
 
 
 @pytest.mark.parametrize(("place", "half"), [(30.0, 30.0), (30.0, 12.0), (10.0, 6.0), (58.0, 5.0), (12.0, 0.7)])
-def test_of_a_range_what_lies_on_the_stretch_is_simulated(place, half):
-    """The supports from 12.0 to 55.8 m that a stretch has, told by their places: they are those of the whole track."""
+def test_the_part_of_a_range_that_is_on_the_stretch_is_simulated(place, half):
+    """The supports of the stretch between 12.0 and 55.8 m, by position, are those of the whole track."""
     stretch = stretch_of_track(TRACK, place, half)
-    term = LIFTS.term(stretch)
+    term = LIFTING_SLEEPERS.term(stretch)
     expected = [x for x in TRACK.support.round(6) if 12.0 <= x <= 55.8 and abs(x - place) <= half]
     assert list(stretch.support[term.first : term.last + 1].round(6)) == expected
 
 
 @pytest.mark.parametrize(("place", "half"), [(5.0, 6.0), (59.0, 2.5)])
-def test_a_range_that_lies_elsewhere_is_left_out(place, half):
-    assert LIFTS.term(stretch_of_track(TRACK, place, half)) is None
+def test_a_range_outside_the_stretch_is_left_out(place, half):
+    assert LIFTING_SLEEPERS.term(stretch_of_track(TRACK, place, half)) is None
 
 
-def test_one_sleeper_beyond_the_end_is_left_out():
+def test_a_sleeper_outside_the_stretch_is_left_out():
     gap = AcceptedEffect("hanging_sleeper", {"sleeper": 30.0}, {"gap": (3e-4, None)})
     assert gap.term(TRACK).sleeper == 50 and gap.term(stretch_of_track(TRACK, 10.0, 12.0)) is None
 
 
 @pytest.mark.parametrize(
-    ("first", "error", "said"),
+    ("first", "error", "message"),
     [
         (Number(12.0, "kg", "x"), ConfigError, r"terms\[0\]\.first: the unit 'kg' is not one of 'm'"),
         ("toe", ConfigError, r"terms\[0\]\.first: 'toe' has no unit and source"),
         (56.4, SimulationError, "lifting_sleepers from 56.4 m back to 55.8 m"),
     ],
 )
-def test_a_place_that_is_none_is_rejected(first, error, said):
+def test_an_invalid_position_is_rejected(first, error, message):
     share = Number(1.0, "-", "x")
     entry = {"term": "lifting_sleepers", "first": first, "last": 55.8, "share": share}
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=message):
         accepted_of([ParameterSet(Place("t.yaml", entry="terms[0]"), entry)])
 
 
@@ -63,7 +63,7 @@ def entry_of(**fields):
         ({"term": "rail_shear", "flexibility": Number(0.5, "-", "x")}, True),
     ],
 )
-def test_an_effect_on_no_route_of_the_whole_track_is_named(fields, is_on):
+def test_an_effect_on_no_route_of_the_whole_track_is_an_error(fields, is_on):
     turnout = TurnoutTrack(TRACK, terms=(entry_of(**fields),))
     if is_on:
         assert len(effects_of(turnout)) == len(terms_on(turnout, TRACK)) == 1

@@ -1,4 +1,4 @@
-"""The calibrated model of a small turnout from its files: what the visits say together, and what is read again."""
+"""The calibrated model of a small turnout from its files: the joint result of visits, and repeated computations."""
 
 import re
 import shutil
@@ -42,11 +42,11 @@ DAYS = ("2025-08-01", "2025-11-01", "2026-02-01", "2026-05-01")
 def year(tmp_path_factory, repository):
     """Four hammer tests; the pad at 18.0 m is soft in the last one. Trains at the first visit."""
     folder = tmp_path_factory.mktemp("year")
-    small.lay_out(folder, repository)
+    small.write_configuration(folder, repository)
     for k, day in enumerate(DAYS):
         terms = small.soft_pad if k == 3 else None
         small.write_hammer_tests(folder, terms, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
-    small.roll(folder, day=datetime.fromisoformat(f"{DAYS[0]}T09:00"))
+    small.write_passages(folder, day=datetime.fromisoformat(f"{DAYS[0]}T09:00"))
     return folder
 
 
@@ -65,7 +65,7 @@ def model(year, tmp_path_factory):
     return calibrated.calibrate_turnout("t1", year / "config", year / "raw", work), work
 
 
-def test_the_pad_that_became_soft_is_the_change_with_its_size_and_onset(model):
+def test_a_softened_pad_is_reported_with_its_size_and_onset(model):
     best = model[0].changes[0]
     assert best.effect.name.startswith("pad@18.00") and best.gain > 100.0
     others = [c for c in model[0].changes if not c.effect.name.startswith("pad@18.00")]
@@ -75,8 +75,8 @@ def test_the_pad_that_became_soft_is_the_change_with_its_size_and_onset(model):
     assert best.onset == DAYS[3]
 
 
-def test_the_model_of_a_track_with_a_switch_says_that_its_answers_are_not_proven(model, year, monkeypatch):
-    """Both what is printed and its rows; a track without a blade has no such sentence."""
+def test_the_model_of_a_track_with_a_switch_states_that_its_answers_are_not_proven(model, year, monkeypatch):
+    """The text and the rows state it; those of a track without a switch do not."""
     plain, work = model
     assert not any(UNPROVEN_SWITCH in line for line in model_text("t1", plain))
     assert all(row["reservation"] is None for row in calibrated.answer_rows(plain))
@@ -99,7 +99,7 @@ def test_a_visit_that_differs_is_not_used_and_the_others_agree_with_the_file(mod
     assert sd["ballast_stiffness"] < 0.4 and sd["pad@18.00"] < 0.8 and sd["pad@16.20"] > sd["pad@18.00"]
 
 
-def test_visits_are_fitted_once_and_again_when_code_or_recordings_change(model, year, monkeypatch):
+def test_visits_are_fitted_again_only_when_code_or_recordings_change(model, year, monkeypatch):
     _, work = model
 
     def again():
@@ -118,7 +118,7 @@ def test_visits_are_fitted_once_and_again_when_code_or_recordings_change(model, 
     assert read_visits(work / "calibrated-model", "t1", versions) == []
 
 
-def test_a_withdrawn_visit_is_as_if_it_had_never_been(turnout, model):
+def test_a_withdrawn_visit_has_no_effect_on_the_model(turnout, model):
     work = turnout / "work"
     shutil.copytree(model[1], work)
     shutil.rmtree(turnout / "raw" / "t1" / "hammer" / DAYS[1])
@@ -132,8 +132,8 @@ def test_a_withdrawn_visit_is_as_if_it_had_never_been(turnout, model):
     assert len(never.history.steps) == 3
 
 
-def test_the_information_of_a_visit_is_that_of_its_joint_fit(year):
-    """With independent errors: mean and covariance are those of one more Gauss-Newton step of the joint fit."""
+def test_the_information_of_a_visit_equals_that_of_its_joint_fit(year):
+    """With independent errors, mean and covariance are those of one more Gauss-Newton step of the joint fit."""
     turnout = with_raw(load_configuration(year / "config").turnout("t1"), year / "raw")
     units = visits(scan(turnout, year / "raw").units)[DAYS[0]]
     track, _ = track_of(turnout)
@@ -147,7 +147,7 @@ def test_the_information_of_a_visit_is_that_of_its_joint_fit(year):
     for o, j, r in zip(case.observations, fit.jacobian, fit.white):
         foreign = [k for k, n in enumerate(case.nuisances) if n.owner not in (None, o.name)]
         rows = np.array(j, dtype=float) * np.sqrt(o.effective / fit.scale[o.data_type])
-        rows[:, foreign] = 0.0  # updates by Broyden's formula leave traces there
+        rows[:, foreign] = 0.0  # updates by Broyden's formula make these columns nonzero
         precision = precision + rows.T @ rows
         slope = slope + np.sqrt(o.effective / fit.scale[o.data_type]) * rows.T @ r
     covariance = np.linalg.inv(precision)
@@ -165,8 +165,8 @@ def test_the_information_of_a_visit_is_that_of_its_joint_fit(year):
         visit_groups(case, fit.without_jacobian(), "A, B")
 
 
-def test_passages_that_are_not_fitted_inform_as_if_they_were(year):
-    """One passage fitted and one linear about the fit, against both fitted: means within half a standard deviation."""
+def test_linearized_passages_give_the_same_information_as_fitted_passages(year):
+    """One fitted and one linearized passage against two fitted ones: means within half a standard deviation."""
     turnout = with_raw(load_configuration(year / "config").turnout("t1"), year / "raw")
     units = visits(scan(turnout, year / "raw").units)[DAYS[0]]
     track, _ = track_of(turnout)
@@ -187,7 +187,7 @@ def test_passages_that_are_not_fitted_inform_as_if_they_were(year):
     np.testing.assert_allclose(beliefs[1].sd, beliefs[0].sd, rtol=0.15)
 
 
-def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_out(turnout, capsys):
+def test_the_stage_writes_the_state_after_a_visit_and_leaves_out_a_visit_with_a_finding(turnout, capsys):
     tables = diagnose_turnout("t1", visit=DAYS[0])
     rows = {r["parameter"]: r for r in tables["twin_states"]}
     assert tables["mismatch_findings"][0]["verdict"] == "none"
@@ -212,8 +212,8 @@ def test_the_stage_writes_the_state_after_a_visit_and_a_finding_keeps_the_visit_
     assert f"appeared after {DAYS[2]}, at the latest at {DAYS[3]}" in printed
 
 
-def test_a_visit_with_a_finding_is_fitted_where_a_change_is_sought_as_if_it_had_been_at_once(turnout, monkeypatch):
-    """Its answer stays: the belief does not use it."""
+def test_a_visit_with_a_finding_is_fitted_later_with_the_same_result_as_at_once(turnout, monkeypatch):
+    """The search for changes needs its fit. Its answer is unchanged, and the estimate does not use it."""
 
     def stored():
         (visit,) = read_visits(Path("work/calibrated-model"), "t1", {DAYS[3]: {}})
@@ -235,46 +235,46 @@ def test_a_visit_with_a_finding_is_fitted_where_a_change_is_sought_as_if_it_had_
     assert calibrated.calibrate_turnout("t1").computed == ()
 
 
-def test_work_on_the_track_opens_what_it_touches(turnout):
+def test_maintenance_makes_the_affected_parameters_uncertain(turnout):
     (turnout / "config" / "events.csv").write_text(
         "turnout,section,date,kind,resets,note\nt1,A,2026-01-10,tamping,,\nt1,,2026-01-11,sensor_change,,\n"
-        "t2,,2026-01-12,tamping,,\nt1,,2026-01-13,other,,\nt1,A99,2026-01-14,tamping,,\n"  # no such section
+        "t2,,2026-01-12,tamping,,\nt1,,2026-01-13,other,,\nt1,A99,2026-01-14,tamping,,\n"  # there is no such section
     )
     parameters = [
         StateParameter("ballast@18.00", 0.0, 0.1, 0.0, "ballast", 30, 18.0),
         StateParameter("ballast@30.00", 0.0, 0.1, 0.0, "ballast", 50, 30.0),
         StateParameter("gain_A", 0.0, 0.02, 0.0, "gain", None, 18.0),
         StateParameter("pad@18.00", 0.0, 0.1, 0.0, "pad", 30, 18.0),
-        StateParameter("ln depth of the kink at 18.20 m", 0.0, 0.4, 0.0, "depth"),  # no work on ballast mends a nose
+        StateParameter("ln depth of the kink at 18.20 m", 0.0, 0.4, 0.0, "depth"),  # tamping does not repair a nose
     ]
     tamping, sensors = events_of(load_configuration("config").turnout("t1"), parameters)
     assert tamping.opened == {"ballast@18.00": 0.1} and sensors.opened == {"gain_A": 0.02}
     assert years_of("2026-01-09") < tamping.time < years_of("2026-01-11")
 
 
-def record_work(text):
+def write_events(text):
     Path("config/events.csv").write_text(f"turnout,section,date,kind,resets,note\n{text}")
 
 
-def test_a_rebuilt_turnout_knows_nothing_of_what_lay_there_before(turnout, model):
-    """To the bit the model of the recordings since the renewal; that of a section makes all of its parts uncertain."""
+def test_the_model_of_a_renewed_turnout_uses_no_recording_from_before_the_renewal(turnout, model):
+    """Equal, bit by bit, to the model of later recordings; renewal of a section makes all its parts uncertain."""
     shutil.copytree(model[1], "work")
     rest = [years_of(day) for day in DAYS[2:]]
-    record_work(f"t1,,{DAYS[1]},tamping,,\nt1,,2025-12-01,renewal,,\nt2,,2026-04-01,renewal,,\n")
+    write_events(f"t1,,{DAYS[1]},tamping,,\nt1,,2025-12-01,renewal,,\nt2,,2026-04-01,renewal,,\n")
     renewed = calibrated.calibrate_turnout("t1")
     assert [s.time for s in renewed.history.steps] == rest and renewed.computed == ()
     for day in DAYS[:2]:
         shutil.rmtree(Path("raw/t1/hammer") / day)
     shutil.rmtree("raw/t1/passages")
-    record_work("")
+    write_events("")
     never = calibrated.calibrate_turnout("t1")
     assert renewed.history.belief.covariance.tobytes() == never.history.belief.covariance.tobytes()
     assert renewed.history.belief.mean.tobytes() == never.history.belief.mean.tobytes()
-    record_work("t1,A,2025-12-01,renewal,,\n")
+    write_events("t1,A,2025-12-01,renewal,,\n")
     of_section = calibrated.calibrate_turnout("t1")
     (event,) = events_of(load_configuration("config").turnout("t1"), of_section.history.parameters)
     assert {"ballast@18.00", "pad@18.00"} <= set(event.opened)
-    record_work("t1,,2026-06-01,renewal,,\n")
+    write_events("t1,,2026-06-01,renewal,,\n")
     with pytest.raises(SimulationError, match="no passage below raw since its renewal on 2026-06-01"):
         calibrated.calibrate_turnout("t1")
 
@@ -282,20 +282,20 @@ def test_a_rebuilt_turnout_knows_nothing_of_what_lay_there_before(turnout, model
 def test_the_diagnosis_of_all_visits_leaves_out_those_before_a_renewal(turnout, monkeypatch):
     used = []
     monkeypatch.setattr(mismatch_results, "diagnose_visit", lambda unit, *_: used.extend(unit.files) or {})
-    record_work("t1,,2026-03-01,renewal,,\n")
+    write_events("t1,,2026-03-01,renewal,,\n")
     diagnose_turnout("t1", visit="all")
     assert {path.split("/")[2] for path, *_ in used} == {DAYS[3]}
     used.clear()
-    record_work(f"t1,,{datetime.now() + timedelta(days=30):%Y-%m-%d},renewal,,\n")
+    write_events(f"t1,,{datetime.now() + timedelta(days=30):%Y-%m-%d},renewal,,\n")
     diagnose_turnout("t1", visit="all")  # a planned renewal has not happened
     assert {path.split("/")[2] for path, *_ in used if "hammer" in path} == set(DAYS)
     used.clear()
-    diagnose_turnout("t1", visit=DAYS[0])  # what is asked for by its day is diagnosed
+    diagnose_turnout("t1", visit=DAYS[0])  # a visit that is given by its day is diagnosed
     assert len(used) == 4
 
 
-def test_a_train_of_unknown_type_is_left_out_and_mentioned_again_by_every_call(turnout):
-    """The belief is to the bit that without trains."""
+def test_a_train_of_unknown_type_is_left_out_and_reported_by_every_call(turnout):
+    """The estimate equals, bit by bit, that without trains."""
     for day in DAYS[1:]:
         shutil.rmtree(Path("raw/t1/hammer") / day)
     Path("config/vehicles/locomotive.yaml").unlink()
@@ -310,14 +310,14 @@ def test_a_train_of_unknown_type_is_left_out_and_mentioned_again_by_every_call(t
         assert any(line.startswith("note: 2 passages") for line in model_text("t1", found))
 
 
-def test_a_turnout_without_recordings_says_so(turnout, capsys):
+def test_a_turnout_without_recordings_is_an_error(turnout, capsys):
     shutil.rmtree(turnout / "raw")
     with pytest.raises(SimulationError, match="no hammer test and no passage"):
         calibrated.calibrate_turnout("t1")
     assert main(["twin", "--turnout", "t1"]) == 2 and "nothing can be calibrated" in capsys.readouterr().err
 
 
-def test_of_one_visit_no_answer_on_changes_is_printed():
+def test_no_answer_about_changes_is_printed_for_a_single_visit():
     history = SimpleNamespace(
         used_steps=[SimpleNamespace(n_recordings=2)], steps=[], parameters=[],
         belief=SimpleNamespace(mean=np.zeros(0), sd=np.zeros(0)),

@@ -1,4 +1,4 @@
-"""What an open alarm rests on: hammer tests of all visits and newest trains together, or why there is no decision."""
+"""The diagnosis of an open alarm from hammer tests of all visits and the newest trains, or why there is none."""
 
 import os
 import shutil
@@ -40,24 +40,24 @@ FACTOR = 0.4
 
 
 def soft_ballast(track, n=1, factor=FACTOR):
-    """Ballast with a share of its stiffness under ``n`` sleepers, the middle one at section A."""
+    """Ballast with a share of its stiffness under ``n`` sleepers; the middle sleeper is at section A."""
     first = track.nearest_support(small.SLEEPER) - n // 2
     return tuple(physics.LocalBallast(first + k, factor) for k in range(n))
 
 
-def softened(folder, repository, terms):
-    """Four hammer tests; the ballast is soft in the last two. Five trains at the last visit."""
-    small.lay_out(folder, repository)
+def write_softened(folder, repository, terms):
+    """Four hammer tests with soft ballast in the last two, and five trains at the last visit."""
+    small.write_configuration(folder, repository)
     for k, day in enumerate(DAYS):
         at = datetime.fromisoformat(f"{day}T09:00")
         small.write_hammer_tests(folder, terms if k > 1 else None, day=at, seed=10 * k)
-    small.roll(folder, terms, (80.0, 90.0, 100.0, 110.0, 120.0), at)
+    small.write_passages(folder, terms, (80.0, 90.0, 100.0, 110.0, 120.0), at)
     return folder
 
 
 @pytest.fixture(scope="module")
 def year(tmp_path_factory, repository):
-    return softened(tmp_path_factory.mktemp("softened"), repository, soft_ballast)
+    return write_softened(tmp_path_factory.mktemp("softened"), repository, soft_ballast)
 
 
 @pytest.fixture
@@ -78,8 +78,10 @@ def row_of(turnout):
     return row
 
 
-def test_soft_ballast_of_a_stretch_is_named_with_onset_and_fit_of_held_out_trains(tmp_path, repository, monkeypatch):
-    softened(tmp_path, repository, partial(soft_ballast, n=3, factor=0.5))
+def test_soft_ballast_below_three_sleepers_is_diagnosed_with_onset_and_fit_of_held_out_trains(
+    tmp_path, repository, monkeypatch
+):
+    write_softened(tmp_path, repository, partial(soft_ballast, n=3, factor=0.5))
     monkeypatch.chdir(tmp_path)
     row = row_of(tmp_path)
     assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
@@ -91,7 +93,7 @@ def test_soft_ballast_of_a_stretch_is_named_with_onset_and_fit_of_held_out_train
     assert "3 held-out trains" in row["sentence"] and "trains of 2026-05-01 name softer ballast" in row["sentence"]
 
 
-def test_impacts_tell_one_soft_support_from_a_gap_by_its_damper_and_trains_fit_either(turnout):
+def test_impacts_distinguish_one_soft_support_from_a_gap_by_its_damping_and_trains_do_not(turnout):
     row = row_of(turnout)
     assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
     assert row["position_m"] == 18.0 and "trains of 2026-05-01 agree with more than one effect" in row["sentence"]
@@ -100,14 +102,14 @@ def test_impacts_tell_one_soft_support_from_a_gap_by_its_damper_and_trains_fit_e
     assert row["fit_after_pct"] > row["fit_before_pct"] + 2.0 * row["fit_gain_se_pct"]
 
 
-def test_without_trains_the_damper_tells_soft_ballast_from_a_gap(turnout):
+def test_without_trains_the_damping_distinguishes_soft_ballast_from_a_gap(turnout):
     shutil.rmtree("raw/t1/passages")
     row = row_of(turnout)
     assert (row["verdict"], row["term"], row["rival_term"]) == ("named", "local_ballast", None)
     assert "no train since then is recorded" in row["sentence"]
 
 
-def test_without_a_track_file_or_a_simulation_the_reason_is_the_answer(turnout, monkeypatch):
+def test_without_a_track_file_or_a_simulation_the_answer_states_the_reason(turnout, monkeypatch):
     def fails(*_, **__):
         raise change_diagnosis.SimulationError("the matrix is singular")
 
@@ -120,37 +122,37 @@ def test_without_a_track_file_or_a_simulation_the_reason_is_the_answer(turnout, 
     assert row["found_at_utc"] == datetime(2026, 5, 1, 23, 59)
 
 
-def night():
-    """The stage of open alarms, in the present folder."""
+def nightly_run():
+    """Run the stage of open alarms in the current folder."""
     stage = Stage("change", change_unit, "v1", lambda turnout, settings: ("", {}), change_units.alarmed_groups)
     configuration = load_configuration("config")
     write_plans(configuration, Path("raw"), Path("work/plan"), 2)
     return run_shard(Path("work/plan"), Path("work/change/00of01.json"), stage, configuration, Path("raw"))
 
 
-def test_a_visit_is_fitted_once_and_a_second_night_computes_nothing(turnout, monkeypatch):
+def test_a_visit_is_fitted_once_and_a_second_nightly_run_computes_nothing(turnout, monkeypatch):
     alarms = {"t1": ["B"]}
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: alarms)
     monkeypatch.setattr(change_diagnosis, "trains_of_change", lambda *_: None)
     fitted = []
     store = change_diagnosis.store_visit
     monkeypatch.setattr(change_diagnosis, "store_visit", lambda *a, **k: (fitted.append(a[4]["visit"]), store(*a, **k)))
-    assert night().processed == 1 and fitted == list(DAYS)
-    assert night().processed == 0 and fitted == list(DAYS)
+    assert nightly_run().processed == 1 and fitted == list(DAYS)
+    assert nightly_run().processed == 0 and fitted == list(DAYS)
     small.write_hammer_tests(turnout, soft_ballast, day=datetime(2026, 6, 1, 9), seed=50)
-    assert night().processed == 1 and fitted == [*DAYS, "2026-06-01"]
+    assert nightly_run().processed == 1 and fitted == [*DAYS, "2026-06-01"]
     alarms.clear()
-    assert night().processed == 0
+    assert nightly_run().processed == 0
 
 
-def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_the_kill(year, tmp_path, monkeypatch):
+def test_a_killed_diagnosis_continues_after_the_last_visit_and_gives_the_same_result(year, tmp_path, monkeypatch):
     monkeypatch.setattr(change_units, "open_alarms", lambda registry: {"t1": ["B"]})
     monkeypatch.setattr(change_diagnosis, "trains_of_change", lambda *_: None)
     store, fitted, deadly = change_diagnosis.store_visit, tmp_path / "fitted", tmp_path / "deadly"
 
     def store_visit(*args, **more):
         store(*args, **more)
-        with open(fitted, "a") as stream:  # a unit that was killed is computed in a process of its own
+        with open(fitted, "a") as stream:  # a unit that was killed is computed in a separate process
             stream.write(f"{args[4]['visit']}\n")
         if deadly.exists() and args[4]["visit"] == DAYS[1]:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -163,16 +165,16 @@ def test_a_killed_diagnosis_goes_on_behind_the_last_visit_and_ends_as_without_th
         if name == "killed":
             deadly.touch()
             if (child := os.fork()) == 0:
-                night()
+                nightly_run()
                 os._exit(0)
             assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
             assert not Path("work/change/00of01.json").exists() or not batch_paths([Path("work/change/00of01.json")])
             deadly.unlink()
-        assert night().processed == 1 and night().processed == 0
+        assert nightly_run().processed == 1 and nightly_run().processed == 0
         (batch,) = batch_paths([Path("work/change/00of01.json")])
         (result,) = read_results(batch)
         rows[name] = result.tables
-    assert fitted.read_text().split() == [*DAYS, *DAYS]  # no visit twice
+    assert fitted.read_text().split() == [*DAYS, *DAYS]  # no visit is fitted twice
     assert rows["killed"] == rows["calm"] and len(rows["calm"]["change_findings"]) == 1
 
 
@@ -184,7 +186,7 @@ def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer
 
     days = [f"2026-0{month}-01" for month in range(1, 8)]
     tests = [at("hammer", day) for day in days]
-    trains = [at("passage", day) for day in days[1:]]  # none at the first visit
+    trains = [at("passage", day) for day in days[1:]]  # no train at the first visit
     chosen = change_units._trains_of_first_and_newest_visits(tests, trains)
     assert [p.unit.label[:8] for p in chosen] == ["20260201", "20260301", "20260601", "20260701"]
     by_visit = visits(p.unit for p in (*tests, *trains))
@@ -196,7 +198,7 @@ def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer
     ]
 
 
-def test_the_sentence_counts_the_visits_of_which_a_train_was_used():
+def test_the_sentence_states_the_number_of_visits_with_used_trains():
     def at(visit, *groups):
         information = tuple(GroupInformation(g, 1, (), np.zeros((0, 0)), np.zeros(0)) for g in groups)
         return StoredVisit(visit, "A", "", information, ())
@@ -218,7 +220,7 @@ def test_the_sentence_counts_the_visits_of_which_a_train_was_used():
     ("nats", "rise", "error", "expected"),
     [(2.0, 0.5, 0.25, 2.0), (5.0, 0.2, 0.2, 0.5), (2.0, -0.2, 0.2, 0.0), (-1.0, -0.2, 0.2, -1.0), (5.0, 0.1, 0.0, 0.5)],
 )
-def test_held_out_trains_that_fit_worse_add_no_evidence(nats, rise, error, expected):
+def test_a_worse_fit_of_held_out_trains_adds_no_evidence(nats, rise, error, expected):
     assert evidence_of_rise(nats, rise, error) == pytest.approx(expected)
 
 
@@ -262,7 +264,7 @@ def test_hammer_tests_and_trains_give_one_answer(given, test, expected):
         ((18.0, 18.6), (None, 18.0), (18.0, 18.6), "(first support at 18.0 m or before, last support at 18.0 to 18.6"),
     ],
 )  # fmt: skip
-def test_the_sentence_says_how_far_a_change_may_reach(changed, first, last, words):
+def test_the_sentence_states_the_possible_extent_of_a_change(changed, first, last, words):
     named = replace(
         answer("named", ("local_pad",)), changed=tuple(f"pad@{x:.2f}" for x in changed), ends=StretchEnds(first, last)
     )
@@ -271,7 +273,7 @@ def test_the_sentence_says_how_far_a_change_may_reach(changed, first, last, word
     assert (row["first_low_m"], row["last_high_m"]) == (first[0], last[1])
 
 
-def test_no_change_and_too_few_visits_are_no_name():
+def test_no_change_too_few_visits_and_an_unknown_change_give_no_name():
     nothing = ModelAnswer("2026-05-01", "change", "none")
     assert "no change at any support has enough evidence" in finding_of_change(nothing, None, 4, 8)["sentence"]
     assert "at least two visits are needed" in finding_of_change(nothing, None, 1, 2)["sentence"]
@@ -282,7 +284,7 @@ def test_no_change_and_too_few_visits_are_no_name():
 
 
 @pytest.mark.parametrize(("nats", "verdict"), [(3.0, "none"), (6.0, "named")])
-def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdict):
+def test_held_out_trains_can_add_the_evidence_that_a_candidate_effect_lacks(nats, verdict):
     test = trains("named", "local_ballast")
     test.finding["gain_nats"] = nats
     weak = ModelAnswer(**{**vars(answer("named", ("local_ballast",))), "gain": 8.0})
@@ -294,7 +296,7 @@ def test_held_out_trains_may_add_the_evidence_that_a_suspicion_lacks(nats, verdi
     assert "softer ballast at 18.0 m" in row["sentence"]
 
 
-def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
+def test_the_worklist_contains_the_newest_diagnoses(tmp_path, monkeypatch):
     from turnout.registry.database import open_registry
     from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult
@@ -315,8 +317,8 @@ def test_the_list_gets_the_newest_diagnoses(tmp_path, monkeypatch):
     assert (tmp_path / "list.csv").exists()
 
 
-def test_growth_states_its_rate_and_what_it_has_reached():
-    """A rate says how urgent it is, the change so far how bad it is; of a step both are the same."""
+def test_the_sentence_of_growth_states_its_rate_and_the_change_so_far():
+    """For a step the change so far is the change itself, so the sentence does not repeat it."""
     row = {
         "verdict": "named", "term": "local_ballast", "rival_term": None, "component": "ballast", "position_m": 3.6,
         "n_visits": 6, "n_recordings": 12, "onset_after_utc": datetime(2025, 3, 1), "trains_visit": None,

@@ -1,4 +1,4 @@
-"""Units of the diagnosis of change: computed again when the recorded work at the turnout changes."""
+"""Units of the diagnosis of changes are computed again when the recorded maintenance of the turnout changes."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from turnout.workflow.plan import write_plans
 
 @pytest.fixture
 def folder(tmp_path, repository, monkeypatch):
-    small.lay_out(tmp_path, repository)
+    small.write_configuration(tmp_path, repository)
     for day in ("2025-08-01", "2025-11-01"):
         for section in "AB":
             path = tmp_path / f"raw/t1/hammer/{day}/{section}_1.npz"
@@ -24,7 +24,7 @@ def folder(tmp_path, repository, monkeypatch):
 
 
 def note_with(table):
-    """Note of the only unit, with this content of events.csv."""
+    """Note of the only unit if events.csv has this content."""
     Path("config/events.csv").write_text(table)
     configuration = load_configuration("config")
     write_plans(configuration, Path("raw"), Path("work/plan"), 1)
@@ -41,12 +41,12 @@ def note_with(table):
         ("turnout,section,date,kind", " t1,,2025-09-01,tamping", " t1,,2025-09-02,tamping"),
     ],
 )
-def test_work_in_a_table_of_any_form_is_part_of_the_unit(folder, header, row, changed):
+def test_maintenance_in_a_table_of_any_form_is_part_of_the_unit(folder, header, row, changed):
     notes = [note_with("\n".join([header, *rows]) + "\n") for rows in ([], [row], [changed])]
     assert len(set(notes)) == 3
 
 
-def test_what_does_not_concern_the_turnout_computes_nothing_again(folder):
+def test_maintenance_of_another_turnout_does_not_cause_a_new_computation(folder):
     header = "turnout,section,date,kind,resets,note\n"
     first = note_with(f"{header}t1,A,2025-09-01,tamping,,\n")
     assert note_with(f"{header}t2,,2025-09-01,tamping,,\nt1,A,2025-09-01,tamping,,by hand\n") == first

@@ -1,4 +1,4 @@
-"""Checkpoints of a diagnosis: exact to the last bit, and never a file that could run code."""
+"""Checkpoints of a diagnosis are exact to the last bit, and no checkpoint file can execute code."""
 
 import pickle
 from datetime import datetime
@@ -27,13 +27,13 @@ class Amount(Case):
 
 
 class Trap:
-    """Unpickling it is a failure of the test."""
+    """To unpickle it is a failure of the test."""
 
     def __reduce__(self):
         return pytest.fail, ("a pickle was loaded",)
 
 
-def test_a_fit_comes_back_to_the_last_bit(tmp_path):
+def test_a_stored_fit_is_read_exactly_to_the_last_bit(tmp_path):
     fit = fit_jointly(Amount())
     Checkpoint(tmp_path, "t1")["base"] = fit
     back = Checkpoint(tmp_path, "t1")["base"]
@@ -44,7 +44,7 @@ def test_a_fit_comes_back_to_the_last_bit(tmp_path):
     assert np.array_equal(fit.covariance, back.covariance)
 
 
-def test_rows_come_back_in_their_order_with_their_types(tmp_path):
+def test_stored_rows_are_read_in_their_order_with_their_types(tmp_path):
     row = {
         "z": 1, "a": float("nan"), "at": datetime(2026, 7, 25, 9, 0, 0, 5), "low": -np.inf, "sure": np.bool_(True),
         "x": np.arange(3, dtype=np.float32), "none": None, "where": ("S1", 24.0), "names": [], "third": 1.0 / 3.0,
@@ -62,8 +62,8 @@ def test_rows_come_back_in_their_order_with_their_types(tmp_path):
     assert found["transposed"].flags.f_contiguous and np.array_equal(found["transposed"], row["transposed"])
 
 
-def test_a_file_of_the_former_pickles_is_not_read(tmp_path):
-    """Neither under its former name nor where a present file would be."""
+def test_a_pickle_of_an_earlier_version_is_not_read(tmp_path):
+    """Neither under its former name nor under the present one."""
     store = Checkpoint(tmp_path, "t1", ("identity",))
     store["base"] = 1.0
     path = store._path("base")
@@ -77,7 +77,7 @@ def test_a_file_of_the_former_pickles_is_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", b"PK\x03\x04broken"])
-def test_a_damaged_file_counts_as_missing(tmp_path, content):
+def test_a_damaged_file_is_treated_as_missing(tmp_path, content):
     store = Checkpoint(tmp_path, "t1")
     store["base"] = {"a": np.arange(3)}
     whole = store._path("base").read_bytes()
@@ -86,7 +86,7 @@ def test_a_damaged_file_counts_as_missing(tmp_path, content):
         assert "base" not in Checkpoint(tmp_path, "t1")
 
 
-def test_another_version_is_not_read(tmp_path, monkeypatch):
+def test_a_file_of_another_version_is_not_read(tmp_path, monkeypatch):
     Checkpoint(tmp_path, "t1", ("one",))["base"] = 1.0
     assert "base" not in Checkpoint(tmp_path, "t1", ("two",))
     monkeypatch.setattr("turnout.stages.checkpoint.VERSION", 99)
@@ -97,14 +97,14 @@ def test_another_version_is_not_read(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("value", [Trap(), {"f": print}, np.array([Trap()], dtype=object)])
-def test_what_could_only_be_pickled_is_not_written(tmp_path, value):
+def test_values_that_could_only_be_pickled_are_not_written(tmp_path, value):
     with pytest.raises(TypeError, match="a checkpoint holds no"):
         write_value(tmp_path / "v.npz", value)
     assert not list(tmp_path.iterdir())
 
 
 class Doubling:
-    """A predictor that counts its work, on a rail of its own."""
+    """Predictor that counts its calls, with its own rail."""
 
     def __init__(self, shear=0.0):
         self.rail, self.n = {"rail_shear": shear}, 0
@@ -118,8 +118,8 @@ class Doubling:
         return [np.array([[2.0]])]
 
 
-def test_a_replay_computes_nothing_twice_and_knows_the_rail(tmp_path):
-    """The same request on another rail is another prediction: it was once answered by the one stored before."""
+def test_a_replay_computes_nothing_twice_and_distinguishes_rails(tmp_path):
+    """The same request with another rail is another prediction; formerly it got the stored one."""
     seen = [SimpleNamespace(name="p")]
     for n in (2, 0):
         plain, softer = Doubling(), Doubling(0.5)
@@ -130,13 +130,13 @@ def test_a_replay_computes_nothing_twice_and_knows_the_rail(tmp_path):
         assert plain.n + softer.n == n
 
 
-def test_the_first_prediction_never_exceeds_the_budget_and_hammer_tests_never_do(tmp_path):
-    told = []
-    budget = Budget(Watch(deadline=0.0, tell=told.append), Replay(tmp_path, "predictions"))
+def test_the_first_prediction_and_hammer_tests_never_exceed_the_budget(tmp_path):
+    reported = []
+    budget = Budget(Watch(deadline=0.0, tell=reported.append), Replay(tmp_path, "predictions"))
     hammer, passage = budget(Doubling(), True), budget(Doubling(), False)
     for _ in range(3):
         hammer.predict({"a": 1.0}, (), ())
     passage.predict({"a": 1.0}, (), ())
     with pytest.raises(BudgetSpentError):
         passage.predict({"a": 2.0}, (), ())
-    assert told == [1, 2, 3, 4, 5]
+    assert reported == [1, 2, 3, 4, 5]

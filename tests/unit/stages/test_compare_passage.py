@@ -1,4 +1,4 @@
-"""A recorded passage beside its simulation: the same train agrees, a louder recording differs by its factor."""
+"""A recorded passage beside its simulation: the same train agrees, and a scaled recording differs by its factor."""
 
 import csv
 from dataclasses import replace
@@ -19,7 +19,7 @@ FACTOR = {"OT": 1.0, "A7": 1.0, "ASM": 2.0}
 
 @pytest.fixture(scope="module")
 def passage(tmp_path_factory):
-    """Recording of a locomotive at 5 kHz, twice as loud at ASM; A9 and ASD are on the other track."""
+    """Recording of a locomotive at 5 kHz, with twice the level at ASM; A9 and ASD are on the other track."""
     folder = tmp_path_factory.mktemp("raw")
     places = {**SENSORS, **OTHERS}
     sensors = [Sensor(name, x, "rail web", gain=0.02 if name in ("A9", "ASD") else 1.0) for name, x in places.items()]
@@ -61,7 +61,7 @@ def test_both_bands_are_complete(comparison):
 
 
 def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
-    """20 lg 2 = 6.02 dB. The found speed is 0.4 % off, so the time series of the high band are out of phase."""
+    """20 lg 2 = 6.02 dB. The estimated speed is 0.4 % off, so the time series of the high band are out of phase."""
     level = {(b.sensor, b.low): b.level_difference for b in comparison.bands}
     assert level["A7", 0.0] == pytest.approx(0.0, abs=0.3) and level["A7", 40.0] == pytest.approx(0.0, abs=1.5)
     assert level["ASM", 0.0] == pytest.approx(-6.02, abs=0.3) and level["ASM", 40.0] == pytest.approx(-6.02, abs=1.5)
@@ -70,7 +70,7 @@ def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
     power = np.sum(low.recorded_density) * (low.frequency[1] - low.frequency[0])
     assert power == pytest.approx(
         np.mean(low.recorded**2), rel=0.25
-    )  # Parseval, without what the filter leaves above 40 Hz
+    )  # Parseval's theorem, without the power that the filter passes above 40 Hz
 
 
 def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, repository, tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""A recording under two names is one measurement: it gives a diagnosis no more evidence than once."""
+"""Two copies of one recording are one measurement: a diagnosis has no more evidence than with one copy."""
 
 import shutil
 
@@ -28,17 +28,17 @@ def raw(tmp_path):
     return make
 
 
-def names_left(units):
+def remaining_names(units):
     return {unit.label: [path for path, *_ in unit.files] for unit in units}
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_of_equal_files_the_first_by_name_counts_in_whatever_order_they_are_found(raw, order):
+def test_the_first_by_name_of_equal_files_is_used_in_any_order_of_the_units(raw, order):
     units, folder = raw(
         b={"b1": b"one", "b2": b"two"}, a={"a1": b"one"}, c={"c1": b"two"}, d={"d1": b"six", "d2": b"six"}
     )
     left, notes = without_copies(units[::order], folder)
-    assert names_left(left) == {"a": ["a1"], "b": ["b2"], "d": ["d1"]}
+    assert remaining_names(left) == {"a": ["a1"], "b": ["b2"], "d": ["d1"]}
     assert notes == [
         "b1: same bytes as a1; not used",
         "c1: same bytes as b2; not used",
@@ -46,15 +46,15 @@ def test_of_equal_files_the_first_by_name_counts_in_whatever_order_they_are_foun
     ]
 
 
-def test_a_file_of_the_same_size_or_of_another_kind_or_unreadable_is_no_copy(raw):
+def test_files_of_equal_size_of_another_kind_or_unreadable_files_are_no_copies(raw):
     units, folder = raw(a={"a1": b"one"}, b={"b1": b"two"}, c={"c1": b"six"})
     units.append(Unit("t1", "passage", "d", (("a1", 3, 0),), ""))
     (folder / "c1").unlink()
     assert without_copies(units, folder) == (units, [])
 
 
-def test_a_copied_test_counts_once_in_a_diagnosis_and_that_is_said(tmp_path, repository, monkeypatch):
-    small.lay_out(tmp_path, repository)
+def test_a_copied_test_is_used_once_in_a_diagnosis_and_the_copy_is_reported(tmp_path, repository, monkeypatch):
+    small.write_configuration(tmp_path, repository)
     small.write_hammer_tests(tmp_path)
     monkeypatch.chdir(tmp_path)
     turnout = with_raw(load_configuration("config").turnout("t1"), tmp_path / "raw")

@@ -1,4 +1,4 @@
-"""`turnout inspect`: what it says of a file is in the file, whatever the format, without a layout."""
+"""`turnout inspect` reports the content of files of every format without a layout."""
 
 import json
 import re
@@ -19,7 +19,7 @@ EXTENSION = {"uff58": "uff", "uff58b": "uff", "hdf5": "h5", "mat73": "mat"}
 
 
 def impact_recordings(names=("hammer", "rail")):
-    """Three impacts of known peaks, 1 ms long, 20 ms after the start; the response decays within 30 ms."""
+    """Three impacts with known peaks, 1 ms long, 20 ms after the start; the response decays within 30 ms."""
     rng = np.random.default_rng(4)
     t = np.arange(2000) / RATE - 0.02
     recordings = []
@@ -32,7 +32,7 @@ def impact_recordings(names=("hammer", "rail")):
 
 
 def in_unit(unit):
-    """The numbers as they are, in volts of 1 mV/N and 10 mV/(m/s²), under names that say nothing."""
+    """Description with volts at 1 mV/N and 10 mV/(m/s²), and names that state no quantity."""
     return RawDescription((
         RawChannel("hammer", "AI0", "force", unit, 1.0, "mV/N"),
         RawChannel("rail", "AI1", "acceleration", unit, 10.0, "mV/(m/s²)"),
@@ -57,13 +57,13 @@ def test_every_format_shows_channels_rate_and_impacts(file_format, tmp_path):
     assert force.maximum == pytest.approx(max(PEAKS), rel=5e-3)
 
 
-def test_impacts_begin_where_the_force_does(tmp_path):
+def test_the_time_of_an_impact_is_the_start_of_its_force(tmp_path):
     write(impact_recordings(), tmp_path / "a.npz", "npz")
     times = [event.time for event in file_contents(tmp_path / "a.npz").events]
     assert times == pytest.approx([0.02] * 3, abs=2e-4)  # a half-sine exceeds the trigger within a sample or two
 
 
-def test_the_force_is_told_by_its_short_pulses_where_names_and_units_say_nothing(tmp_path):
+def test_the_force_is_identified_by_short_pulses_if_names_and_units_state_nothing(tmp_path):
     write(impact_recordings(), tmp_path / "a.npz", "npz", in_unit("V"))
     contents = file_contents(tmp_path / "a.npz")
     (force,) = contents.with_role("force")
@@ -72,14 +72,14 @@ def test_the_force_is_told_by_its_short_pulses_where_names_and_units_say_nothing
     assert contents.events[0].size == pytest.approx(2.0, rel=5e-3)  # 2000 N at 1 mV/N
 
 
-def test_two_responses_are_no_force(tmp_path):
+def test_no_force_is_identified_in_two_responses(tmp_path):
     rng = np.random.default_rng(2)
     np.savez(tmp_path / "a.npz", AI0=rng.normal(size=4000), AI1=rng.normal(size=4000), fs=RATE)
     contents = file_contents(tmp_path / "a.npz")
     assert contents.with_role("force") == () and contents.kind == "" and contents.events == ()
 
 
-def test_a_train_is_a_stretch_that_is_loud(tmp_path):
+def test_a_train_is_an_interval_of_high_level(tmp_path):
     rng, rate = np.random.default_rng(2), 2000.0
     t = np.arange(int(40 * rate)) / rate
     level = 0.1 + 20.0 * np.exp(-(((t - 17.0) / 1.5) ** 8))  # about 15.5 to 18.5 s
@@ -91,27 +91,27 @@ def test_a_train_is_a_stretch_that_is_loud(tmp_path):
     assert train.time < 15.5 and train.time + train.size > 18.5 and train.size < 15.0
 
 
-def test_a_file_without_a_rate_says_so(tmp_path):
+def test_a_file_without_a_rate_is_reported_without_a_rate(tmp_path):
     (tmp_path / "a.csv").write_text("force [N];rail [m/s²]\n" + "1.5;2.5\n0.5;1.5\n" * 50, encoding="utf-8")
     contents = file_contents(tmp_path / "a.csv")
     assert contents.rate.value is None and contents.kind == ""
     assert [(c.name, c.unit) for c in contents.channels] == [("force", "N"), ("rail", "m/s²")]
 
 
-def test_a_rising_column_is_a_time_axis(tmp_path):
+def test_a_rising_column_is_identified_as_a_time_axis(tmp_path):
     np.savez(tmp_path / "a.npz", n=np.arange(500.0) * 0.1, AI1=np.random.default_rng(1).normal(size=500), fs=10.0)
     contents = file_contents(tmp_path / "a.npz")
     assert [c.name for c in contents.with_role("time")] == ["n"]
 
 
-def say(capsys, *words):
+def inspect(capsys, *words):
     code = main(["inspect", *map(str, words)])
     return code, *capsys.readouterr()
 
 
-def test_the_command_prints_what_is_in_the_file(tmp_path, capsys):
+def test_the_command_prints_the_content_of_the_file(tmp_path, capsys):
     write(impact_recordings(), tmp_path / "A7_1.h5", "hdf5")
-    code, text, _ = say(capsys, tmp_path / "A7_1.h5")
+    code, text, _ = inspect(capsys, tmp_path / "A7_1.h5")
     assert code == 0
     for words in ("HDF5 (hdf5)", "3 records of 2000 samples (0.2 s)", "10000 Hz", "'hammer'", "[m/s²]"):
         assert words in text
@@ -119,19 +119,19 @@ def test_the_command_prints_what_is_in_the_file(tmp_path, capsys):
     assert (low, high) == pytest.approx((2000.0, 3000.0), rel=5e-3)
 
 
-def test_a_folder_has_a_line_for_each_file_and_damage_is_said(tmp_path, capsys):
+def test_a_folder_gives_one_line_per_file_and_unreadable_files_are_reported(tmp_path, capsys):
     write(impact_recordings(), tmp_path / "A7_1.h5", "hdf5")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "notes.docx").write_text("nothing")
-    code, text, _ = say(capsys, tmp_path)
+    code, text, _ = inspect(capsys, tmp_path)
     lines = text.splitlines()
     assert code == 1 and len(lines) == 2
     assert "3 impacts" in lines[0] and "not read" in lines[1] and "notes.docx" in lines[1]
 
 
-def test_json_holds_the_same(tmp_path, capsys):
+def test_json_output_has_the_same_content(tmp_path, capsys):
     write(impact_recordings(), tmp_path / "A7_1.npz", "npz")
-    code, text, _ = say(capsys, tmp_path / "A7_1.npz", "--json")
+    code, text, _ = inspect(capsys, tmp_path / "A7_1.npz", "--json")
     (values,) = json.loads(text)["result"]
     assert code == 0 and values["rate_hz"] == RATE and values["kind"] == "impacts" and values["records"] == 3
     assert [c["name"] for c in values["channels"]] == ["hammer", "rail"] and values["force_candidates"] == ["hammer"]
@@ -141,19 +141,19 @@ def test_json_holds_the_same(tmp_path, capsys):
 def test_the_plot_shows_every_channel(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write(impact_recordings(), tmp_path / "A7_1.npz", "npz")
-    code, text, _ = say(capsys, "A7_1.npz", "--plot")
+    code, text, _ = inspect(capsys, "A7_1.npz", "--plot")
     drawing = (tmp_path / "A7_1.npz.svg").read_text()
     assert code == 0 and "A7_1.npz.svg" in text and drawing.count('<g id="axes_') == 2
 
 
-def test_frequency_responses_are_said_to_be_such(tmp_path, capsys):
+def test_frequency_responses_are_identified(tmp_path, capsys):
     f = np.arange(1.0, 500.0)
     np.savez(tmp_path / "frf.npz", frequency=f, frf=1.0 / (100.0**2 - f**2 + 2j * f), units="m/N")
-    code, text, _ = say(capsys, tmp_path / "frf.npz")
+    code, text, _ = inspect(capsys, tmp_path / "frf.npz")
     assert code == 0 and "1 frequency responses of 499 lines" in text and "no impact can be judged" in text
 
 
-def test_the_hammer_file_of_others_has_five_impacts(shared_data):
+def test_the_hammer_file_of_pyfrf_has_five_impacts(shared_data):
     contents = file_contents(shared_data / "hammer_pyfrf" / "impact2_response0.lvm")
     assert contents.rate.value == 51200.0 and contents.kind == "impacts" and len(contents.events) == 5
     assert {e.record for e in contents.events} == {1, 2, 3, 4, 5} and not contents.has_zone
@@ -169,7 +169,7 @@ def test_the_hammer_file_of_others_has_five_impacts(shared_data):
         ("tip;steel", "\n1;", "may be cut"),
     ],
 )
-def test_what_reading_with_a_layout_rejects_or_remarks_is_a_problem(head, end, words, tmp_path):
+def test_rejections_and_remarks_of_reading_with_a_layout_are_listed_as_problems(head, end, words, tmp_path):
     rows = "\n".join(f"{np.sin(k):.6f};{np.cos(k):.6f}" for k in range(60))
     text = f"rate;5000\n{head}\nforce [N];rail [g]\n3.5;0.5\n{rows}{end}"
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")

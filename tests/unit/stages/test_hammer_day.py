@@ -1,4 +1,4 @@
-"""The day of a hammer test whose name states none: that of the clock on the wall, by the zone of the layout."""
+"""The day of a hammer test whose name states none is the local day in the time zone of the layout."""
 
 import numpy as np
 import pytest
@@ -26,13 +26,13 @@ def day_of(tmp_path, start, time_zone):
         ("2026-05-13T08:00:00", "Asia/Tokyo", "2026-05-13"),
     ],
 )
-def test_the_day_is_that_of_the_zone_of_the_layout(start, time_zone, day, tmp_path, monkeypatch):
+def test_the_day_is_that_of_the_time_zone_of_the_layout(start, time_zone, day, tmp_path, monkeypatch):
     monkeypatch.setenv("TZ", "Pacific/Kiritimati")
     assert day_of(tmp_path, start, time_zone) == day
 
 
 @pytest.mark.parametrize("start", ["05/06/2026 10:00", "2026-02-30 10:00:00", "13.05.26 10:00:00"])
-def test_a_start_that_cannot_be_read_is_quoted_where_the_day_is_asked_for(start, tmp_path):
+def test_the_error_about_an_unknown_day_quotes_an_unreadable_start_time(start, tmp_path):
     with pytest.raises(ConfigError) as raised:
         day_of(tmp_path, start, "UTC")
     assert f"neither its name nor the file says on which day it was recorded (the start time {start!r}" in str(

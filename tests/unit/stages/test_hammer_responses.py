@@ -1,4 +1,4 @@
-"""`turnout hammer` on files of averaged frequency responses: modes with errors, and no impact is judged."""
+"""`turnout hammer` on files of averaged frequency responses: modes with errors, and no test of single impacts."""
 
 import re
 from datetime import date
@@ -44,7 +44,7 @@ def hammer(capsys, tmp_path, *files, more=()):
     return code, *capsys.readouterr()
 
 
-def filed(tmp_path):
+def write_filed(tmp_path):
     folder = tmp_path / "raw" / "tommerup_s1" / "hammer" / str(DAY)
     folder.mkdir(parents=True)
     np.savez(folder / "A7_1.npz", frequency=F, frf=receptances(), units="m/N")
@@ -53,8 +53,8 @@ def filed(tmp_path):
     return folder / "A7_1.npz"
 
 
-def test_both_resonances_have_the_errors_of_the_spread(tmp_path, capsys):
-    code, text, _ = hammer(capsys, tmp_path, filed(tmp_path))
+def test_the_errors_of_both_resonances_follow_from_the_spread_of_the_responses(tmp_path, capsys):
+    code, text, _ = hammer(capsys, tmp_path, write_filed(tmp_path))
     assert code == 0 and "none could be judged: the files hold averaged frequency responses" in text
     found = re.findall(r"  (ballast|railpad) +(\S+) ± (\S+) Hz, damping (\S+) ± \S+, n = 4", text)
     values = {band: tuple(map(float, numbers)) for band, *numbers in found}
@@ -66,28 +66,28 @@ def test_both_resonances_have_the_errors_of_the_spread(tmp_path, capsys):
     assert NO_IMPACTS in text
 
 
-def test_the_registry_holds_them_and_says_that_no_impact_was_judged(tmp_path):
-    filed(tmp_path)
+def test_the_registry_contains_the_modes_and_states_that_no_impact_was_tested(tmp_path):
+    write_filed(tmp_path)
     turnout = with_raw(load_configuration("config").turnout("tommerup_s1"), tmp_path / "raw")
     (unit,) = scan(turnout, tmp_path / "raw").units
     rows = hammer_unit(unit, turnout, tmp_path / "raw", algo="1")
     arrival = Arrival(0, "tommerup_s1/hammer/A7/2024-05-13", "tommerup_s1", "hammer", "key", "1", rows)
-    held = {table: gather(table, [arrival])[0].to_pylist() for table in ("recordings", "modes", "models")}
-    (model,), (recording,) = held["models"], held["recordings"]
+    registered = {table: gather(table, [arrival])[0].to_pylist() for table in ("recordings", "modes", "models")}
+    (model,), (recording,) = registered["models"], registered["recordings"]
     assert (model["method"], model["status"], model["n_impacts_used"]) == ("frf", "accepted", 0)
     assert model["detail"].startswith(NO_IMPACTS) and model["sampling_rate_hz"] is None
-    assert {m["band"] for m in held["modes"]} == {"ballast", "railpad"} and rows["quarantine"] == []
-    assert {m["rail_temperature_c"] for m in held["modes"]} == {11.5}
+    assert {m["band"] for m in registered["modes"]} == {"ballast", "railpad"} and rows["quarantine"] == []
+    assert {m["rail_temperature_c"] for m in registered["modes"]} == {11.5}
     assert (recording["n_channels"], recording["n_samples"]) == (4, len(F))
 
 
-def test_a_day_that_nothing_states_is_asked_for(tmp_path, capsys):
+def test_the_error_asks_for_a_day_that_the_file_does_not_state(tmp_path, capsys):
     np.savez(tmp_path / "x.npz", frequency=F, frf=receptances())
     code, _, errors = hammer(capsys, tmp_path, tmp_path / "x.npz", more=("--section", "A7"))
     assert code == 2 and "Write --campaign YYYY-MM-DD" in errors
 
 
-def test_responses_that_cannot_be_evaluated_are_quarantined_by_name(tmp_path, capsys):
+def test_responses_that_cannot_be_evaluated_are_quarantined_with_the_reason(tmp_path, capsys):
     np.savez(tmp_path / "x.npz", frequency=F**1.1, frf=receptances())
     code, text, _ = hammer(capsys, tmp_path, tmp_path / "x.npz", more=("--section", "A7", "--campaign", "2024-05-13"))
     assert code == 1 and "not evenly spaced" in text and "nothing could be used" in text

@@ -1,4 +1,4 @@
-"""The whole hammer stage against a truth that it never sees: files on disk in, rows out."""
+"""The whole hammer stage from files to rows, compared with true values that the stage never gets."""
 
 import json
 from collections import Counter
@@ -26,8 +26,8 @@ DAY = date(2024, 5, 13)
 EXTENSIONS = {"uff58b": "uff", "tdms": "tdms", "hdf5": "h5"}
 
 
-def lay_out(raw, section="A7", file_format="hdf5", n_test=3, ballast=1.0, railpad=1.0, seed=5, change=None):
-    """Files of one section and campaign of tommerup_s1; returns its unit and configuration, and the impacts' truth."""
+def write_tests(raw, section="A7", file_format="hdf5", n_test=3, ballast=1.0, railpad=1.0, seed=5, change=None):
+    """Write files of one section and campaign of tommerup_s1; return its unit, configuration and true impacts."""
     folder = raw / "tommerup_s1" / "hammer" / DAY.isoformat()
     folder.mkdir(parents=True)
     rng, truth = np.random.default_rng(seed), []
@@ -51,42 +51,42 @@ def in_repository(repository, monkeypatch):
 
 
 @pytest.mark.parametrize("file_format", EXTENSIONS)
-def test_modes_lie_within_five_standard_errors_of_the_truth(tmp_path, file_format):
-    unit, turnout, _ = lay_out(tmp_path, "A7", file_format, ballast=1.21, railpad=0.81)
+def test_modes_are_within_five_standard_errors_of_the_true_values(tmp_path, file_format):
+    unit, turnout, _ = write_tests(tmp_path, "A7", file_format, ballast=1.21, railpad=0.81)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     modes = {m["band"]: m for m in rows["modes"]}
     model = published_model("CP A7")
-    # the resonance goes with the root of the stiffness: 1.1 and 0.9
+    # a resonance is proportional to the square root of the stiffness: 1.1 and 0.9
     for band, frequency, factor, damping in zip(model.bands, model.frequency, (1.1, 0.9), model.damping):
         mode = modes[band]
         assert abs(mode["frequency_hz"] - factor * frequency) < 5 * mode["frequency_se_hz"]
         assert abs(mode["damping_ratio"] - damping) < 5 * mode["damping_se"]
-        # poles differ by 0.6 % between impacts, so the mean of 30 cannot be known better than 0.1 %
+        # poles differ by 0.6 % between impacts, so the standard error of the mean of 30 is 0.1 % or more
         assert 0.0005 < mode["frequency_se_hz"] / mode["frequency_hz"] < 0.005
         assert mode["rail_temperature_c"] == 12.0
 
 
-def test_every_fault_of_an_impact_is_named_and_no_sound_impact_is_lost(tmp_path):
-    unit, turnout, truth = lay_out(tmp_path, "OT", seed=11)
+def test_every_faulty_impact_is_rejected_with_a_reason_and_nearly_all_others_are_accepted(tmp_path):
+    unit, turnout, truth = write_tests(tmp_path, "OT", seed=11)
     fault = {(b.test, b.record): b.fault for b in truth}
-    assert sum(bool(f) for f in fault.values()) >= 1, "the seed must bring at least one mishap"
+    assert sum(bool(f) for f in fault.values()) >= 1, "the seed must give at least one faulty impact"
     impacts = hammer_unit(unit, turnout, tmp_path, algo="1")["impacts"]
     assert len(impacts) == 30
     for impact in impacts:
-        said = fault[impact["test"], impact["record"]]
-        if said:
-            assert impact["status"] == "rejected" and impact["reason"], (impact, said)
-    sound = [i for i in impacts if not fault[i["test"], i["record"]]]
-    assert np.mean([i["status"] == "accepted" for i in sound]) >= 0.95
+        true_fault = fault[impact["test"], impact["record"]]
+        if true_fault:
+            assert impact["status"] == "rejected" and impact["reason"], (impact, true_fault)
+    without_fault = [i for i in impacts if not fault[i["test"], i["record"]]]
+    assert np.mean([i["status"] == "accepted" for i in without_fault]) >= 0.95
 
 
-def test_one_dead_channel_costs_one_file_and_says_what_to_do(tmp_path):
+def test_a_dead_channel_removes_one_file_and_the_quarantine_states_a_remedy(tmp_path):
     from turnout.demo import scenario
 
     def change(test, recordings):
         return [scenario.dead_channel(r) for r in recordings] if test == 2 else recordings
 
-    unit, turnout, _ = lay_out(tmp_path, "CLP", change=change)
+    unit, turnout, _ = write_tests(tmp_path, "CLP", change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert {q["reason_code"] for q in rows["quarantine"]} == {"dead_channel"}
     assert all("CLP_2" in q["path"] and q["remedy"] for q in rows["quarantine"])
@@ -108,7 +108,7 @@ def test_spikes_change_no_mode_and_are_stated(tmp_path, is_force):
 
     rows = []
     for name, change in (("clean", None), ("spoilt", spoil)):
-        unit, turnout, _ = lay_out(tmp_path / name, "A8", change=change)
+        unit, turnout, _ = write_tests(tmp_path / name, "A8", change=change)
         rows.append(hammer_unit(unit, turnout, tmp_path / name, algo="1"))
     clean, spoilt = rows
     assert [(q["reason_code"], q["measured_value"]) for q in spoilt["quarantine"]] == [("spikes", 6.0)] * 10
@@ -119,9 +119,8 @@ def test_spikes_change_no_mode_and_are_stated(tmp_path, is_force):
         assert abs(mode["frequency_hz"] - other["frequency_hz"]) < 0.1 * mode["frequency_se_hz"]
 
 
-def test_an_impact_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_all_that_is_counted(tmp_path):
-    """A resonance of 1350 Hz at half of the peak rings in one impact of ten alone: it was hit elsewhere, or
-    loose."""
+def test_an_impact_that_the_modes_do_not_describe_is_rejected_and_not_counted(tmp_path):
+    """Only one impact of ten has a resonance of 1350 Hz, at half of the peak, as from a hit elsewhere."""
 
     def change(_, recordings):
         first = recordings[0]
@@ -132,7 +131,7 @@ def test_an_impact_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_
         samples[row, top:] += ring
         return [replace(first, samples=samples), *recordings[1:]]
 
-    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    unit, turnout, _ = write_tests(tmp_path, "A7", n_test=1, change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     odd = [i for i in rows["impacts"] if i["record"] == 0]
     assert [(i["status"], i["reason"]) for i in odd] == [("rejected", "odd_one_out")]
@@ -143,33 +142,33 @@ def test_an_impact_that_the_modes_do_not_describe_is_rejected_in_its_row_and_in_
     assert {r["impact_id"] for r in rows["impact_modes"]} == used
 
 
-def test_rates_that_differ_in_the_digits_of_a_printed_clock_are_one_rate(tmp_path):
+def test_rates_that_differ_only_by_rounding_are_one_rate(tmp_path):
     rates = iter([20000.0, 20000.000000004, 20000.0000013])
-    unit, turnout, _ = lay_out(
+    unit, turnout, _ = write_tests(
         tmp_path, "A7", change=lambda _, rs: (lambda r: [replace(x, rate=r) for x in rs])(next(rates))
     )
-    said = dict(turnout.hammer.descriptions) | {"A7": replace(turnout.hammer.descriptions["A7"], rate=None)}
-    turnout = replace(turnout, hammer=replace(turnout.hammer, descriptions=said))
+    descriptions = dict(turnout.hammer.descriptions) | {"A7": replace(turnout.hammer.descriptions["A7"], rate=None)}
+    turnout = replace(turnout, hammer=replace(turnout.hammer, descriptions=descriptions))
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert rows["quarantine"] == [] and len(rows["impacts"]) == 30
     assert rows["models"][0]["sampling_rate_hz"] == pytest.approx(20000.0, rel=1e-9)
 
 
-def test_a_file_of_another_day_is_used_and_said(tmp_path):
-    """Its logger's clock may have been wrong, and its data are not."""
+def test_a_file_with_another_day_is_used_and_reported(tmp_path):
+    """The clock of the logger may have been wrong although its data are right."""
 
     def change(test, recordings):
         return [replace(r, started_at=datetime(2010, 1, 1)) for r in recordings] if test == 2 else recordings
 
-    unit, turnout, _ = lay_out(tmp_path, "A7", change=change)
+    unit, turnout, _ = write_tests(tmp_path, "A7", change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert [(q["reason_code"], "A7_2" in q["path"]) for q in rows["quarantine"]] == [("start_unknown", True)]
     assert len(rows["impacts"]) == 30 and rows["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
-def test_a_force_that_no_hammer_has_is_named(tmp_path, factor):
-    """Newtons that are called kilonewtons, and kilonewtons that are called newtons."""
+def test_a_force_beyond_any_hammer_is_rejected_with_the_reason(tmp_path, factor):
+    """Newtons stated as kilonewtons, and kilonewtons stated as newtons."""
 
     def change(_, recordings):
         return [
@@ -177,28 +176,28 @@ def test_a_force_that_no_hammer_has_is_named(tmp_path, factor):
             for r in recordings
         ]
 
-    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    unit, turnout, _ = write_tests(tmp_path, "A7", n_test=1, change=change)
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert {i["reason"] for i in rows["impacts"]} == {"out_of_scale"} and rows["models"][0]["status"] == "rejected"
     assert all("scale" in i["detail"] for i in rows["impacts"])
 
 
-def test_a_small_hammer_is_believed_where_the_configuration_says_so(tmp_path):
+def test_a_small_force_is_accepted_if_the_configuration_allows_it(tmp_path):
     def change(_, recordings):
         return [
             replace(r, samples=r.samples * [[1e-3 if c.quantity == "force" else 1.0] for c in r.channels])
             for r in recordings
         ]
 
-    unit, turnout, _ = lay_out(tmp_path, "A7", n_test=1, change=change)
+    unit, turnout, _ = write_tests(tmp_path, "A7", n_test=1, change=change)
     settings = {**turnout.settings, "receptance": replace(turnout.settings["receptance"], softest_blow=0.0)}
     rows = hammer_unit(unit, replace(turnout, settings=settings), tmp_path, algo="1")
     assert rows["models"][0]["status"] == "accepted"
 
 
-def test_a_test_called_by_the_time_of_its_recording_loses_no_impact_on_the_way_into_the_registry(tmp_path):
-    """Fourteen digits are no number of a test; the largest that a column of 32 bits holds is."""
-    unit, turnout, _ = lay_out(tmp_path, "A7")
+def test_no_impact_is_lost_if_the_number_of_a_test_is_a_time_stamp(tmp_path):
+    """Fourteen digits exceed a column of 32 bits; the largest number that fits is kept."""
+    unit, turnout, _ = write_tests(tmp_path, "A7")
     folder = tmp_path / "tommerup_s1/hammer" / DAY.isoformat()
     for test, label in ((1, "20240513101500"), (2, "2147483648"), (3, "2147483647")):
         (folder / f"A7_{test}.h5").rename(folder / f"A7_{label}.h5")
@@ -210,25 +209,25 @@ def test_a_test_called_by_the_time_of_its_recording_loses_no_impact_on_the_way_i
     assert Counter(row["test"] for row in rows["impacts"]) == {0: 20, 2**31 - 1: 10}
 
 
-def test_a_reversed_force_is_named(tmp_path):
+def test_a_reversed_force_is_rejected_with_the_reason(tmp_path):
     from turnout.demo import scenario
 
-    unit, turnout, _ = lay_out(tmp_path, "SP", change=lambda _, rs: [scenario.swapped_sign(r) for r in rs])
+    unit, turnout, _ = write_tests(tmp_path, "SP", change=lambda _, rs: [scenario.swapped_sign(r) for r in rs])
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert rows["models"][0]["status"] == "rejected" and rows["models"][0]["reason"] == "too_few_impacts"
     assert {i["reason"] for i in rows["impacts"]} == {"sign_reversed"}
 
 
 def test_the_same_files_give_the_same_rows(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path, "A8", n_test=1)
+    unit, turnout, _ = write_tests(tmp_path, "A8", n_test=1)
     first, second = (hammer_unit(unit, turnout, tmp_path, algo="1") for _ in range(2))
     as_text = [json.dumps(r, default=lambda v: v.tolist() if hasattr(v, "tolist") else str(v)) for r in (first, second)]
     assert as_text[0] == as_text[1]
     assert first["models"][0]["measured_at_utc"] == datetime(2024, 5, 13, 9)
 
 
-def test_a_file_copied_under_another_name_counts_once(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path, "A9", n_test=2)
+def test_a_file_copied_under_another_name_is_used_once(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path, "A9", n_test=2)
     folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
     (folder / "A9_3.h5").write_bytes((folder / "A9_1.h5").read_bytes())
     unit = scan(turnout, tmp_path).units[0]
@@ -238,9 +237,9 @@ def test_a_file_copied_under_another_name_counts_once(tmp_path):
     assert "A9_1" in rows["quarantine"][0]["found"] and "A9_3" in rows["quarantine"][0]["path"]
 
 
-def test_a_test_exported_again_in_another_format_counts_once(tmp_path):
-    """Other bytes, the same impacts, and a name that is a test of its own: every one is named with its original."""
-    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+def test_a_test_exported_again_in_another_format_is_used_once(tmp_path):
+    """Other bytes, the same impacts and another test number: each impact is reported with its original."""
+    unit, turnout, _ = write_tests(tmp_path, n_test=2)
     once = hammer_unit(unit, turnout, tmp_path, algo="1")
     folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
     recordings = read("A7_1.h5", folder, replace(turnout.hammer.descriptions["A7"], n_records=None)).recordings
@@ -252,8 +251,8 @@ def test_a_test_exported_again_in_another_format_counts_once(tmp_path):
     assert twice["models"][0]["n_impacts_used"] == once["models"][0]["n_impacts_used"]
 
 
-def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+def test_a_file_that_no_reader_can_read_does_not_affect_the_others(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path, n_test=2)
     folder = tmp_path / "tommerup_s1" / "hammer" / DAY.isoformat()
     (folder / "A7_3.csv").write_text("# rate: 20000,0\nforce;acc\n1;2\n3;4\n")
     unit = scan(turnout, tmp_path).units[0]
@@ -262,8 +261,8 @@ def test_a_file_that_no_reader_foresaw_costs_itself_alone(tmp_path):
     assert {q["path"][-8:] for q in result.tables["quarantine"]} == {"A7_3.csv"}
 
 
-def test_an_unexplained_entry_of_all_files_is_one_remark_and_the_unit_is_sound(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path)
+def test_an_unexplained_entry_of_all_files_is_one_remark_and_the_status_is_ok(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path)
     for path, *_ in unit.files:
         with h5py.File(tmp_path / path, "a") as file:
             file.attrs["Hub"] = 2.5
@@ -273,8 +272,8 @@ def test_an_unexplained_entry_of_all_files_is_one_remark_and_the_unit_is_sound(t
     assert result.status == "ok" and len(result.tables["impacts"]) == 30
 
 
-def test_the_decay_of_an_exponential_window_and_the_level_of_the_gate_stand_beside_a_receptance(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path, n_test=2)
+def test_the_row_of_a_receptance_has_the_decay_of_the_window_and_the_level_of_the_gate(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path, n_test=2)
     for decay in (0.0, 50.0):
         own = replace(turnout.settings["receptance"], exponential_window=decay, gate_level=0.7)
         windowed = replace(turnout, settings={**turnout.settings, "receptance": own})
@@ -282,21 +281,21 @@ def test_the_decay_of_an_exponential_window_and_the_level_of_the_gate_stand_besi
         assert row["window_decay_per_s"] == decay and row["gate_required"] == 0.7
 
 
-def test_a_corrected_temperature_makes_another_model_of_the_same_impacts(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path)
+def test_a_corrected_temperature_gives_the_model_of_the_same_impacts_another_id(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path)
     warm = replace(turnout.campaigns[unit.campaign], rail_temperature=22.0)
     other = replace(turnout, campaigns={**turnout.campaigns, unit.campaign: warm})
     one, two, again = (hammer_unit(unit, t, tmp_path, algo="1")["models"][0] for t in (turnout, other, turnout))
     assert one["model_id"] == again["model_id"] != two["model_id"]
 
 
-def test_a_file_at_another_rate_is_left_out_and_the_campaign_goes_on(tmp_path):
+def test_a_file_at_another_rate_is_left_out_and_the_others_are_used(tmp_path):
     def slower(test, recordings):
         if test != 2:
             return recordings
         return [replace(r, samples=r.samples[:, ::2], rate=r.rate / 2) for r in recordings]
 
-    unit, turnout, _ = lay_out(tmp_path, change=slower)
+    unit, turnout, _ = write_tests(tmp_path, change=slower)
     layout = replace(turnout.hammer.descriptions["A7"], rate=None, n_samples=None)
     hammer = replace(turnout.hammer, descriptions={**turnout.hammer.descriptions, "A7": layout})
     rows = hammer_unit(unit, replace(turnout, hammer=hammer), tmp_path, algo="1")
@@ -304,8 +303,8 @@ def test_a_file_at_another_rate_is_left_out_and_the_campaign_goes_on(tmp_path):
     assert {i["test"] for i in rows["impacts"]} == {1, 3} and rows["models"][0]["status"] == "accepted"
 
 
-def test_rows_hold_tables_1_and_2_of_the_paper_with_errors_stiffness_and_density(tmp_path):
-    unit, turnout, _ = lay_out(tmp_path, "A7")
+def test_rows_contain_tables_1_and_2_of_the_paper_with_errors_stiffness_and_density(tmp_path):
+    unit, turnout, _ = write_tests(tmp_path, "A7")
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     (receptance,) = rows["receptances"]
     for mode in rows["modes"]:
@@ -315,7 +314,7 @@ def test_rows_hold_tables_1_and_2_of_the_paper_with_errors_stiffness_and_density
         s = np.log(pole) * 20e3
         assert abs(s) / (2.0 * np.pi) == pytest.approx(mode["frequency_hz"])
         assert -s.real / abs(s) == pytest.approx(mode["damping_ratio"])
-        # det A = exp(-2 zeta w / rate): its error, from those of the entries as if independent, is no smaller
+        # det A = exp(-2 zeta w / rate): its error, computed from independent errors of the elements, is not smaller
         error_of_log = 2.0 / 20e3 * 2.0 * np.pi * mode["frequency_hz"] * mode["damping_se"]
         independent = np.hypot(a22 * mode["a_block_se"][0], a11 * mode["a_block_se"][3])
         assert 0.5 * abs(pole) ** 2 * error_of_log < np.hypot(independent, 2.0 * a12 * mode["a_block_se"][1])
@@ -341,8 +340,8 @@ def test_the_density_of_white_noise_is_its_variance_over_the_nyquist_frequency()
 
 
 def rows_with_second_response(folder, channel, use="validate"):
-    """Rows of a section whose second accelerometer is ``channel`` of the layout, None where it has none."""
-    unit, turnout, _ = lay_out(folder, "A7", n_test=1, change=with_second_response)
+    """Rows of a section with the second accelerometer ``channel`` of the layout; None: without one."""
+    unit, turnout, _ = write_tests(folder, "A7", n_test=1, change=with_second_response)
     description = turnout.hammer.descriptions["A7"]
     second = replace(description.channels[1], name="rail_2", source="rail_2")
     description = replace(description, channels=(*description.channels, second))
@@ -359,17 +358,17 @@ def test_the_second_response_validates_the_modes_of_the_first(tmp_path):
     assert 60.0 < model["validation_fit_pct"] <= 100.0
 
 
-def test_a_second_response_that_takes_part_makes_each_impact_more_certain_and_validates_nothing(tmp_path):
+def test_a_second_response_in_the_fit_reduces_the_errors_and_validates_nothing(tmp_path):
     alone, both = (rows_with_second_response(tmp_path / use, "rail_2", use) for use in ("validate", "joint"))
     assert both["models"][0]["validation_fit_pct"] is None
     error = [np.array([m["frequency_se_hz"] for m in rows["impact_modes"]]) for rows in (alone, both)]
     assert len(error[0]) == len(error[1]) > 0
-    # half of the signal in 0.94 times the noise of the first: information 1.28, error 0.88
+    # half of the signal with 0.94 times the noise of the first: information 1.28, error 0.88
     assert 0.85 < np.median(error[1] / error[0]) < 0.95
 
 
-def test_modes_have_the_ratio_of_both_responses_and_are_else_the_same(tmp_path):
-    """The second sensor sees half of the response; 5 standard errors in two parts."""
+def test_a_second_response_adds_the_ratio_of_both_responses_and_changes_nothing_else(tmp_path):
+    """The second sensor records half of the response; tolerance of 5 standard errors in both parts."""
     without, both = (rows_with_second_response(tmp_path / str(c), c)["modes"] for c in (None, "rail_2"))
     assert len(without) == len(both) > 0
     for plain, mode in zip(without, both, strict=True):
@@ -382,7 +381,7 @@ def test_modes_have_the_ratio_of_both_responses_and_are_else_the_same(tmp_path):
 
 
 def with_second_response(test, recordings):
-    """The same recordings with a second accelerometer that sees half of the response and its own noise."""
+    """The same recordings with a second accelerometer, which records half of the response and its own noise."""
     rng = np.random.default_rng(test)
     changed = []
     for recording in recordings:

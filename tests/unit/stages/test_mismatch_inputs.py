@@ -1,4 +1,4 @@
-"""What the files of strangers say, or leave unsaid: read as far as it goes, else told, never mistaken."""
+"""Notes and recordings of others with missing or odd entries: used as far as possible, and reported otherwise."""
 
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -44,8 +44,8 @@ from turnout.workflow.scan import scan, unit_id
 
 @pytest.fixture
 def folder(tmp_path, repository, monkeypatch):
-    """Impacts on an even turnout, and two families, so that a diagnosis takes a second."""
-    small.lay_out(tmp_path, repository)
+    """Hammer tests on a uniform turnout; with only two families of effects a diagnosis takes about a second."""
+    small.write_configuration(tmp_path, repository)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=("local_ballast", "sensor_gain")))
     small.write_hammer_tests(tmp_path)
@@ -62,59 +62,63 @@ def train(row, noted, repository):
 
 
 @pytest.mark.parametrize(
-    ("said", "means"), [("27.8", 27.8), ("27,8", 27.8), (12, 12.0), ("120 km/h", None), (None, None), ("nan", None)]
+    ("text", "number"), [("27.8", 27.8), ("27,8", 27.8), (12, 12.0), ("120 km/h", None), (None, None), ("nan", None)]
 )
-def test_a_number_in_the_notes_is_read_or_is_none(said, means):
-    assert noted_number({"speed": said}, "speed") == means
+def test_a_number_in_the_notes_is_read_or_is_none(text, number):
+    assert noted_number({"speed": text}, "speed") == number
 
 
-def test_a_direction_in_other_letters_is_that_direction_and_one_unheard_is_said(repository):
-    """A sensor alone cannot tell it: taken for the other one, what is before the sensor would be behind it."""
+def test_a_direction_is_read_in_any_capitals_and_an_unknown_one_is_reported(repository):
+    """One sensor cannot determine it: a wrong direction exchanges the sides of the sensor."""
     found = train({}, {"direction": " Trailing ", "track": "Diverging"}, repository)
     assert (found.direction, found.route) == ("trailing", "diverging")
-    unheard = train({"direction": "unknown"}, {"direction": "downhill"}, repository)
-    assert unheard.direction == "facing" and any("direction not known" in doubt for doubt in unheard.doubts)
+    unknown = train({"direction": "unknown"}, {"direction": "downhill"}, repository)
+    assert unknown.direction == "facing" and any("direction not known" in doubt for doubt in unknown.doubts)
 
 
-def test_impacts_between_the_axles_do_not_tell_the_speed(repository):
-    """A long flat is heard as six axles of eight, and 74 km/h: the notes' 90 is believed. Four of four are heard."""
-    said = {"speed": 25.0, "train_type": "ic3"}
+def test_the_noted_speed_is_used_if_impacts_between_the_axles_give_a_wrong_speed(repository):
+    """With six of eight axles, 90 km/h of the notes are used; with all eight axles the recorded 74 km/h."""
+    noted_values = {"speed": 25.0, "train_type": "ic3"}
     for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
         row = {"train_type": "ic3", "n_axles": heard, "speed_kmh": 74.0}
-        assert train(row, said, repository).speed == pytest.approx(speed)
+        assert train(row, noted_values, repository).speed == pytest.approx(speed)
 
 
 @pytest.mark.parametrize(("codes", "name", "speed"), [((), "locomotive", 40.0), (("axles_uncertain",), "ic3", 25.0)])
-def test_train_data_precede_a_train_whose_axles_are_uncertain(repository, codes, name, speed):
+def test_train_data_override_a_recorded_train_with_uncertain_axles(repository, codes, name, speed):
     row = {"train_type": "locomotive", "n_axles": 4, "speed_kmh": 144.0, "speed_listed_kmh": 90.0}
     row |= {"train_type_listed": "ic3", "reason_codes": list(codes)}
     found = train(row, {}, repository)
     assert found.name == name and found.speed == pytest.approx(speed)
 
 
-def test_an_uncertain_train_without_train_data_is_taken_as_recorded(repository):
+def test_a_recorded_train_with_uncertain_axles_is_used_without_train_data(repository):
     row = {"train_type": "locomotive", "speed_kmh": 144.0, "reason_codes": ["axles_uncertain"]}
     assert train(row, {}, repository).speed == pytest.approx(40.0)
 
 
-def test_the_noted_number_of_axles_decides_where_the_recorded_ones_match_no_train(repository):
-    """Impacts at a nose lengthen a train: eight axles over the length of two locomotives, and four are listed."""
+def test_the_noted_number_of_axles_is_used_if_the_recorded_axles_match_no_train(repository):
+    """Impacts at a nose add axles: eight axles over the length of two locomotives, and four are noted."""
     one, two = (load_vehicle("locomotive", 0.0, repository / "config/vehicles", n).wheel_positions for n in (1, 2))
     impacts = np.sort(np.concatenate([one, one + 0.6 * (two[-1] - one[-1])]))
-    said = {"speed": 35.0, "train_type": "locomotive"}
+    noted_values = {"speed": 35.0, "train_type": "locomotive"}
     for places, noted, axles in ((impacts, {}, 8), (impacts, {"n_axles": 4}, 4), (impacts, {"n_axles": 5}, 8)):
         row = {"n_axles": 8, "speed_kmh": 120.0, "axle_times_s": places / 35.0}
-        found = train(row, said | noted, repository)
+        found = train(row, noted_values | noted, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 35.0
         assert ("8 axles recorded, 4 assumed as noted" in found.doubts) == (axles == 4)
     nose = {"reason_codes": ["axles_uncertain"], "train_type": "unknown", "n_axles": 8, "speed_kmh": 161.0}
-    impacts = np.sort(np.concatenate([one, one + 1.3]))  # over the length of one unit
+    impacts = np.sort(np.concatenate([one, one + 1.3]))  # within the length of one unit
     for places, noted, axles in ((impacts, {}, 4), (two, {}, 8), (two, {"n_axles": 4}, 4), (impacts, {"units": 2}, 8)):
-        found = train(nose | {"axle_times_s": places / 35.0}, said | noted, repository)
+        found = train(nose | {"axle_times_s": places / 35.0}, noted_values | noted, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 35.0
         assert any("8 axles recorded, 4 assumed" in doubt for doubt in found.doubts) == (axles == 4)
-    row = {"n_axles": 8, "speed_kmh": 126.0, "axle_times_s": two / 35.0}  # two units as they stand in the file
-    assert len(train(row, said | {"n_axles": 4}, repository).vehicle.wheels) == 8
+    row = {
+        "n_axles": 8,
+        "speed_kmh": 126.0,
+        "axle_times_s": two / 35.0,
+    }  # two units with the axle distances of the file
+    assert len(train(row, noted_values | {"n_axles": 4}, repository).vehicle.wheels) == 8
 
 
 @pytest.mark.parametrize(
@@ -126,7 +130,7 @@ def test_the_noted_number_of_axles_decides_where_the_recorded_ones_match_no_trai
         ({"n_axles": 16}, "ic3", 16),
     ],
 )
-def test_the_train_data_give_the_number_of_axles_that_the_file_does_not_note(known, listed_type, axles):
+def test_train_data_give_the_number_of_axles_that_the_file_does_not_state(known, listed_type, axles):
     rows = ({"passed_at_utc": "2024-07-16T13:00:02", "train_type": listed_type, "n_axles": "8"},)
     settings = {"passage": SimpleNamespace(train_data_tolerance=60.0)}
     turnout = SimpleNamespace(trains=rows, settings=settings)
@@ -136,26 +140,27 @@ def test_the_train_data_give_the_number_of_axles_that_the_file_does_not_note(kno
     assert mismatch_inputs._train_notes(later, recording, turnout) == known
 
 
-def test_impacts_that_are_twice_as_many_as_the_axles_are_no_second_unit(repository):
-    """A deep dip is crossed with a bang behind every axle: sixteen, over the length of one unit. Sixteen over that of
-    two are two units, also where they do not stand as the file has them. The notes' speed is believed, not 81 km/h."""
+def test_twice_as_many_impacts_as_axles_are_not_taken_as_a_second_unit(repository):
+    """A deep dip gives an impact behind every axle: sixteen within the length of one unit.
+
+    Sixteen within the length of two units are two units, also with other distances. The speed is that of the notes."""
     folder = repository / "config/vehicles"
-    said = {"speed": 25.0, "train_type": "ic3"}
+    noted_values = {"speed": 25.0, "train_type": "ic3"}
     one, two = (load_vehicle("ic3", 0.0, folder, units).wheel_positions for units in (1, 2))
     impacts, stretched = np.sort(np.concatenate([one, one + 1.3])), two + 1.0 * np.sin(two)
     for places, axles, doubt in ((impacts, 8, True), (stretched, 16, False)):
         row = {"train_type": "ic3", "n_axles": 16, "speed_kmh": 81.0, "axle_times_s": places / 25.0}
-        found = train(row, said, repository)
+        found = train(row, noted_values, repository)
         assert len(found.vehicle.wheels) == axles and found.speed == 25.0
         assert ("16 axles recorded, 8 assumed by its length" in found.doubts) == doubt
     row |= {"speed_kmh": 90.0, "axle_times_s": two / 25.0}
-    found = train(row, said, repository)
+    found = train(row, noted_values, repository)
     assert len(found.vehicle.wheels) == 16 and not any("axles" in doubt for doubt in found.doubts)
 
 
 @pytest.mark.parametrize("known", [{"axle_load_t": 14.0}, {"load_share": 0.4}, {}])
-def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, known):
-    """Uniform between: its standard deviation is half of the way over the root of 3. Known loads are known to 5 %."""
+def test_the_prior_of_an_unknown_load_spans_empty_to_full(repository, known):
+    """The sd of a uniform prior is half of its width over the root of 3. A known load has an sd of 5 %."""
     folder = repository / "config/vehicles"
     row = {"train_type": "freight", "n_axles": None} | {k: v for k, v in known.items() if k == "axle_load_t"}
     found = train(row, {k: v for k, v in known.items() if k == "load_share"}, repository)
@@ -170,15 +175,15 @@ def test_a_load_that_nobody_knows_is_as_open_as_from_empty_to_full(repository, k
     assert load.sd > 0.2 and load.bounds == (-2.0 * load.sd, 2.0 * load.sd)
 
 
-def test_words_where_a_temperature_should_be_cost_the_temperature_alone(folder):
-    small.roll(
+def test_a_passage_with_an_unreadable_temperature_is_used(folder):
+    small.write_passages(
         folder, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "rail_temperature": "?"})
     )
     assert [f["n_passages"] for f in diagnose_turnout("t1")["mismatch_findings"]] == [1]
 
 
-def test_a_turnout_without_a_track_is_a_row_of_the_fleet(folder):
-    """Not a fault of the program: its neighbours' run is sound."""
+def test_a_turnout_without_a_track_file_gives_a_row_of_the_quarantine(folder):
+    """It is no fault of the program: the run of the other turnouts continues."""
     (folder / "config/tracks/small.yaml").unlink()
     turnout = turnout_in(folder)
     unit = unit_of("t1", "2026-07-25", scan(turnout, folder / "raw").units, turnout.hashes["mismatch"])
@@ -186,8 +191,8 @@ def test_a_turnout_without_a_track_is_a_row_of_the_fleet(folder):
     assert row["reason_code"] == "simulation_failed" and "without a track nothing can be simulated" in row["found"]
 
 
-def test_other_notes_are_another_finding(folder):
-    """The same files, a corrected temperature: what an earlier run kept is not the answer."""
+def test_a_change_of_the_notes_gives_another_finding(folder):
+    """The same files with a corrected temperature: the stored result of an earlier run is not used."""
     notes = folder / "raw/t1/campaigns.csv"
     found = []
     for temperature in ("11.0", "25.0"):
@@ -196,8 +201,8 @@ def test_other_notes_are_another_finding(folder):
     assert found[0] != found[1] == diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"]
 
 
-def test_another_content_of_the_same_size_is_another_finding(folder):
-    """A file put right and copied over the old one: name, size and notes are the same."""
+def test_other_content_of_the_same_size_gives_another_finding(folder):
+    """A corrected file replaces the old one: name, size and notes are the same."""
     (file, _) = sorted((folder / "raw/t1/hammer").rglob("*.h5"))
     first, size = diagnose_turnout("t1")["mismatch_findings"][0]["finding_id"], file.stat().st_size
     small.write_hammer_tests(folder, seed=7)
@@ -210,7 +215,7 @@ def test_the_temperature_in_the_files_is_their_median():
     assert rail_temperature(recordings) == 14.0 and rail_temperature(recordings[1:2]) is None
 
 
-def test_a_track_that_is_extended_counts(folder):
+def test_a_change_of_an_extended_track_file_changes_the_digest(folder):
     tracks = folder / "config/tracks"
     (tracks / "ground.yaml").write_text((tracks / "small.yaml").read_text())
     (tracks / "t1.yaml").write_text("extends: ground\n")
@@ -220,8 +225,8 @@ def test_a_track_that_is_extended_counts(folder):
     assert digest_of_model(turnout) != before
 
 
-def test_a_route_that_the_track_has_not_is_said(folder):
-    """A hammer test on the diverging track is not simulated on the rails of the main one."""
+def test_a_section_on_a_route_that_the_track_lacks_is_reported_and_not_used(folder):
+    """A hammer test on the diverging track is not simulated on the main track."""
     layout = folder / "config/layouts/small.yaml"
     layout.write_text(layout.read_text().replace("B: {panel: CP, track: main", "B: {panel: AS, track: diverging"))
     turnout = turnout_in(folder)
@@ -233,7 +238,7 @@ def test_a_route_that_the_track_has_not_is_said(folder):
 
 
 def test_a_case_in_a_switch_has_a_third_of_the_axles(folder, monkeypatch):
-    """An axle costs three times as much there; limits that are given stay."""
+    """An axle needs three times as much computation there; given limits are not changed."""
     limits = []
     monkeypatch.setattr(mismatch_groups, "_campaign", lambda *arguments: limits.append(arguments[-1]))
     turnout = turnout_in(folder)
@@ -244,7 +249,7 @@ def test_a_case_in_a_switch_has_a_third_of_the_axles(folder, monkeypatch):
     assert dict.fromkeys(limits) == dict.fromkeys([(8, 96), (8, 32), (60, 1000)])
 
 
-def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
+def test_the_result_of_the_newest_recordings_is_used(tmp_path, monkeypatch):
     def row(name, day):
         return {"finding_id": name, "found_at_utc": datetime(2026, day, 1), "term_json": "[]"}
 
@@ -266,7 +271,7 @@ def test_the_result_of_the_newer_recordings_is_accepted(tmp_path, monkeypatch):
         lambda text: "",
     ],
 )
-def test_a_stored_result_that_was_edited_or_damaged_is_not_accepted(tmp_path, edit):
+def test_a_stored_result_that_was_edited_or_damaged_is_rejected(tmp_path, edit):
     row = {"finding_id": "a", "found_at_utc": "2026-07-01", "term_json": "[]", "verdict": "none"}
     results = Results(tmp_path, "t1")
     results.save({"mismatch_findings": [row]})
@@ -276,7 +281,7 @@ def test_a_stored_result_that_was_edited_or_damaged_is_not_accepted(tmp_path, ed
         results.finding()
 
 
-def test_corrugation_further_on_is_another_entry():
+def test_corrugation_at_another_position_is_another_entry():
     text = "name: a\nterms:\n  - term: rail_corrugation\n    start: 10\n    end: 14\n"
     both = with_entry(text, "  - term: rail_corrugation\n    start: 30\n    end: 34\n")
     assert both.count("rail_corrugation") == 2
@@ -289,13 +294,13 @@ def test_corrugation_further_on_is_another_entry():
 WARM = {None: (25.0, None), "as warm": (25.0, 27.0), "warmer": (10.0, 25.0)}
 
 
-@pytest.mark.parametrize(("warmth", "offered"), [(None, False), ("as warm", False), ("warmer", True)])
-def test_warmth_is_a_cause_only_where_it_is_known_and_differs(warmth, offered):
-    """A pad softer than its file is no pad that is warm: one temperature cannot tell the two."""
+@pytest.mark.parametrize(("case_name", "offered"), [(None, False), ("as warm", False), ("warmer", True)])
+def test_pad_temperature_is_a_candidate_only_if_temperatures_are_known_and_differ(case_name, offered):
+    """Recordings at one temperature cannot distinguish a soft pad from a warm pad."""
     campaign = measured_campaign(small_plan((15.0,), passages=False, hammer_positions=(21.6, 24.0)), (), 3)
     tests = tuple(
         replace(t, conditions={} if w is None else {"rail_temperature": w})
-        for t, w in zip(campaign.hammer, WARM[warmth])
+        for t, w in zip(campaign.hammer, WARM[case_name])
     )
     case = TrackCase(replace(campaign, hammer=tests), families=("pad_temperature", "zener_pad"))
     assert ("pad_temperature" in {c.family for c in case.candidates}) == offered
@@ -303,13 +308,13 @@ def test_warmth_is_a_cause_only_where_it_is_known_and_differs(warmth, offered):
 
 
 @pytest.mark.parametrize("rate", [500.0, 1e3, 1e4])
-def test_slow_loggers_are_read_true(rate):
-    """Three tones within the band, sampled mid-step as recordings are: read where the observation asks, to 1 %."""
+def test_passages_of_slow_loggers_are_resampled_correctly(rate):
+    """Three tones in the band, sampled in the middle of steps: at the times of the observation to 1 %."""
     found, exact = _tones_at(rate)
     assert np.linalg.norm(found - exact) < 0.01 * np.linalg.norm(exact)
 
 
-def test_a_train_outside_its_recording_is_noted_and_the_impacts_are_used(monkeypatch):
+def test_a_train_outside_its_recording_is_reported_and_the_impacts_are_used(monkeypatch):
     def nowhere(*_):
         raise SimulationError("the train lies outside the recording")
 
@@ -319,13 +324,13 @@ def test_a_train_outside_its_recording_is_noted_and_the_impacts_are_used(monkeyp
     assert any("outside the recording" in note for note in case.notes)
 
 
-def test_loggers_too_slow_for_the_band_are_rejected():
+def test_a_logger_that_is_too_slow_for_the_band_is_rejected():
     with pytest.raises(SimulationError, match="200 samples per second are too few for 107 Hz"):
         _tones_at(200.0)
 
 
 def _tones_at(rate):
-    """(data, what they should be) of a passage at 40 m/s whose sensors show tones, inside, away from its edges."""
+    """(data, expected data) of a passage at 40 m/s whose sensors record tones, without the edges."""
     passage = measured_campaign(small_plan((15.0,), (40.0,), hammer_positions=()), (), 5).passages[0]
     sensors = small_plan().sensors
     n = round(passage.recording.duration * rate)
@@ -341,7 +346,7 @@ def _tones_at(rate):
     return data[:, inside], np.tile(tones(made.time), (len(sensors), 1))[:, inside]
 
 
-def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
+def test_the_notes_of_a_group_are_listed_before_those_of_others():
     from turnout.stages.mismatch_rows import _visit_notes
 
     notes = [*(Note("load not known", f"{k}") for k in range(20)), Note("section C: elsewhere")]
@@ -349,7 +354,7 @@ def test_a_note_of_this_group_is_not_cut_off_by_those_of_others():
     assert _visit_notes({"notes": notes}, campaign)[:2] == ["passage 17: load not known", "section C: elsewhere"]
 
 
-def test_notes_that_are_cut_off_are_counted():
+def test_the_number_of_omitted_notes_is_stated():
     from turnout.stages.mismatch_rows import MAX_NOTES, _first_notes
 
     notes = [f"note {k}" for k in range(MAX_NOTES + 3)]
@@ -357,8 +362,8 @@ def test_notes_that_are_cut_off_are_counted():
     assert _first_notes(notes[:MAX_NOTES]) == notes[:MAX_NOTES]
 
 
-def test_a_passage_of_the_fewest_samples_is_an_observation():
-    """Fewer than those over which its amplitude is taken: then it is taken over all of them."""
+def test_a_passage_with_the_minimum_number_of_samples_is_an_observation():
+    """It is shorter than the window of the amplitude, so the amplitude is that of all samples."""
     rng, time = np.random.default_rng(0), np.arange(PASSAGE.min_samples) / 300.0
     vehicle = SimpleNamespace(wheel_positions=np.zeros(1), static_loads=[1e5])
     passage = PassageInput("p", None, vehicle, 30.0, "x")
@@ -368,8 +373,8 @@ def test_a_passage_of_the_fewest_samples_is_an_observation():
     assert found.data.size == 2 * PASSAGE.min_samples and np.all(found.sigma > 0.02 * np.std(data, axis=1).min())
 
 
-def test_sections_that_are_asked_for_are_diagnosed_together():
-    """13 m apart they are two groups of a turnout, and one where somebody asks for just these."""
+def test_sections_that_the_user_selects_are_diagnosed_together():
+    """Two sections 13 m apart are two groups of a turnout, and one group if the user selects them."""
     places = {"A": 2.0, "B": 15.0, "C": 40.0}
     sections = [SimpleNamespace(label=n, position=x, track="main") for n, x in places.items()]
     turnout = SimpleNamespace(sections=sections)
@@ -377,8 +382,8 @@ def test_sections_that_are_asked_for_are_diagnosed_together():
     assert list(neighbours_of(turnout, ("A", "B"))) == [("main", ("A", "B"))]
 
 
-def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
-    """Those that a case would choose of all of them are chosen of what is kept."""
+def test_a_month_of_passages_keeps_the_extremes_of_speed_of_each_train():
+    """A case chooses the same passages from the kept ones as from all of them."""
     rng, passages, every = np.random.default_rng(1), [], []
     for k in range(200):
         vehicle, heard = SimpleNamespace(wheels=range(8)), SimpleNamespace(channels=())
@@ -393,17 +398,17 @@ def test_a_month_of_trains_keeps_the_extremes_of_speed_of_each():
 
 @pytest.fixture
 def logged(folder):
-    """Two trains in one file, 70 s of nothing between and about them."""
-    small.roll(folder, speeds=(80.0, 110.0), vehicle="locomotive")
+    """Two trains in one file, with 70 s of noise before, between and after them."""
+    small.write_passages(folder, speeds=(80.0, 110.0), vehicle="locomotive")
     files = sorted((folder / "raw/t1/passages").iterdir())
     turnout = turnout_in(folder)
     parts = [read(f"t1/passages/{f.name}", folder / "raw", turnout.passages.description).recordings[0] for f in files]
     rng, rate = np.random.default_rng(0), parts[0].rate
 
-    def nothing(seconds):
+    def noise(seconds):
         return 0.02 * rng.standard_normal((len(parts[0].channels), round(seconds * rate)))
 
-    samples = np.concatenate([nothing(70), parts[0].samples, nothing(70), parts[1].samples, nothing(70)], axis=1)
+    samples = np.concatenate([noise(70), parts[0].samples, noise(70), parts[1].samples, noise(70)], axis=1)
     for file in files[1:]:
         file.unlink()
     noted = {k: v for k, v in parts[0].conditions.items() if k == "train_type"}
@@ -418,16 +423,16 @@ def gathered(folder, kind="passage"):
 
 
 @pytest.mark.parametrize("held", [MAX_WHOLE_FILE_SIZE, 0])
-def test_a_logger_that_never_stops_gives_its_trains(logged, monkeypatch, held):
-    """Both are used, each as its own; also of a file so large that it is not read as a whole."""
+def test_both_trains_of_a_continuous_recording_are_used(logged, monkeypatch, held):
+    """Each train is a separate passage, also in a file that is too large to be read as a whole."""
     monkeypatch.setattr(mismatch_inputs, "read", partial(read, max_whole_file_size=held))
     found = gathered(logged)
     assert [round(3.6 * p.speed, -1) for p in found.passages] == [80.0, 110.0], found.notes
     assert len({p.name for p in found.passages}) == 2 and not [n for n in found.notes if "trains in it" in n.text]
 
 
-def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(logged, monkeypatch):
-    """The passage stage lost the first of two: its only row would give either train the other's speed and load."""
+def test_passages_without_a_clear_row_of_the_passage_stage_are_reported_and_not_used(logged, monkeypatch):
+    """The passage stage lost the first of two trains: its only row could give a train the wrong speed and load."""
     plain = mismatch_inputs.passage_unit
 
     def lost(*arguments, **more):
@@ -441,7 +446,7 @@ def test_rows_that_may_be_those_of_other_trains_are_not_used_and_that_is_said(lo
 
 
 def gathered_with(folder, quarantine=(), **facts):
-    """Inputs from the one passage, with facts that the passage stage would state about it."""
+    """Inputs from the only passage, with facts that the passage stage states about it."""
     turnout = turnout_in(folder)
     (unit,) = (u for u in scan(turnout, folder / "raw").units if u.kind == "passage")
     tables = mismatch_inputs.passage_unit(unit, turnout, folder / "raw")
@@ -453,16 +458,16 @@ def gathered_with(folder, quarantine=(), **facts):
     ("channels", "used"), [(["B"], ["A"]), (["A7"], ["A", "B"]), (["A", "B"], []), (None, ["A", "B"])]
 )
 def test_channels_that_the_passage_stage_excludes_are_not_used(folder, channels, used):
-    """They are stated as a list: two that are exchanged are two, and A7 is not A."""
-    small.roll(folder, speeds=(100.0,))
+    """The channels are a list: two exchanged channels are two entries, and A7 is not A."""
+    small.write_passages(folder, speeds=(100.0,))
     found = gathered_with(folder, [{"reason_code": "channels_swapped", "channels": channels, "place": "record 1, A"}])
     assert [c.name for p in found.passages for c in p.recording.channels] == used
     assert any("not used (channels_swapped)" in n.text for n in found.notes) == (len(used) < 2)
 
 
 @pytest.mark.parametrize(("codes", "used"), [(["train_cut_off", "two_trains"], 0), (["train_cut_off"], 1), (None, 1)])
-def test_of_two_trains_at_once_neither_is_simulated_whatever_the_first_reason(folder, codes, used):
-    small.roll(folder, speeds=(100.0,))
+def test_two_trains_at_the_same_time_are_not_simulated_whatever_the_first_reason(folder, codes, used):
+    small.write_passages(folder, speeds=(100.0,))
     found = gathered_with(folder, reason_codes=codes, detail="another train at about 90 km/h, facing")
     assert len(found.passages) == used
     assert [n.text for n in found.notes if "two trains" in n.text] == ["two trains at the same time, not used"] * (
@@ -470,7 +475,7 @@ def test_of_two_trains_at_once_neither_is_simulated_whatever_the_first_reason(fo
     )
 
 
-def test_results_of_an_earlier_version_without_the_codes_of_all_reasons_are_analysed_again(monkeypatch):
+def test_results_of_an_earlier_version_without_reason_codes_are_computed_again(monkeypatch):
     results = [
         SimpleNamespace(unit="t1/passage/old", tables={"passages": [{"passage_id": "a", "status": "partly"}]}),
         SimpleNamespace(unit="t1/passage/new", tables={"passages": [{"passage_id": "b", "reason_codes": []}]}),
@@ -480,8 +485,8 @@ def test_results_of_an_earlier_version_without_the_codes_of_all_reasons_are_anal
 
 
 @pytest.mark.parametrize(("softest", "used"), [(50.0, True), (50_000.0, False)])
-def test_impacts_are_judged_as_the_hammer_stage_judges_them(folder, softest, used):
-    """Its settings are the turnout's: impacts too soft for the one are too soft for the other."""
+def test_impacts_are_accepted_by_the_same_settings_as_in_the_hammer_stage(folder, softest, used):
+    """Both use the settings of the turnout, so both reject the same impacts as too soft."""
     file = folder / "config/config.yaml"
     file.write_text(file.read_text() + f"receptance: {{softest_blow: {softest:g}}}\n")
     tests = gathered(folder, "hammer").tests
@@ -494,8 +499,8 @@ def test_impacts_are_judged_as_the_hammer_stage_judges_them(folder, softest, use
     assert tests
 
 
-def test_a_hammer_test_whose_own_response_fails_is_used_with_its_other_responses(folder):
-    """Only a fault of the force costs a record; that of one response costs this response."""
+def test_a_hammer_test_with_a_faulty_response_is_used_with_its_other_responses(folder):
+    """Only a fault of the force removes a record; a fault of one response removes this response."""
     turnout = turnout_in(folder)
     response = turnout.hammer.response["A"]
     for path in (folder / "raw/t1/hammer").rglob("A_*.h5"):
@@ -524,14 +529,14 @@ def test_spikes_in_recordings_are_replaced_and_stated_once_for_each_channel(fold
         samples[0, [200, 400, 600]] = 1e4
         return replace(recording, samples=samples)
 
-    small.roll(folder, speeds=(100.0, 110.0), change=spoil)
+    small.write_passages(folder, speeds=(100.0, 110.0), change=spoil)
     found = gathered(folder, "passage")
     assert all(np.abs(p.recording.samples).max() < 1e3 for p in found.passages) and len(found.passages) == 2
     (note,) = (n.text for n in found.notes if "stand out" in n.text)
     assert "3 samples replaced" in note and "Other records with this fault: 1." in note
 
 
-def test_a_calibration_judges_impacts_by_the_turnouts_settings(folder):
+def test_a_calibration_accepts_impacts_by_the_settings_of_the_turnout(folder):
     file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
     file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
@@ -557,15 +562,15 @@ def test_a_calibration_replaces_spikes_and_states_them(folder, monkeypatch, capl
     assert f"{file.name}, record 1: rail: 1 sample replaced" in caplog.text
 
 
-def test_files_that_a_calibration_cannot_use_are_said(folder, tmp_path, caplog):
-    """Without the turnout's layout no channel of the file is known."""
+def test_files_that_a_calibration_cannot_use_are_reported(folder, tmp_path, caplog):
+    """Without the layout of the turnout, no channel of the file is known."""
     track = folder / "config/tracks/small.yaml"
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
     with pytest.raises(SimulationError, match=r"no record can be used\. .*there is no channel 'hammer'"):
         calibrate_to_files(str(track), "A", files[:1])
     damaged = tmp_path / files[0].name
     damaged.write_bytes(files[0].read_bytes()[:-200])
-    # the impacts are read, the small track has no sections
+    # the impacts are read; the small track has no sections
     with pytest.raises(SimulationError, match="no section 'A'"):
         calibrate_to_files(str(track), "A", [*files, damaged], "t1", folder / "config")
     assert damaged.name in caplog.text and "not used" in caplog.text

@@ -1,4 +1,4 @@
-"""From the files of a turnout to findings: what is found, what is accepted, what is said where little can be said."""
+"""From the files of a turnout to findings: names, accepted effects, and what is reported for incomplete input."""
 
 import json
 import re
@@ -26,8 +26,8 @@ from turnout.stages.track_files import track_of
 
 @pytest.fixture
 def folder(tmp_path, repository, monkeypatch):
-    """An empty turnout, and few families, so that a diagnosis takes a second."""
-    small.lay_out(tmp_path, repository)
+    """A turnout without recordings; with only three families of effects a diagnosis takes about a second."""
+    small.write_configuration(tmp_path, repository)
     monkeypatch.chdir(tmp_path)
     families = ("local_ballast", "local_pad", "sensor_gain")
     monkeypatch.setattr(mismatch, "TrackCase", partial(TrackCase, families=families))
@@ -36,9 +36,9 @@ def folder(tmp_path, repository, monkeypatch):
 
 @pytest.fixture(scope="module")
 def impacts(tmp_path_factory, repository):
-    """Impacts on a turnout with one soft pad; tests copy them."""
+    """Hammer tests on a turnout with one soft pad; tests copy them."""
     made = tmp_path_factory.mktemp("impacts")
-    small.lay_out(made, repository)
+    small.write_configuration(made, repository)
     small.write_hammer_tests(made, small.soft_pad)
     return made / "raw"
 
@@ -49,14 +49,14 @@ def soft(folder, impacts):
     return folder
 
 
-def said(tables):
-    """All that was said of what was not used."""
+def reported(tables):
+    """All notes and messages about what was not used."""
     notes = [n for f in tables["mismatch_findings"] for n in (f["notes"] or "").splitlines()]
     return "\n".join([*notes, *(q["found"] for q in tables["quarantine"])])
 
 
-def test_a_rail_far_softer_than_its_file_is_stated_though_no_name_is_given(folder):
-    """Half the shear stiffness: its tolerance absorbs it, and no effect of these families explains it."""
+def test_a_rail_much_softer_than_the_file_is_reported_without_a_name(folder):
+    """Half the shear stiffness: a nuisance parameter absorbs it, and no effect of these families explains it."""
 
     def soft_in_shear(track):
         return (physics.RailShear(1e9 / track.rail.shear_stiffness),)
@@ -67,7 +67,7 @@ def test_a_rail_far_softer_than_its_file_is_stated_though_no_name_is_given(folde
     assert row["term"] is None and float(stated[1]) == pytest.approx(0.5, abs=0.05)
 
 
-def test_impacts_alone_name_the_soft_pad_at_its_sleeper(soft):
+def test_hammer_tests_alone_name_the_soft_pad_and_its_sleeper(soft):
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
     assert (row["verdict"], row["term"], row["position_m"]) == ("named", "local_pad", 18.0)
@@ -75,7 +75,7 @@ def test_impacts_alone_name_the_soft_pad_at_its_sleeper(soft):
     assert "18.0 m" in row["sentence"] and row["next_measurement"]
     assert row["n_passages"] == 0 and row["n_hammer_tests"] == 2
     (parameter,) = tables["mismatch_parameters"]
-    # true 0.3; impacts on two sleepers leave the factor open by a fifth
+    # the true value is 0.3; impacts on two sleepers determine the factor to a fifth
     assert (
         parameter["value_low"] < small.SOFT + 0.1
         and parameter["value_low"] < parameter["value"] < parameter["value_high"]
@@ -85,7 +85,7 @@ def test_impacts_alone_name_the_soft_pad_at_its_sleeper(soft):
     assert better.mean() > 0.5
 
 
-def test_what_was_accepted_is_simulated_and_not_found_again(soft, capsys):
+def test_an_accepted_effect_is_simulated_and_not_reported_again(soft, capsys):
     assert main(["diagnose", "--turnout", "t1"]) == 0
     assert (soft / "results/pages/findings/t1.html").is_file()
     assert main(["diagnose", "--turnout", "t1", "--accept"]) == 0
@@ -117,8 +117,8 @@ terms:
 @pytest.mark.parametrize(
     ("since", "until", "verdict"), [("2026-05", "2026-06", "none"), ("2026-08", "2026-09", "named")]
 )
-def test_a_change_that_was_accepted_is_not_found_again_at_a_later_visit(soft, since, until, verdict):
-    """The visit of 2026-07-25 estimates its size, 0.3 of the stiffness; a change that began later is none of it."""
+def test_an_accepted_change_is_not_reported_again_at_a_later_visit(soft, since, until, verdict):
+    """The visit of 2026-07-25 estimates its size, 0.3 of the stiffness, unless the change began later."""
     (soft / "config/tracks/t1.yaml").write_text(PAD_CHANGED.format(since=f"{since}-01", until=f"{until}-01"))
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
@@ -128,13 +128,13 @@ def test_a_change_that_was_accepted_is_not_found_again_at_a_later_visit(soft, si
     for size in sizes:
         assert size["position_m"] == 18.0 and size["value"] == pytest.approx(small.SOFT, abs=0.1)
     names = {p["parameter"] for p in tables["twin_states"]}
-    assert names and not any("local_pad" in name for name in names)  # of the calibrated model it is no parameter
+    assert names and not any("local_pad" in name for name in names)  # it is no parameter of the calibrated model
 
 
-def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
-    """The residual is searched for dips and wheels beside what was accepted."""
+def test_an_accepted_effect_is_not_reported_again_from_passages(soft):
+    """The search for dips and wheels uses the residual that remains with the accepted effect."""
     assert main(["diagnose", "--turnout", "t1"]) == 0 == main(["diagnose", "--turnout", "t1", "--accept"])
-    small.roll(soft, small.soft_pad)
+    small.write_passages(soft, small.soft_pad)
     tables = diagnose_turnout("t1")
     (row,) = tables["mismatch_findings"]
     assert (row["verdict"], row["n_passages"]) == ("none", 2)
@@ -142,8 +142,8 @@ def test_what_was_accepted_is_not_found_again_in_passages_either(soft):
     assert parameter["accepted"] and parameter["value_low"] < small.SOFT < parameter["value_high"]
 
 
-def test_the_simulated_file_holds_the_accepted_effect(soft):
-    """The file that `turnout simulate` writes is the recording of the track with the term, and not the one without."""
+def test_the_simulated_file_contains_the_accepted_effect(soft):
+    """`turnout simulate` writes the recording of the track with the effect."""
     from turnout.readers import read
     from turnout.stages.simulate import write_hammer
     from turnout.stages.simulate_request import REQUEST_DEFAULTS
@@ -162,7 +162,7 @@ def test_the_simulated_file_holds_the_accepted_effect(soft):
     assert change > 0.02
 
 
-def test_a_spent_budget_keeps_what_is_done(soft):
+def test_results_are_kept_when_the_budget_is_used_up(soft):
     class Bar:
         def __init__(self):
             self.fits, self.groups = [], []
@@ -183,26 +183,26 @@ def test_a_spent_budget_keeps_what_is_done(soft):
     assert second["mismatch_findings"] == first["mismatch_findings"] and not again.fits
 
 
-def test_a_spent_budget_shows_the_groups_that_are_done(soft, monkeypatch, capsys):
-    """Two groups, of which the first was finished before."""
+def test_finished_groups_are_shown_when_the_budget_is_used_up(soft, monkeypatch, capsys):
+    """There are two groups; the first was finished before."""
     monkeypatch.setattr(mismatch_groups, "MAX_SECTION_GAP", 0.1)
     assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
     assert "0 of 2 groups done" in capsys.readouterr().err and not (soft / "results").exists()
     (first,) = diagnose_turnout("t1", sections=("A",))["mismatch_findings"]
     assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
-    told = capsys.readouterr()
-    assert first["sentence"] in told.out and "no answer for sections B: the budget was used up" in told.out
-    assert "1 of 2 groups done; the same command continues" in told.err
+    printed = capsys.readouterr()
+    assert first["sentence"] in printed.out and "no answer for sections B: the budget was used up" in printed.out
+    assert "1 of 2 groups done; the same command continues" in printed.err
     page = (soft / "results/pages/findings/t1.html").read_text()
     assert "Run the same command again" in page and "docs/" not in page
-    assert "2 groups: neighbouring sections together; a group takes a minute to ten" in told.err
+    assert "2 groups: neighbouring sections together; a group takes a minute to ten" in printed.err
     page = (soft / "results/pages/findings/t1.html").read_text()
     assert "with 1 of 2 groups done" in page
 
 
-def test_small_budgets_one_after_the_other_reach_the_same_end(soft):
+def test_successive_small_budgets_give_the_same_result(soft):
     first = diagnose_turnout("t1", work="other")
-    for _ in range(600):  # every one makes progress; a busy machine needs many
+    for _ in range(600):  # every run makes progress; a busy machine needs many runs
         try:
             second = diagnose_turnout("t1", budget=2.0)
             break
@@ -212,7 +212,7 @@ def test_small_budgets_one_after_the_other_reach_the_same_end(soft):
     assert not list((soft / "work/mismatch-fits").glob("*predictions*"))
 
 
-def test_only_some_sections_can_be_asked_for(soft):
+def test_the_diagnosis_can_be_limited_to_some_sections(soft):
     (row,) = diagnose_turnout("t1", sections=("B",))["mismatch_findings"]
     assert row["sections"] == "B" and row["section_id"] == "t1/B"
     with pytest.raises(SimulationError, match="no section C"):
@@ -221,63 +221,67 @@ def test_only_some_sections_can_be_asked_for(soft):
         diagnose_turnout("t1", visit="2026-01-01")
 
 
-# Bad input: each gives what can still be said, or says why nothing can.
+# Bad input: the diagnosis uses the rest, or states why it cannot give an answer.
 
 
-def test_no_recording_at_all_is_said(folder, capsys):
+def test_a_turnout_without_recordings_is_an_error(folder, capsys):
     assert main(["diagnose", "--turnout", "t1"]) == 2
     assert "no hammer test and no passage" in capsys.readouterr().err
 
 
 def test_no_hammer_test_and_one_train_give_a_finding_without_held_out_recordings(folder):
-    small.roll(folder, speeds=(100.0,))
+    small.write_passages(folder, speeds=(100.0,))
     (row,) = diagnose_turnout("t1")["mismatch_findings"]
     assert row["verdict"] in ("none", "named", "a_or_b", "unknown", "numerics")
     assert (row["n_hammer_tests"], row["n_passages"], row["n_held_out"], row["fit_before_pct"]) == (0, 1, 0, None)
 
 
-def test_one_sensor_alone_gives_a_finding(folder):
+def test_a_single_sensor_gives_a_finding(folder):
     def one(recording):
         dead = recording.samples.copy()
         dead[1] = 0.0
         return replace(recording, samples=dead)
 
-    small.roll(folder, speeds=(100.0,), change=one)
+    small.write_passages(folder, speeds=(100.0,), change=one)
     tables = diagnose_turnout("t1")
-    assert "channel 'B'" in said(tables) and "dead" in said(tables)
+    assert "channel 'B'" in reported(tables) and "dead" in reported(tables)
     assert [f["n_sensors"] for f in tables["mismatch_findings"]] == [1]
 
 
-def test_a_wrong_vehicle_file_is_told_by_its_axles(soft):
-    small.roll(soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "ic3"}))
+def test_a_wrong_vehicle_file_is_reported_because_of_its_axles(soft):
+    small.write_passages(
+        soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "ic3"})
+    )
     tables = diagnose_turnout("t1")
-    assert "4 axles recorded, 8 in ic3.yaml: wrong vehicle file" in said(tables)
+    assert "4 axles recorded, 8 in ic3.yaml: wrong vehicle file" in reported(tables)
     assert [f["n_passages"] for f in tables["mismatch_findings"]] == [0]
 
 
-def test_a_vehicle_without_a_file_is_said(soft):
-    small.roll(soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "tgv"}))
-    assert "type tgv: no file config/vehicles/tgv.yaml" in said(diagnose_turnout("t1"))
+def test_a_vehicle_without_a_file_is_reported(soft):
+    small.write_passages(
+        soft, speeds=(100.0,), change=lambda r: replace(r, conditions={**r.conditions, "train_type": "tgv"})
+    )
+    assert "type tgv: no file config/vehicles/tgv.yaml" in reported(diagnose_turnout("t1"))
 
 
-def test_a_wrong_layout_is_told_by_the_track_file(soft):
+def test_a_wrong_layout_is_reported_because_of_the_track_file(soft):
     layout = soft / "config/layouts/small.yaml"
     layout.write_text(layout.read_text().replace("position: 18.0", "position: 22.0"))
     tables = diagnose_turnout("t1")
-    assert "section A: 22.0 m in the layout, 18.0 m in the track's file" in said(tables)
+    assert "section A: 22.0 m in the layout, 18.0 m in the track's file" in reported(tables)
     assert [f["sections"] for f in tables["mismatch_findings"]] == ["B"]
 
 
 def test_a_recording_from_another_turnout_is_not_used(soft):
-    """Its sensors lie three times as far apart: the axles come at times that no known train has."""
+    """Its sensors are three times as far apart: no known train has axles at these times."""
     near = dict(small.PLACES)
     small.PLACES["B"] = 19.8
     try:
-        small.roll(soft, speeds=(60.0,), change=_called("locomotive"))
+        small.write_passages(soft, speeds=(60.0,), change=_called("locomotive"))
     finally:
         small.PLACES.update(near)
     tables = diagnose_turnout("t1")
-    assert "wrong vehicle file" in said(tables) and "other sensors" in said(tables)
+    assert "wrong vehicle file" in reported(tables) and "other sensors" in reported(tables)
     (row,) = tables["mismatch_findings"]
     assert (row["n_hammer_tests"], row["n_passages"]) == (2, 0)
 
@@ -286,42 +290,42 @@ def _called(name):
     return lambda r: replace(r, conditions={"train_type": name})
 
 
-def test_channels_clipped_throughout_are_left_out(soft):
+def test_channels_that_are_clipped_throughout_are_left_out(soft):
     def clipped(recording):
         return replace(recording, samples=np.clip(recording.samples, -0.5, 0.5))
 
     layout = soft / "config/layouts/small.yaml"
     layout.write_text(layout.read_text().replace("limit: 500", "limit: 0.5"))
-    small.roll(soft, speeds=(100.0,), change=clipped)
+    small.write_passages(soft, speeds=(100.0,), change=clipped)
     tables = diagnose_turnout("t1")
-    assert "clipped" in said(tables)
+    assert "clipped" in reported(tables)
     assert tables["mismatch_findings"][0]["n_passages"] == 0
 
 
-def test_a_file_that_cannot_be_read_is_said(soft):
+def test_a_file_that_cannot_be_read_is_reported(soft):
     (soft / "raw/t1/hammer/2026-07-25/B_1.h5").write_bytes(b"nothing")
     tables = diagnose_turnout("t1")
-    assert "B_1.h5" in said(tables) and tables["mismatch_findings"][0]["n_hammer_tests"] == 1
+    assert "B_1.h5" in reported(tables) and tables["mismatch_findings"][0]["n_hammer_tests"] == 1
 
 
-def test_trains_that_differ_too_much_to_be_compared_do_not_agree(soft, monkeypatch):
-    """The dip is that large that no passage resembles its simulation; hammer tests do not show a dip."""
+def test_trains_that_differ_too_much_for_a_comparison_give_the_answer_unknown(soft, monkeypatch):
+    """The dip is so large that no passage resembles its simulation; hammer tests do not show a dip."""
     shutil.rmtree(soft / "raw")
     small.write_hammer_tests(soft)
-    small.roll(soft, lambda track: (physics.SurfaceDip(18.3, 6e-4),), speeds=(90.0, 110.0))
+    small.write_passages(soft, lambda track: (physics.SurfaceDip(18.3, 6e-4),), speeds=(90.0, 110.0))
     (row,) = diagnose_turnout("t1")["mismatch_findings"]
     assert (row["verdict"], row["n_passages"], row["position_m"]) == ("unknown", 0, None)
     assert row["sentence"].startswith("No passage resembles the simulation of its train: a large fault of the track")
 
 
-def test_a_turnout_without_a_track_is_said(soft, capsys):
+def test_a_turnout_without_a_track_file_is_an_error(soft, capsys):
     (soft / "config/tracks/small.yaml").unlink()
     assert main(["diagnose", "--turnout", "t1"]) == 2
     message = capsys.readouterr().err
     assert "without a track nothing can be simulated. Copy a file of config/tracks" in message
 
 
-def test_the_rows_fit_the_registry(soft, tmp_path):
+def test_the_registry_accepts_the_rows(soft, tmp_path):
     from turnout.registry.database import open_registry
     from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult, read_results, write_batch
@@ -353,15 +357,15 @@ def test_a_finding_of_the_fleet_is_accepted_from_the_registry(soft, tmp_path):
         Results("work", "t2", tmp_path / "registry").finding()
 
 
-def test_notes_of_a_visit_are_stored_in_words_with_its_information(tmp_path, monkeypatch):
-    """A diagnosis of a visit with a note ended with a TypeError."""
+def test_notes_of_a_visit_are_stored_as_text_with_its_information(tmp_path, monkeypatch):
+    """Formerly, the diagnosis of a visit with a note ended with a TypeError."""
     kept = {}
     monkeypatch.setattr(mismatch, "TrackCase", lambda *_, **__: None)
     monkeypatch.setattr(mismatch, "diagnose", lambda *_: SimpleNamespace(verdict=SimpleNamespace(answer="none")))
     monkeypatch.setattr(mismatch, "finding_tables", lambda *_: {"mismatch_findings": [{}]})
     monkeypatch.setattr(mismatch.calibrated_model, "state_rows", lambda *_: [])
     monkeypatch.setattr(mismatch.stored_visits, "store_visit", lambda *given: kept.update(given[4]))
-    about = {
+    description = {
         "visit": "2024-05-07",
         "identity": "a",
         "changes": (),
@@ -370,7 +374,7 @@ def test_notes_of_a_visit_are_stored_in_words_with_its_information(tmp_path, mon
     group = SimpleNamespace(labels=("A1",), route="main", campaign=None)
     turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
     options = mismatch.Options(fits=str(tmp_path))
-    rows = mismatch._diagnose_group(group, turnout, (), about, options, (0, 1))
+    rows = mismatch._diagnose_group(group, turnout, (), description, options, (0, 1))
     assert rows["twin_states"] == []
     assert [list(note) for note in kept["notes"]] == [
         ["2024-05-07", "too short", True],

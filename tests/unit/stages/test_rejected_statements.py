@@ -1,7 +1,7 @@
-"""What a file states against its layout reaches the user: a row in quarantine of a run and a line of `check --read`.
+"""A statement of a file against its layout gives a row of the quarantine and a line of `check --read`.
 
-Each kind of statement is in files of several formats, each the hammer test of a section in a small project. The row and
-the line name the file, the place in it, what was found and what to do.
+Each kind of statement is tested in several formats, as a hammer test of a section in a small project. The row and the
+line state the file, the place in it, the problem and the remedy.
 """
 
 import h5py
@@ -46,7 +46,7 @@ def impact():
 
 
 def write_text(path, facts, quantities, separator=";", n_behind=0):
-    """Text with ``n_behind`` further rows behind an empty line."""
+    """Write text with ``n_behind`` further rows behind an empty line."""
     head = [separator.join(map(str, pair)) for pair in facts.items()]
     head += [separator.join(("Quantity", *quantities))] if quantities else []
     names = separator.join(f"{name} [{unit}]" for name, unit in zip(NAMES, UNITS))
@@ -56,7 +56,7 @@ def write_text(path, facts, quantities, separator=";", n_behind=0):
 
 
 def write_tdms(path, facts, quantities):
-    """Facts are properties of the file, quantities of the channels."""
+    """Write a file with the facts as its properties and the quantities as properties of channels."""
     channels = [
         nptdms.ChannelObject("impact", name, x, {"unit_string": unit} | ({"Quantity": q} if q else {}))
         for name, x, unit, q in zip(NAMES, impact(), UNITS, quantities or ("", ""))
@@ -66,7 +66,7 @@ def write_tdms(path, facts, quantities):
 
 
 def write_hdf5(path, facts, quantities):
-    """Facts are attributes of the file, quantities of the datasets."""
+    """Write a file with the facts as its attributes and the quantities as attributes of datasets."""
     with h5py.File(path, "w") as file:
         file.attrs.update(facts)
         for name, x, unit, quantity in zip(NAMES, impact(), UNITS, quantities or ("", "")):
@@ -75,7 +75,7 @@ def write_hdf5(path, facts, quantities):
 
 
 WRITERS = {"csv": write_text, "tdms": write_tdms, "h5": write_hdf5}
-# Facts of the file, quantities of its channels, reason, and words of the finding. A fact is an entry beside the start.
+# Facts of the file, quantities of channels, reason, and words of the message. A fact is an entry beside the start time.
 KINDS = {
     "quantity": ({"Sample rate": RATE}, ("force", "displacement"), "unit_unknown", "displacement"),
     "reduction": ({"Sample rate": 2 * RATE, "Decimation": 2}, (), "wrong_rate", "reduction by 2"),
@@ -86,7 +86,7 @@ KINDS = {
 
 @pytest.fixture
 def project(tmp_path):
-    """(function that writes the raw file of the project: extension -> path, function that returns what a user sees)."""
+    """(folder of the configuration, raw folder) of a project with one turnout."""
     folder = tmp_path / "config"
     (folder / "layouts").mkdir(parents=True)
     (folder / "layouts" / "mine.yaml").write_text(LAYOUT, encoding="utf-8")
@@ -107,7 +107,7 @@ def rows_and_lines(project, capsys):
     return result.tables["quarantine"], code, capsys.readouterr().out.splitlines()
 
 
-def assert_both_say(project, capsys, path, reason, words):
+def assert_row_and_line(project, capsys, path, reason, words):
     rows, code, lines = rows_and_lines(project, capsys)
     (row,) = [row for row in rows if row["reason_code"] == reason]
     assert row["path"] == path and row["place"] and words in row["found"] and row["remedy"]
@@ -117,23 +117,23 @@ def assert_both_say(project, capsys, path, reason, words):
 
 @pytest.mark.parametrize("extension", WRITERS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_a_file_states_against_its_layout_is_a_row_and_a_line(kind, extension, project, capsys):
+def test_a_statement_against_the_layout_gives_a_row_and_a_line(kind, extension, project, capsys):
     facts, quantities, reason, words = KINDS[kind]
     path = f"t1/hammer/2026-05-13/A7_1.{extension}"
     WRITERS[extension](project[1] / path, {"started_at": START, **facts}, quantities)
-    assert_both_say(project, capsys, path, reason, words)
+    assert_row_and_line(project, capsys, path, reason, words)
 
 
 @pytest.mark.parametrize(("extension", "separator"), [("csv", ";"), ("txt", "\t"), ("asc", ",")])
-def test_rows_behind_an_empty_line_are_a_row_and_a_line(extension, separator, project, capsys):
-    """Only text has lines."""
+def test_rows_behind_an_empty_line_give_a_row_and_a_line(extension, separator, project, capsys):
+    """Only text formats have lines."""
     path = f"t1/hammer/2026-05-13/A7_1.{extension}"
     write_text(project[1] / path, {"started_at": START, "Sample rate": RATE}, (), separator, 2)
-    assert_both_say(project, capsys, path, "wrong_length", "an empty line stands before its last 2 rows")
+    assert_row_and_line(project, capsys, path, "wrong_length", "an empty line stands before its last 2 rows")
 
 
 @pytest.mark.parametrize("extension", WRITERS)
-def test_a_file_that_agrees_with_its_layout_is_neither(extension, project, capsys):
+def test_a_file_that_agrees_with_its_layout_gives_no_row_and_no_fault(extension, project, capsys):
     path = project[1] / f"t1/hammer/2026-05-13/A7_1.{extension}"
     WRITERS[extension](path, {"started_at": START, "Sample rate": RATE}, ("force", "acceleration"))
     rows, code, lines = rows_and_lines(project, capsys)

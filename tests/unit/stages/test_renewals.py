@@ -1,4 +1,4 @@
-"""Renewals of a turnout: which visits they leave, and how often their file is read."""
+"""Renewals of a turnout: the visits that remain, and how often the file of events is read."""
 
 from types import SimpleNamespace
 
@@ -27,14 +27,17 @@ def turnout(tmp_path):
     [
         ((), [1, 2, 3, 4]),
         (("t1,,2025-06-01,renewal,,",), [2, 3, 4]),
-        (("t1,,2025-06-01,renewal,,", "t1,,2025-07-20,renewal,,"), [4]),  # the newest; the month counts as its middle
+        (
+            ("t1,,2025-06-01,renewal,,", "t1,,2025-07-20,renewal,,"),
+            [4],
+        ),  # the newest renewal counts; the day of a visit of a month is its middle
         (("t1,,2025-06-01,tamping,,",), [1, 2, 3, 4]),
         (("t2,,2025-06-01,renewal,,",), [1, 2, 3, 4]),
         (("t1,A7,2025-06-01,renewal,,",), [1, 2, 3, 4]),  # of one section
         (("t1,,2099-06-01,renewal,,",), [1, 2, 3, 4]),  # planned
     ],
 )
-def test_only_visits_since_the_newest_renewal_of_the_whole_turnout_are_left(turnout, rows, kept):
+def test_only_visits_since_the_newest_renewal_of_the_whole_turnout_remain(turnout, rows, kept):
     assert list(since_renewal(turnout(*rows), VISITS).values()) == kept
 
 
@@ -42,12 +45,12 @@ def test_without_a_file_there_is_no_renewal(tmp_path):
     assert renewal_of(SimpleNamespace(folder=str(tmp_path), id="t1")) is None
 
 
-def test_the_note_names_the_day(turnout):
+def test_the_note_states_the_day_of_the_renewal(turnout):
     assert renewal_note(turnout("t1,,2025-06-01,renewal,,")) == " since its renewal on 2025-06-01"
     assert renewal_note(turnout("t1,,2025-06-01,tamping,,,")) == ""
 
 
-def test_the_file_is_read_once_and_again_when_it_has_changed(turnout, monkeypatch):
+def test_the_file_is_read_again_only_when_it_has_changed(turnout, monkeypatch):
     n_read = 0
 
     def counting(*arguments):

@@ -1,4 +1,4 @@
-"""Stages that only read the registry load no package that they do not use: each takes 20 to 65 MB in every job."""
+"""Stages that only read the registry import no heavy package: each package takes 20 to 65 MB in every job."""
 
 import subprocess
 import sys
@@ -46,8 +46,8 @@ RARELY_USED = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimi
         ("turnout.stages.passage", True),
     ],
 )
-def test_parts_of_scipy_are_loaded_where_they_are_used_and_before_processes_are_forked(modules, loads):
-    """They took 0.7 of the 2.2 CPU s of ``turnout check``. Recordings are analysed in forked processes."""
+def test_parts_of_scipy_are_imported_only_where_they_are_used_and_before_a_fork(modules, loads):
+    """They took 0.7 of the 2.2 CPU s of ``turnout check``. Forked processes analyse the recordings."""
     done = subprocess.run(
         [sys.executable, "-c", f"import sys, {modules}; print(*sys.modules)"],
         capture_output=True, text=True, check=True,

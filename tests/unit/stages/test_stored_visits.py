@@ -1,4 +1,4 @@
-"""Files of visits: those that no longer serve are removed, and no others."""
+"""Stored files of visits: only those that are no longer needed are removed."""
 
 from types import SimpleNamespace
 
@@ -32,8 +32,8 @@ def test_a_folder_that_does_not_exist_yet_is_no_error(tmp_path):
 @pytest.mark.parametrize(
     ("parameter", "expected"), [(f"{stored_visits.NOSE_POSITION} at 7.37 m", True), ("rail", False)]
 )
-def test_a_visit_is_fitted_again_with_all_trains_where_the_file_has_a_nose(monkeypatch, tmp_path, parameter, expected):
-    """And what is stored is of that fit. The fits themselves are tested with worn noses; here they are names."""
+def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypatch, tmp_path, parameter, expected):
+    """The second fit is stored. The tests of worn noses test the fits themselves; here, fits are only names."""
     case, parameters = object.__new__(TrackCase), {"n": StateParameter(parameter, 0.0, 0.1, 0.0, "surface")}
     first, again = (SimpleNamespace(name=name, without_jacobian=lambda: None) for name in ("first", "again"))
     written = {}
@@ -53,8 +53,8 @@ def test_a_visit_is_fitted_again_with_all_trains_where_the_file_has_a_nose(monke
         monkeypatch.setattr(stored_visits, name, function)
     monkeypatch.setattr(stored_visits.Search, "of", lambda *_: None)
     turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
-    about = {"turnout": turnout, "visit": "2026-01-01", "version": {}}
+    description = {"turnout": turnout, "visit": "2026-01-01", "version": {}}
     group = SimpleNamespace(labels=("A",), route="main")
     monkeypatch.setattr(stored_visits, "replace", lambda fitted, fit: fitted)
-    stored = stored_visits.store_visit(tmp_path, group, case, "", about)
+    stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")

@@ -1,4 +1,4 @@
-"""Where a diagnosis has not been proven on concealed data, its answer says so."""
+"""An answer states if the diagnosis has not been proven on concealed data at its position."""
 
 import pytest
 
@@ -10,14 +10,14 @@ from turnout.stages import distinguish
 
 
 @pytest.mark.parametrize(("grade", "expected"), [("A", "B"), ("B", "B"), (None, None)])
-def test_a_name_at_an_unproven_panel_is_at_most_of_grade_b(grade, expected):
+def test_a_name_at_an_unproven_panel_has_at_most_grade_b(grade, expected):
     row = {"verdict": "named", "grade": grade, "sentence": "A hanging sleeper at 4.8 m."}
     changed = as_unproven(row, UNPROVEN_SWITCH)
     assert changed == {**row, "grade": expected, "sentence": f"A hanging sleeper at 4.8 m. {UNPROVEN_SWITCH}"}
 
 
-def test_a_change_on_a_track_with_a_blade_is_unproven_too():
-    """The blade may be that of any route; a track without one has no reservation."""
+def test_a_change_on_a_track_with_a_switch_blade_is_unproven():
+    """The blade may be on any route; a track without a blade has no reservation."""
     plain = uniform_track(30.0)
     switch = plain.with_(blade=Blade(3.0, 9.0, 12.0, plain.rail, 3e8, 3e4))
     assert reservation(TurnoutTrack(plain)) == ""
@@ -25,8 +25,8 @@ def test_a_change_on_a_track_with_a_blade_is_unproven_too():
     assert UNPROVEN_SWITCH in reservation(TurnoutTrack(plain, tracks={"diverging": switch}))
 
 
-def test_a_planned_campaign_at_a_switch_says_so_too(monkeypatch):
-    """What a plan can tell apart is computed in the model alone."""
+def test_the_plan_of_a_campaign_at_a_switch_has_the_reservation(monkeypatch):
+    """The effects that a plan can distinguish are computed only with the model."""
     plain = uniform_track(30.0)
     switch = plain.with_(blade=Blade(3.0, 9.0, 12.0, plain.rail, 3e8, 3e4))
     for track, expected in ((plain, False), (switch, True)):

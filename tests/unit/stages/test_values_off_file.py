@@ -1,4 +1,4 @@
-"""Values of the whole track that a fit has moved beyond their tolerance are stated with their factor on the file."""
+"""Values of the whole track that a fit puts beyond their tolerance are stated with their ratio to the file."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ SHEAR = Nuisance("rail_shear", "-", 0.0, 0.12, meaning="ln shear stiffness of th
 
 
 def sentences_of(*values_and_errors):
-    """Sentences on (nuisance, value, standard error), ..."""
+    """The sentences about (nuisance parameter, value, standard error), ..."""
     values = {n.name: v for n, v, _ in values_and_errors}
     covariance = np.diag([error**2 for *_, error in values_and_errors])
     fit = SimpleNamespace(values=values, covariance=covariance)
@@ -29,19 +29,21 @@ def test_a_rail_softer_than_its_tolerance_is_stated_with_factor_and_interval():
 
 
 @pytest.mark.parametrize(("value", "stated"), [(0.359, False), (0.361, True), (-0.359, False), (-0.361, True)])
-def test_three_tolerances_are_the_bar_in_both_directions(value, stated):
+def test_a_value_beyond_three_tolerances_in_either_direction_is_stated(value, stated):
     assert bool(sentences_of((SHEAR, value, 0.01))) is stated
 
 
-def test_the_farthest_is_first_and_a_wheelset_has_its_train():
+def test_the_largest_deviation_is_first_and_a_wheelset_is_stated_with_its_train():
     wheels = Nuisance("wheels_railcar", "-", 0.0, 0.06, meaning="ln unsprung mass", group="wheels")
     first, second = sentences_of((SHEAR, -0.5, 0.02), (wheels, 0.4, 0.02))
-    assert "The unsprung mass of railcar is 1.49 times that of the file" in first  # 6.7 tolerances, the rail has 4.2
+    assert (
+        "The unsprung mass of railcar is 1.49 times that of the file" in first
+    )  # 6.7 tolerances; the rail deviates by 4.2
     assert "The shear stiffness of the rail is 0.61 times" in second
 
 
-def test_what_is_no_value_of_the_whole_track_in_a_file_is_not_stated():
-    """A wave, the speed of one passage, one support among many; the running surface has a sentence of its own."""
+def test_values_that_are_not_of_the_whole_track_are_not_stated():
+    """A wave, the speed of one passage, one support of many; the running surface has a separate sentence."""
     wave = Nuisance("wave_3", "m", 0.0, 1e-5, group="wave")
     speed = Nuisance("v@p1", "-", 0.0, 0.01, "p1", meaning="ln speed")
     pad = Nuisance("pad_37", "-", 0.0, 0.1, meaning="ln pad_stiffness of 37", group="pad", index=37)
@@ -50,11 +52,11 @@ def test_what_is_no_value_of_the_whole_track_in_a_file_is_not_stated():
 
 
 def test_all_values_of_the_whole_track_of_a_case_can_be_stated():
-    """Those of pads, ballast and sleepers, of the rail and of the wheelsets, each moved by four tolerances."""
+    """Pads, ballast, sleepers, the rail and the wheelsets, each changed by four tolerances."""
     case = PlannedCase(small_plan(), families=("sensor_gain",))
-    ours = [n for n in case.nuisances if n.group in ("track", "rail", "wheels")]
-    assert {n.group for n in ours} == {"track", "rail", "wheels"}
-    for nuisance in ours:
+    whole_track = [n for n in case.nuisances if n.group in ("track", "rail", "wheels")]
+    assert {n.group for n in whole_track} == {"track", "rail", "wheels"}
+    for nuisance in whole_track:
         (sentence,) = sentences_of((nuisance, 4.0 * nuisance.sd, 0.01))
         assert sentence.endswith(": 4.0 times its tolerance.")
         assert "_" not in sentence.removesuffix(nuisance.name.removeprefix("wheels_"))

@@ -1,4 +1,4 @@
-"""The fleet of lengths is a module of its own, for its calls and its function are asked about, too."""
+"""Fixtures of the workflow tests; the fleet is in a separate module, as tests use its list of calls, too."""
 
 import sys
 from pathlib import Path

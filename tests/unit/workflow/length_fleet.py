@@ -1,4 +1,4 @@
-"""A fleet of tiny text files, and a function whose rows are the lengths of them."""
+"""A fleet of tiny text files, and a stage function whose rows contain their lengths."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ CALLS = []
 
 
 def length(unit, turnout, raw_root, algo=""):
-    """Rows from the length of each file; what a file says may go wrong."""
+    """Rows with the length of each file; the text of a file can request a fault."""
     CALLS.append(f"{unit.turnout}/{unit.label}")
     rows = {"recordings": [], "quarantine": []}
     for path, *_ in unit.files:
@@ -54,7 +54,7 @@ def length(unit, turnout, raw_root, algo=""):
 
 
 class Fleet:
-    """One shard with turnouts t0, t1, ... of one section."""
+    """One shard with turnouts t0, t1, ... of one section each."""
 
     def __init__(self, folder, n_turnout=3, settings=""):
         self.folder, self.raw = folder, folder / "raw"
@@ -85,7 +85,7 @@ class Fleet:
         return run_shard(self.plan, self.state, stage, self.configuration, self.raw, **more)
 
     def rows(self):
-        """{unit: tables} as the registry would see it: the later batch counts."""
+        """{unit: tables} as the registry gets them: a later batch overrides an earlier one."""
         return {r.unit: r.tables for path in batch_paths([self.state]) for r in read_results(path)}
 
     def lengths(self):

@@ -1,4 +1,4 @@
-"""New entries of the worklist reach a mail server and a webhook, each once, with what to look at first."""
+"""New entries of the worklist are sent once to a mail server and a webhook, with what to inspect first."""
 
 import email
 import email.policy
@@ -32,7 +32,7 @@ PLAN = ALARM | {
 
 
 class SmtpSink(socketserver.StreamRequestHandler):
-    """The part of RFC 5321 that a client needs to hand over one mail."""
+    """The part of RFC 5321 that a client needs to send one mail."""
 
     def handle(self):
         self.wfile.write(b"220 sink\r\n")
@@ -60,7 +60,7 @@ class HttpSink(BaseHTTPRequestHandler):
 
 @pytest.fixture
 def serving():
-    """Function that starts a server in a thread and returns it; all are ended after the test."""
+    """Function that starts a server in a thread and returns it; all servers stop after the test."""
     servers = []
 
     def start(server):
@@ -114,7 +114,7 @@ def test_each_entry_is_sent_once_by_each_channel(tmp_path, settings, mail, hook)
     assert second["turnout_id"] == "W2" and second["look_at"] in hook.bodies[1]["text"]
 
 
-def test_an_alarm_that_is_acknowledged_is_no_new_entry(tmp_path, settings, mail):
+def test_an_acknowledged_alarm_is_no_new_entry(tmp_path, settings, mail):
     sent = tmp_path / "alerts.json"
     send_alerts([ALARM], settings, sent)
     assert send_alerts([ALARM | {"state": "plan"}], settings, sent) == {"mail": 0, "webhook": 0}
@@ -122,7 +122,7 @@ def test_an_alarm_that_is_acknowledged_is_no_new_entry(tmp_path, settings, mail)
     assert send_alerts([later], settings, sent) == {"mail": 1, "webhook": 1}
 
 
-def test_a_channel_that_fails_is_tried_again_and_the_other_is_not_repeated(tmp_path, settings, mail, hook):
+def test_only_the_channel_that_failed_sends_again(tmp_path, settings, mail, hook):
     sent = tmp_path / "alerts.json"
     hook.status = 503
     with pytest.raises(TurnoutError, match=r"not sent by webhook \(127.0.0.1\): HTTP Error 503.*tried again"):
@@ -133,51 +133,51 @@ def test_a_channel_that_fails_is_tried_again_and_the_other_is_not_repeated(tmp_p
 
 
 @pytest.mark.parametrize("change", [{"smtp_port": 9}, {"smtp_host": "no.such.host.invalid"}])
-def test_a_mail_server_that_is_not_there_is_said(tmp_path, settings, hook, change):
+def test_an_unreachable_mail_server_is_reported(tmp_path, settings, hook, change):
     with pytest.raises(TurnoutError, match=r"not sent by mail \(.*, port .*section alerts of config.yaml") as raised:
         send_alerts([ALARM], replace(settings, **change), tmp_path / "alerts.json")
     assert all(str(value) in str(raised.value) for value in change.values()) and "Errno" not in str(raised.value)
     assert len(hook.bodies) == 1
 
 
-def test_a_secret_webhook_comes_from_the_environment(tmp_path, settings, hook, monkeypatch):
+def test_an_environment_variable_overrides_the_webhook(tmp_path, settings, hook, monkeypatch):
     monkeypatch.setenv("TURNOUT_WEBHOOK", settings.webhook)
     own = AlertsSettings(webhook="http://127.0.0.1:9/")
     assert send_alerts([ALARM], own, tmp_path / "alerts.json") == {"webhook": 1} and len(hook.bodies) == 1
 
 
-def test_an_address_that_is_no_web_address_is_not_opened(tmp_path, monkeypatch):
+def test_a_webhook_that_is_no_web_address_is_rejected(tmp_path, monkeypatch):
     monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
     with pytest.raises(TurnoutError, match="begins neither with https"):
         send_alerts([ALARM], AlertsSettings(webhook="file:///etc/hostname"), tmp_path / "alerts.json")
 
 
 @pytest.mark.parametrize("recipients", ["a@b.c; d@e.f", "a@b.c d@e.f", "a@b.c, <d@e.f"])
-def test_recipients_that_are_no_list_are_quoted(tmp_path, settings, mail, recipients):
+def test_an_invalid_list_of_recipients_is_an_error(tmp_path, settings, mail, recipients):
     with pytest.raises(TurnoutError, match=r"is no mail address. Write name@host, several with commas between"):
         send_alerts([ALARM], replace(settings, recipients=recipients, webhook=""), tmp_path / "alerts.json")
     assert not mail.mails
 
 
 @pytest.mark.parametrize("recipients", ["a@b.c, Track team <d@e.f>", "root"])
-def test_names_and_local_users_are_recipients(tmp_path, settings, mail, recipients):
+def test_recipients_may_have_names_or_be_local_users(tmp_path, settings, mail, recipients):
     assert send_alerts([ALARM], replace(settings, recipients=recipients), tmp_path / "alerts.json")["mail"] == 1
 
 
 @pytest.mark.parametrize("chart, words", [("ballast_damping", "ballast damping"), ("amplitude", "acceleration")])
-def test_worklist_and_message_name_a_chart_in_words(chart, words):
-    """The page of the fleet does the same."""
+def test_worklist_and_message_name_a_chart_in_plain_words(chart, words):
+    """The page of the fleet uses the same words."""
     entry = ALARM | {"band": chart, "component": chart, "rank": 1, "n_in_all": 1, "false_alarm_words": "rare"}
     texts = message_text([entry]), as_text([entry | {"last_maintenance": None}], 1)
     assert all(f"A8, {words}\n" in text and chart not in text for text in texts)
 
 
-def test_the_subject_names_three():
+def test_the_subject_contains_three_entries_and_the_number_of_others():
     entries = [ALARM | {"turnout_id": f"W{k}"} for k in range(5)]
     assert subject(entries) == "Turnout: 5 new entries: W0 A8, W1 A8, W2 A8 and 2 more"
 
 
-def test_nothing_is_sent_unless_configured_and_no_result_changes(tmp_path, repository, monkeypatch, capsys):
+def test_without_recipients_nothing_is_sent_and_the_settings_change_no_hash(tmp_path, repository, monkeypatch, capsys):
     monkeypatch.delenv("TURNOUT_WEBHOOK", raising=False)
     assert not has_channel(AlertsSettings()) and send_alerts([ALARM], AlertsSettings(), tmp_path / "a.json") == {}
     (tmp_path / "config").mkdir()
@@ -204,7 +204,7 @@ def test_the_command_reads_the_worklist_of_a_registry(tmp_path, repository, monk
     assert main(["alert"]) == 0 and capsys.readouterr().out == "webhook: 0 new\n"
 
 
-def test_every_state_of_the_list_that_needs_a_person_is_sent():
+def test_every_state_of_the_worklist_that_needs_action_is_sent():
     from turnout.report.pages import fleet
     from turnout.workflow.alerts import STATES
 

@@ -1,4 +1,4 @@
-"""Reading a batch: the units asked for, and nothing of the others."""
+"""Reading a batch gives the requested units and decodes no other unit."""
 
 import pyarrow.parquet as pq
 
@@ -14,15 +14,15 @@ def results(n, **row):
     ]
 
 
-def test_units_that_were_asked_for_come_in_order_and_as_written(tmp_path):
+def test_requested_units_are_read_in_order_and_as_written(tmp_path):
     written = results(100)
     batch = write_batch(tmp_path, reversed(written))
     assert list(read_results(batch)) == written
     assert list(read_results(batch, {"t70/hammer/A", "t03/hammer/A", "t99/hammer/B"})) == [written[3], written[70]]
 
 
-def test_the_rows_of_other_units_stay_packed(tmp_path):
-    """A stage reads every batch that holds a unit of its turnout: bytes of other turnouts' rows must not cost it."""
+def test_the_rows_of_other_units_are_not_decoded(tmp_path):
+    """A stage reads every batch with a unit of its turnout: rows of other turnouts must not need time."""
     written = results(100, detail="x" * 30_000)
     batch = write_batch(tmp_path, written)
     last = pq.read_metadata(batch).row_group(pq.read_metadata(batch).num_row_groups - 1)
@@ -35,6 +35,6 @@ def test_the_rows_of_other_units_stay_packed(tmp_path):
 
 
 def test_small_results_share_a_row_group(tmp_path):
-    """Each group costs 0.2 ms, which is more than the reading of eight small results."""
+    """Each group needs 0.2 ms, which is more than the reading of eight small results."""
     assert pq.read_metadata(write_batch(tmp_path, results(400))).num_row_groups == 1
     assert pq.read_metadata(write_batch(tmp_path, results(16, detail="x" * 2**18))).num_row_groups == 2

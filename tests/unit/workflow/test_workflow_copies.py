@@ -1,4 +1,4 @@
-"""The same bytes twice in one turnout's folder count once, at every moment."""
+"""Two copies of a file in the folder of one turnout are used once at any time."""
 
 import random
 import shutil
@@ -10,17 +10,17 @@ from turnout.workflow.duplicate_files import files_at_two_turnouts
 from turnout.workflow.state import batch_paths
 
 
-def test_a_copy_is_said_and_counts_once_its_original_is_gone(fleet):
-    """A file exported under a second name, and then the first one deleted: it counts once, at every moment."""
+def test_a_copy_is_reported_and_is_used_after_its_original_is_deleted(fleet):
+    """A file is exported under a second name, and then the first file is deleted."""
     fleet.run()
     day, other = fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31"
     shutil.copytree(day, other)
     assert fleet.run().processed == 1
     first, second = "t0/hammer/A/2024-05-13", "t0/hammer/A/2024-05-31"
     assert fleet.lengths()[first] == [9] and fleet.lengths()[second] == []
-    (said,) = fleet.rows()[second]["quarantine"]
-    assert said["reason_code"] == "duplicate" and said["path"].endswith("2024-05-31/A_1.txt")
-    assert said["found"] == "same bytes as t0/2024-05-13/A_1.txt"
+    (row,) = fleet.rows()[second]["quarantine"]
+    assert row["reason_code"] == "duplicate" and row["path"].endswith("2024-05-31/A_1.txt")
+    assert row["found"] == "same bytes as t0/2024-05-13/A_1.txt"
     n_batch = len(batch_paths([fleet.state]))
     assert fleet.run().processed == 0 and len(batch_paths([fleet.state])) == n_batch
     shutil.rmtree(day)
@@ -29,8 +29,8 @@ def test_a_copy_is_said_and_counts_once_its_original_is_gone(fleet):
     assert fleet.run().processed == 0 and fleet.lengths()[second] == [9]
 
 
-def test_a_copy_whose_original_is_measured_again_counts_for_itself(fleet):
-    """And one that holds more than the other is no copy of it."""
+def test_a_copy_is_used_after_its_original_has_other_content(fleet):
+    """A unit with more files than the other is not a copy of it."""
     shutil.copytree(fleet.raw / "t0/2024-05-13", fleet.raw / "t0/2024-05-31")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-05-31"] == []
@@ -43,7 +43,7 @@ def test_a_copy_whose_original_is_measured_again_counts_for_itself(fleet):
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9, 8]
 
 
-def test_the_same_file_at_two_turnouts_is_no_copy(fleet):
+def test_the_same_file_at_two_turnouts_is_used_at_both(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "turnout 0")
     fleet.run()
     assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
@@ -55,7 +55,7 @@ def remarks(fleet):
 
 
 def test_the_same_file_at_two_turnouts_has_a_remark_at_each_until_one_is_deleted(fleet):
-    """Nothing tells at which of them it was measured."""
+    """Nothing shows at which of the two turnouts it was measured."""
     fleet.put("t1/2024-05-13/A_2.txt", "turnout 0")
     fleet.run()
     first, second = "t0/2024-05-13/A_1.txt", "t1/2024-05-13/A_2.txt"
@@ -68,7 +68,7 @@ def test_the_same_file_at_two_turnouts_has_a_remark_at_each_until_one_is_deleted
     assert remarks(fleet) == []
 
 
-def test_a_copy_within_one_turnout_or_a_file_that_cannot_be_used_is_at_no_other_turnout(fleet):
+def test_copies_within_one_turnout_and_unusable_files_give_no_remark_of_two_turnouts(fleet):
     share_a_file(fleet)
     for turnout in ("t0", "t1"):
         fleet.put(f"{turnout}/2024-06-13/A_1.txt", "damaged")
@@ -80,7 +80,7 @@ FIRST, SECOND = "t0/hammer/A/2024-05-13", "t0/hammer/A/2024-05-31"
 
 
 def share_a_file(fleet):
-    """Two campaigns of one section, each with a test of its own, and the first test of the first in the second, too."""
+    """Two campaigns of a section, each with its own test; the second also has the first test of the first."""
     fleet.put("t0/2024-05-13/A_2.txt", "of the first day")
     fleet.put("t0/2024-05-31/A_2.txt", "turnout 0")
     fleet.put("t0/2024-05-31/A_3.txt", "of the second")
@@ -92,7 +92,7 @@ def duplicates(fleet, unit):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_of_two_campaigns_that_share_a_file_the_first_keeps_it_and_the_second_its_others(fleet, threads):
+def test_a_file_of_two_campaigns_is_used_only_in_the_first(fleet, threads):
     share_a_file(fleet)
     fleet.run(threads=threads)
     assert fleet.lengths()[FIRST] == [9, 16] and duplicates(fleet, FIRST) == []
@@ -102,7 +102,7 @@ def test_of_two_campaigns_that_share_a_file_the_first_keeps_it_and_the_second_it
     assert fleet.run().processed == 0 and CALLS == [] and len(batch_paths([fleet.state])) == n_batch
 
 
-def test_a_file_that_two_campaigns_shared_counts_in_the_second_once_it_is_gone_from_the_first(fleet):
+def test_a_shared_file_is_used_in_the_second_campaign_after_it_is_deleted_from_the_first(fleet):
     share_a_file(fleet)
     fleet.run()
     (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
@@ -112,7 +112,7 @@ def test_a_file_that_two_campaigns_shared_counts_in_the_second_once_it_is_gone_f
     assert fleet.run().processed == 0
 
 
-def test_a_shared_file_counts_once_though_the_job_was_killed_before_it_knew(fleet, monkeypatch):
+def test_a_shared_file_is_used_once_after_the_job_was_killed_before_the_comparison(fleet, monkeypatch):
     share_a_file(fleet)
 
     def killed(*_):
@@ -127,25 +127,25 @@ def test_a_shared_file_counts_once_though_the_job_was_killed_before_it_knew(flee
     assert CALLS == ["t0/A/2024-05-31"] and fleet.lengths()[SECOND] == [13]
 
 
-def test_a_campaign_of_nothing_but_files_of_two_others_gives_no_row_of_its_own(fleet):
+def test_a_campaign_that_has_only_files_of_two_others_gives_no_row(fleet):
     share_a_file(fleet)
     fleet.put("t0/2024-06-13/A_1.txt", "of the second")
     fleet.put("t0/2024-06-13/A_2.txt", "of the first day")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-06-13"] == []
-    said = "same bytes as t0/2024-05-31/A_3.txt, t0/2024-05-13/A_2.txt"
-    assert duplicates(fleet, "t0/hammer/A/2024-06-13") == [("t0/2024-06-13/A_1.txt", "the whole unit", said)]
+    message = "same bytes as t0/2024-05-31/A_3.txt, t0/2024-05-13/A_2.txt"
+    assert duplicates(fleet, "t0/hammer/A/2024-06-13") == [("t0/2024-06-13/A_1.txt", "the whole unit", message)]
     assert fleet.run().processed == 0
 
 
-def test_a_file_that_is_shared_with_a_campaign_without_rows_counts(fleet):
+def test_a_file_that_is_shared_with_a_campaign_without_rows_is_used(fleet):
     share_a_file(fleet)
     fleet.put("t0/2024-05-13/A_2.txt", "damaged")
     fleet.run()
     assert fleet.lengths()[FIRST] == [] and fleet.lengths()[SECOND] == [9, 13]
 
 
-def test_a_campaign_that_shares_one_more_file_leaves_out_both(fleet):
+def test_a_campaign_that_shares_files_with_two_others_leaves_out_both_files(fleet):
     share_a_file(fleet)
     fleet.put("t0/2024-05-31/A_4.txt", "a third one")
     fleet.run()
@@ -161,8 +161,8 @@ def test_a_campaign_that_shares_one_more_file_leaves_out_both(fleet):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_whatever_is_copied_and_deleted_in_any_order_counts_once(tmp_path, seed):
-    """Four campaigns of up to three files, of six contents that differ in length; ten nights of changes."""
+def test_every_content_is_used_once_after_any_order_of_copies_and_deletions(tmp_path, seed):
+    """Four campaigns of up to three files with six contents of different lengths; changes in ten nights."""
     fleet, draw = Fleet(tmp_path, 1), random.Random(seed)
     places = [f"t0/2024-0{month}-13/A_{test}.txt" for month in (5, 6, 7, 8) for test in (1, 2, 3)]
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""A work file of which a full disk or a power failure left a part is made again, and nothing is computed for it."""
+"""A work file that a full disk or a power failure truncated is restored without computing any unit again."""
 
 import json
 
@@ -18,26 +18,26 @@ PARTS = [0.0, 0.3, 0.7, 0.95]
 
 
 def cut(path, share):
-    """Only the first ``share`` of a file is left."""
+    """Keep only the first ``share`` of a file."""
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
 
 
 @pytest.mark.parametrize("share", PARTS)
-def test_a_state_is_made_again_from_its_batches(fleet, share, caplog):
+def test_a_truncated_state_is_restored_from_its_batches(fleet, share, caplog):
     fleet.run()
     fleet.put("t1/2024-05-13/A_1.txt", "measured again")
     fleet.put("t1/2024-06-13/A_1.txt", "and later")
     fleet.run()
     before, rows = fleet.state.read_bytes(), fleet.rows()
     cut(fleet.state, share)
-    assert fleet.rows() == rows  # whoever reads it before its job has run
+    assert fleet.rows() == rows  # for a reader before its job has run
     assert fleet.run().processed == 0 and CALLS == []
     assert fleet.state.read_bytes() == before and fleet.rows() == rows
     assert str(fleet.state) in caplog.text and "made again" in caplog.text
 
 
-def test_of_a_cut_state_the_batch_of_a_unit_counts_that_was_written_last(fleet):
+def test_the_last_written_batch_of_a_unit_is_used_to_restore_a_truncated_state(fleet):
     fleet.run()
     for text in ("measured again", "measured once more", "turnout 1"):
         fleet.put("t1/2024-05-13/A_1.txt", text)
@@ -47,7 +47,7 @@ def test_of_a_cut_state_the_batch_of_a_unit_counts_that_was_written_last(fleet):
     assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9]
 
 
-def test_a_cut_state_with_a_cut_batch_costs_the_units_of_that_batch_alone(fleet):
+def test_only_the_units_of_a_truncated_batch_are_computed_again(fleet):
     fleet.run()
     fleet.put("t1/2024-06-13/A_1.txt", "later")
     fleet.run()
@@ -58,7 +58,7 @@ def test_a_cut_state_with_a_cut_batch_costs_the_units_of_that_batch_alone(fleet)
     assert fleet.lengths() == before
 
 
-def test_the_job_of_a_cut_state_is_asked_for_though_no_plan_has_changed(fleet, monkeypatch):
+def test_the_job_of_a_truncated_state_is_requested_if_no_plan_has_changed(fleet, monkeypatch):
     fleet.run()
     monkeypatch.chdir(fleet.folder)
     launch({}, scan=True)
@@ -74,8 +74,8 @@ def test_the_job_of_a_cut_state_is_asked_for_though_no_plan_has_changed(fleet, m
 
 
 @pytest.mark.parametrize("content", ["", '{"generation": 7, "fil', '{"a": 1}'])
-def test_a_list_of_the_registry_that_cannot_be_read_stops_the_run_before_any_job(fleet, monkeypatch, content):
-    """Its message is the reason in the last line of the night; a job that fails would only name its log."""
+def test_an_unreadable_list_of_the_registry_stops_the_run_before_any_job(fleet, monkeypatch, content):
+    """The last line of the nightly run states its message; a job that fails would only name its log."""
     fleet.run()
     monkeypatch.chdir(fleet.folder)
     generation = fleet.folder / "results/registry/_generation.json"
@@ -90,7 +90,7 @@ def test_a_list_of_the_registry_that_cannot_be_read_stops_the_run_before_any_job
 
 
 @pytest.mark.parametrize("share", PARTS)
-def test_a_plan_is_made_again_though_its_shard_was_not_asked_for(fleet, share):
+def test_a_truncated_plan_is_written_again_if_its_shard_was_not_requested(fleet, share):
     fleet.put("t0/2024-05-13/Ä_1.txt", "of which the name takes two bytes")
     folder = fleet.plan.parent
     write_plans(fleet.configuration, fleet.raw, folder, 2)
@@ -101,14 +101,14 @@ def test_a_plan_is_made_again_though_its_shard_was_not_asked_for(fleet, share):
         assert {path: path.read_bytes() for path in folder.iterdir()} == whole
 
 
-def test_a_run_that_cannot_plan_says_what_it_did_though_a_plan_is_cut(fleet):
+def test_a_run_without_a_readable_plan_reports_the_known_units(fleet):
     fleet.run()
     cut(fleet.plan, 0.5)
     assert _report(1, set(), set(), "", fleet.folder / "work").units == 3
 
 
-def test_a_unit_that_only_vanished_is_not_processed(fleet, monkeypatch):
-    """Its files are gone: the night computed nothing for it."""
+def test_a_vanished_unit_is_not_counted_as_processed(fleet, monkeypatch):
+    """Its files were deleted: the run computed nothing for it."""
     monkeypatch.chdir(fleet.folder)
     path = fleet.put("t0/2024-07-13/A_1.txt", "soon gone") or fleet.raw / "t0/2024-07-13/A_1.txt"
     fleet.run()
@@ -121,7 +121,7 @@ def test_a_unit_that_only_vanished_is_not_processed(fleet, monkeypatch):
     assert (report.processed, report.vanished, report.quarantined) == (1, 1, 0)
 
 
-def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):
+def test_a_plan_that_is_truncated_at_any_byte_is_written_again(fleet):
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     content = fleet.plan.read_bytes()
     for length in range(len(content)):
@@ -131,8 +131,8 @@ def test_a_plan_that_is_whole_is_told_from_a_cut_one_at_every_byte(fleet):
     assert len(list(read_plan(fleet.plan))) == 3
 
 
-@pytest.mark.parametrize("left", [b"", bytes(1)])  # nothing, or a block that was never written
-def test_a_cut_number_of_attempts_asks_for_its_job(tmp_path, monkeypatch, left):
+@pytest.mark.parametrize("left", [b"", bytes(1)])  # an empty file, or a block that was never written
+def test_a_truncated_number_of_attempts_requests_its_job(tmp_path, monkeypatch, left):
     monkeypatch.chdir(tmp_path)
     with attempt("register", attempts("register")):
         pass
@@ -146,7 +146,7 @@ def test_a_cut_number_of_attempts_asks_for_its_job(tmp_path, monkeypatch, left):
 
 
 @pytest.mark.parametrize("share", PARTS)
-def test_a_cut_verdict_judges_all_units_again(fleet, share):
+def test_after_a_truncated_verdict_all_units_are_checked_again(fleet, share):
     (fleet.folder / "config/config.yaml").write_text("fleet: {quarantine_units: 1}\n")
     fleet.run()
     output = fleet.folder / "work/verdict.json"
@@ -158,7 +158,7 @@ def test_a_cut_verdict_judges_all_units_again(fleet, share):
 
 
 @pytest.mark.parametrize("share", PARTS)
-def test_a_cut_state_of_the_trend_writes_every_year_again(fleet, share, monkeypatch):
+def test_after_a_truncated_state_of_the_trend_every_year_is_written_again(fleet, share, monkeypatch):
     from turnout.registry.job import register
 
     root, state = fleet.folder / "registry", fleet.folder / "work/trend.json"

@@ -1,4 +1,4 @@
-"""A unit that kills its process is named and holds nothing else back; a job that is killed condemns nobody."""
+"""A unit that kills its process is reported and delays no other; the kill of a job puts no unit in quarantine."""
 
 import os
 import signal
@@ -23,8 +23,8 @@ def fleet(tmp_path):
     return Fleet(tmp_path, 6)
 
 
-def night(fleet, **more):
-    """Exit status of a job in a process group of its own, as the workflow starts it."""
+def run_night(fleet, **more):
+    """Exit status of a job in its own process group, as the workflow starts it."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -42,9 +42,9 @@ def statuses(fleet):
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_a_unit_that_kills_its_process_is_in_quarantine_after_two_nights_and_the_others_are_known(fleet, threads):
+def test_a_unit_that_kills_its_process_is_in_quarantine_after_two_nights_and_the_others_are_computed(fleet, threads):
     fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
-    first, second = night(fleet, threads=threads), night(fleet, threads=threads)
+    first, second = run_night(fleet, threads=threads), run_night(fleet, threads=threads)
     assert (first == 0, second) == (threads > 1, 0)
     assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[1]: "internal_error"}
     (row,) = fleet.rows()[UNITS[1]]["quarantine"]
@@ -58,7 +58,7 @@ def test_a_unit_that_kills_its_process_is_in_quarantine_after_two_nights_and_the
 
 
 @pytest.mark.parametrize("threads", [2, 3])
-def test_what_was_computed_beside_it_is_known_the_same_night_and_it_is_said_by_name(fleet, threads):
+def test_other_units_are_computed_in_the_same_night_and_the_faulty_unit_is_reported(fleet, threads):
     fleet.put("t4/2024-05-13/A_1.txt", "kills its process")
     summary = fleet.run(threads=threads)
     assert (summary.processed, summary.quarantined, summary.postponed) == (5, 0, 1)
@@ -70,46 +70,46 @@ def test_what_was_computed_beside_it_is_known_the_same_night_and_it_is_said_by_n
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_job_that_is_tried_again_in_the_same_run_condemns_no_unit(fleet, threads):
-    """What took the memory of the machine may be there a minute later, too."""
+def test_repeated_attempts_within_one_run_put_no_unit_in_quarantine(fleet, threads):
+    """Another program may need the memory of the machine for several minutes."""
     fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
     first, second = datetime(2026, 11, 22, 2), datetime(2026, 11, 23, 2)
     for _ in range(3):
-        night(fleet, threads=threads, launched=first)
+        run_night(fleet, threads=threads, launched=first)
     assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[1]], "ok")
     assert read_postponed(fleet.state)[1] == {UNITS[1]: "the process died that computed it"}
-    night(fleet, threads=threads, launched=second)
+    run_night(fleet, threads=threads, launched=second)
     assert statuses(fleet)[UNITS[1]] == "internal_error"
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_two_units_that_kill_their_processes_cost_no_third_one(fleet, threads):
+def test_two_units_that_kill_their_processes_affect_no_other_unit(fleet, threads):
     for i in (0, 3):
         fleet.put(f"t{i}/2024-05-13/A_1.txt", "kills its process")
     for _ in range(3):
-        night(fleet, threads=threads)
+        run_night(fleet, threads=threads)
     assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[i]: "internal_error" for i in (0, 3)}
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_job_killed_as_a_whole_night_after_night_condemns_no_unit(fleet, threads):
-    """Each of the two kills one night beside others and one alone; after these four nights the others are known."""
+def test_a_job_that_is_killed_every_night_puts_no_unit_in_quarantine(fleet, threads):
+    """Each of the two kills its job in two nights, once alone; after these four nights the others are computed."""
     fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
     fleet.put("t5/2024-05-13/A_1.txt", "kills the job")
     for _ in range(2 * 2 + 1):
-        assert night(fleet, threads=threads) < 0
+        assert run_night(fleet, threads=threads) < 0
     assert statuses(fleet) == dict.fromkeys([UNITS[i] for i in (0, 1, 3, 4)], "ok")
     (complaint,) = judge([fleet.state], fleet.configuration).complaints
     assert "wait for the next run, first t2/" in complaint and "its job ended while it was computed" in complaint
     for i in (2, 5):
         fleet.put(f"t{i}/2024-05-13/A_1.txt", "spared")
-    assert night(fleet, threads=threads) == 0
+    assert run_night(fleet, threads=threads) == 0
     assert statuses(fleet) == dict.fromkeys(UNITS, "ok")
     assert judge([fleet.state], fleet.configuration).complaints == ()
 
 
-def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun_beside_it(fleet):
-    """Where a job may not take more memory all of it is ended, with what its other processes had at hand."""
+def test_a_unit_that_kills_its_job_every_night_delays_no_unit_that_started_at_the_same_time(fleet):
+    """A job that exceeds its memory is ended with all its processes and their units."""
     fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
     child = os.fork()
     if child == 0:
@@ -119,12 +119,12 @@ def test_one_that_ends_its_job_every_night_keeps_no_other_waiting_that_was_begun
     os.waitpid(child, 0)
     assert set(started_units(fleet.state)) == {UNITS[2], UNITS[3], UNITS[5]}
     for _ in range(2):
-        assert night(fleet) < 0
+        assert run_night(fleet) < 0
     assert statuses(fleet) == dict.fromkeys([u for u in UNITS if u != UNITS[2]], "ok")
 
 
-def test_those_begun_beside_two_that_end_their_job_are_known_when_each_has_ended_one_night_alone(fleet):
-    """The slowest order: both that end the job were begun before the two beside them."""
+def test_units_started_beside_two_that_kill_their_job_are_computed_after_three_nights(fleet):
+    """The slowest order: both that kill the job started before the two others."""
     for i in (2, 5):
         fleet.put(f"t{i}/2024-05-13/A_1.txt", "kills the job")
     child = os.fork()
@@ -132,18 +132,18 @@ def test_those_begun_beside_two_that_end_their_job_are_known_when_each_has_ended
         with ExitStack() as marks:
             for i in (2, 5, 3, 4):
                 marks.enter_context(mark_started(fleet.state, UNITS[i], "then"))
-                time.sleep(0.02)  # marks of one clock tick are in no order
+                time.sleep(0.02)  # marks within one clock tick have no order
             os._exit(0)
     os.waitpid(child, 0)
     assert list(started_units(fleet.state)) == [UNITS[i] for i in (2, 5, 3, 4)]
     known = []
     for _ in range(3):
-        assert night(fleet) < 0
+        assert run_night(fleet) < 0
         known.append(sorted(statuses(fleet)))
     assert known == [[UNITS[i] for i in (0, 1)], [UNITS[i] for i in (0, 1)], [UNITS[i] for i in (0, 1, 3, 4)]]
 
 
-def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fleet):
+def test_results_that_wait_for_a_checkpoint_are_kept_when_a_fault_ends_the_job(fleet):
     fleet.put("t4/2024-05-13/A_1.txt", "bug")
     with pytest.raises(ZeroDivisionError):
         fleet.run(strict=True)
@@ -151,9 +151,9 @@ def test_a_fault_that_ends_the_job_costs_none_of_what_waited_for_a_checkpoint(fl
     assert not list(fleet.state.with_suffix("").glob("begun-*"))
 
 
-def test_a_unit_that_was_begun_and_is_asked_for_no_more_is_forgotten(fleet):
+def test_the_mark_of_a_started_unit_is_removed_when_the_unit_is_no_longer_planned(fleet):
     fleet.put("t2/2024-05-13/A_1.txt", "kills the job")
-    night(fleet)
+    run_night(fleet)
     (fleet.raw / "t2/2024-05-13/A_1.txt").unlink()
     assert fleet.run(only=["t1"]).processed == 1
     assert list(fleet.state.with_suffix("").glob("begun-*"))
@@ -161,25 +161,25 @@ def test_a_unit_that_was_begun_and_is_asked_for_no_more_is_forgotten(fleet):
     assert not list(fleet.state.with_suffix("").glob("begun-*"))
 
 
-def test_strict_raises_where_a_process_dies(fleet):
+def test_strict_raises_an_error_if_a_process_dies(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
     with pytest.raises(RuntimeError, match=f"{UNITS[1]}: the process died that computed it"):
         fleet.run(threads=2, strict=True)
 
 
-def test_what_a_machine_may_have_been_at_fault_for_is_tried_again_when_its_file_is_touched(fleet):
-    """Memory that ended is there again one day, and nobody can change the content of a sound file."""
+def test_a_unit_that_killed_its_process_is_tried_again_after_its_file_is_touched(fleet):
+    """The memory may suffice later, and a correct file has no reason to change."""
     file, short = fleet.raw / "t1/2024-05-13/A_1.txt", fleet.folder / "memory is short"
 
-    def hungry(unit, *more, **options):
+    def needs_memory(unit, *more, **options):
         if unit.turnout == "t1" and short.exists():
             os._exit(9)
         return length(unit, *more, **options)
 
-    stage = Stage("hammer", hungry, "1")
+    stage = Stage("hammer", needs_memory, "1")
     short.touch()
     for _ in range(2):
-        night(fleet, threads=2, stage=stage)
+        run_night(fleet, threads=2, stage=stage)
     assert statuses(fleet)[UNITS[1]] == "internal_error"
     short.unlink()
     assert fleet.run(stage=stage).processed == 0
@@ -189,18 +189,18 @@ def test_what_a_machine_may_have_been_at_fault_for_is_tried_again_when_its_file_
 
 
 @pytest.mark.parametrize("cut", ["", "2026-11-22T02:00:00\nt1/ham"])
-def test_a_note_that_a_power_failure_cut_is_written_again(fleet, cut):
+def test_a_truncated_mark_is_written_again(fleet, cut):
     with mark_started(fleet.state, UNITS[1], "then"):
         (note,) = fleet.state.with_suffix("").glob("begun-*")
         name = note.name
     note.with_name(name).write_text(cut)
     fleet.put("t1/2024-05-13/A_1.txt", "kills its process")
     for _ in range(2):
-        night(fleet)
+        run_night(fleet)
     assert statuses(fleet) == dict.fromkeys(UNITS, "ok") | {UNITS[1]: "internal_error"}
 
 
-def test_a_note_that_was_cut_within_a_letter_is_none(fleet):
+def test_a_mark_that_is_truncated_within_a_letter_is_ignored(fleet):
     with mark_started(fleet.state, "t1/hammer/Ø/2024-05-13", "then"):
         (note,) = fleet.state.with_suffix("").glob("begun-*")
         assert started_units(fleet.state) == {"t1/hammer/Ø/2024-05-13": "then"}
@@ -208,8 +208,8 @@ def test_a_note_that_was_cut_within_a_letter_is_none(fleet):
         assert started_units(fleet.state) == {}
 
 
-def test_where_a_job_is_killed_alone_its_processes_end_with_it(fleet, tmp_path):
-    """They would live for ever, hold their memory, and take away the notes of the job that comes after."""
+def test_the_processes_of_a_killed_job_end_with_it(fleet, tmp_path):
+    """Otherwise they would keep their memory for ever and remove the marks of the next job."""
 
     def never_done(unit, *_, **__):
         (tmp_path / f"pid-{os.getpid()}").touch()
@@ -225,15 +225,15 @@ def test_where_a_job_is_killed_alone_its_processes_end_with_it(fleet, tmp_path):
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
     try:
-        while any(map(lives, pids)) and time.monotonic() < until:
+        while any(map(is_alive, pids)) and time.monotonic() < until:
             time.sleep(0.05)
-        assert len(pids) == 2 and not any(map(lives, pids))
+        assert len(pids) == 2 and not any(map(is_alive, pids))
     finally:
-        for pid in filter(lives, pids):
+        for pid in filter(is_alive, pids):
             os.kill(pid, signal.SIGKILL)
 
 
-def lives(pid):
+def is_alive(pid):
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:

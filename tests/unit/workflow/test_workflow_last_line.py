@@ -1,4 +1,4 @@
-"""The last line of a night: what of it can be used, what is gone since the last one, and why it failed."""
+"""The last line of a nightly run: what can be used, what vanished since the last run, and the reason of a failure."""
 
 import json
 import os
@@ -41,8 +41,8 @@ def plan(*units):
     return f'{{"shard":"00of01","turnouts":[\n{lines}\n]}}\n'
 
 
-def night(folder, known, planned, more=""):
-    """The line of a night in which Snakemake leaves these units and this plan."""
+def run_night(folder, known, planned, more=""):
+    """The last line of a nightly run in which Snakemake leaves these units and this plan."""
     (folder / "snakemake.py").write_text(STATE.format(known=known, plan=plan(*planned), more=more))
     return str(nightly([], "profiles/default"))
 
@@ -51,11 +51,11 @@ def units(*turnouts):
     return [f"{t}/hammer/A/2026-01-05" for t in turnouts]
 
 
-def test_what_is_gone_is_said_once(folder):
+def test_a_vanished_unit_is_reported_once(folder):
     known = dict.fromkeys([*units("t1", "t2"), "t1/mismatch/2026-01-05"], "ok")
-    assert "0 vanished" in night(folder, known, units("t1", "t2"))
-    assert "1 vanished" in night(folder, known, units("t1"))
-    assert "0 vanished" in night(folder, known, units("t1"))
+    assert "0 vanished" in run_night(folder, known, units("t1", "t2"))
+    assert "1 vanished" in run_night(folder, known, units("t1"))
+    assert "0 vanished" in run_night(folder, known, units("t1"))
 
 
 def model(turnout, status):
@@ -68,27 +68,27 @@ def model(turnout, status):
     return UnitResult(f"{turnout}/hammer/A/2026-01-05", turnout, "hammer", "k", "1", "ok", {"models": [row]})
 
 
-def registry(folder, quarantine=(), taken_out="", **status):
-    listed = [t for t in [*status, "never"] if t != taken_out]
+def registry(folder, quarantine=(), removed="", **status):
+    listed = [t for t in [*status, "never"] if t != removed]
     tables = {"turnouts": [{"turnout_id": t, "layout": "l", "config_hash": "h"} for t in listed]}
     tables |= {"quarantine": list(quarantine)} if quarantine else {}
     batch = write_batch(folder / "batches", [model(t, s) for t, s in status.items()])
     register([batch], folder / "results/registry", read=read_results, tables=tables)
 
 
-def test_turnouts_of_which_nothing_could_be_used_are_named_every_night(folder):
+def test_turnouts_without_any_usable_result_are_reported_every_night(folder):
     registry(folder, t1="accepted", t2="rejected", t3="rejected")
     known = dict.fromkeys(units("t1", "t2", "t3"), "ok")
-    for said in (night(folder, known, known), night(folder, known, known)):
-        assert said.startswith("sound: ") and "nothing could be used yet of t2, t3" in said
+    for last_line in (run_night(folder, known, known), run_night(folder, known, known)):
+        assert last_line.startswith("sound: ") and "nothing could be used yet of t2, t3" in last_line
 
 
-def test_a_fleet_of_which_nothing_could_be_used_is_not_called_sound(folder):
+def test_a_run_without_any_usable_result_is_not_reported_as_sound(folder):
     registry(folder, **dict.fromkeys(("t1", "t2", "t3", "t4", "t5"), "rejected"))
     known = dict.fromkeys(units("t1", "t2", "t3", "t4", "t5"), "ok")
-    said = night(folder, known, known)
-    assert said.startswith("every job ran, but nothing could be used: 5 units known")
-    assert "nothing could be used yet of t1, t2, t3 and 2 more" in said
+    last_line = run_night(folder, known, known)
+    assert last_line.startswith("every job ran, but nothing could be used: 5 units known")
+    assert "nothing could be used yet of t1, t2, t3 and 2 more" in last_line
 
 
 def excluded(turnout, name, reason, place, found):
@@ -97,36 +97,36 @@ def excluded(turnout, name, reason, place, found):
     return row | {"quarantine_id": key, "reason_code": reason, "place": place, "found": found, "remedy": "Correct it"}
 
 
-def test_a_table_that_cannot_be_read_is_quoted_before_a_file_with_an_unknown_name(folder):
-    """It belongs to no unit, so no count has it, and without its temperatures no chart is evaluated."""
+def test_an_unreadable_table_is_reported_before_a_file_with_an_unknown_name(folder):
+    """It belongs to no unit, so no number includes it, and no chart is evaluated without its temperatures."""
     column = excluded("t1", "campaigns.csv", "unreadable", "line 1, column 25", "unknown column 'temperature'")
     name = excluded("t1", "a.csv", "name_unknown", "file name", "its name follows no pattern of the layout")
     unused = excluded("t2", "campaigns.csv", "unreadable", "line 2, column 1", "a cell too many")
     registry(folder, (name, column, unused), t1="accepted", t2="rejected")
     known = dict.fromkeys(units("t1", "t2"), "ok")
-    line = night(folder, known, known)
+    line = run_night(folder, known, known)
     assert "; in no unit: t1/campaigns.csv, line 1, column 25: unknown column 'temperature' and 1 more, see" in line
     assert "nothing could be used yet of t2;" in line and "t2/campaigns.csv" not in line
 
 
 @pytest.mark.parametrize("turnout", [None, "t9"])
-def test_a_row_of_the_configuration_that_does_not_count_is_quoted(folder, turnout):
+def test_an_unused_row_of_the_configuration_is_reported(folder, turnout):
     found = f"turnout {turnout!r} has no row in turnouts.tsv"
     row = excluded("t1", "x", "not_counted", "line 2, column 1", found)
     registry(folder, ({**row, "turnout_id": turnout, "path": "config/events.csv"},), t1="accepted")
-    line = night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
+    line = run_night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
     assert f"; in no unit: config/events.csv, line 2, column 1: {found}, see" in line
 
 
-def test_an_event_of_a_turnout_that_was_taken_out_is_no_fault(folder):
+def test_an_event_of_a_removed_turnout_is_no_fault(folder):
     row = excluded("t2", "x", "not_counted", "line 2, column 1", "turnout 't2' has no row in turnouts.tsv")
     registry(folder, (row,), "t2", t1="accepted", t2="accepted")
-    assert "in no unit" not in night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
+    assert "in no unit" not in run_night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
 
 
 @pytest.mark.parametrize("quiet", [False, True])
-def test_a_quiet_night_shows_only_its_last_line(folder, quiet, capfd):
-    """Neither messages of Snakemake nor what its jobs print."""
+def test_a_quiet_run_prints_only_its_last_line(folder, quiet, capfd):
+    """Neither the messages of Snakemake nor the output of its jobs are printed."""
     more = "import sys; print('trend: 12 rows'); print('rule trend', file=sys.stderr)"
     (folder / "snakemake.py").write_text(STATE.format(known={}, plan=plan("t1/hammer/A/2026-01-05"), more=more))
     nightly([], "profiles/default", quiet=quiet)
@@ -142,8 +142,8 @@ ERROR = """Error in rule {rule}:
 """
 
 
-def test_the_verdicts_sentence_is_why(folder):
-    """A job that was tried again and came to its end is no reason."""
+def test_the_reason_is_the_sentence_of_the_verdict(folder):
+    """A job that finished in a second attempt is no reason."""
     text = ERROR.format(rule="hammer", job=2) + "Trying to restart job 2.\nFinished jobid: 2 (Rule: hammer)\n"
     write("run", text + ERROR.format(rule="verdict", job=4))
     complaint = "9 of 12 new units of the fleet have rows in quarantine, 75 %, above the limit of 50 %"
@@ -153,13 +153,13 @@ def test_the_verdicts_sentence_is_why(folder):
     assert failure_reason() == f"{complaint} (and 1 more, see logs/verdict.log)"
 
 
-def test_the_first_rule_that_failed_is_why_with_its_log(folder):
+def test_the_reason_is_the_first_failed_rule_with_its_log(folder):
     write("run", ERROR.format(rule="passage", job=2) + ERROR.format(rule="register", job=4))
     write("then", ERROR.format(rule="verdict", job=1), later=5)
     assert failure_reason() == "rule passage failed, see logs/passage.log (and 2 more)"
 
 
-def test_a_run_that_was_stopped_before_any_job_says_what_it_met(folder):
+def test_the_reason_of_a_run_that_stopped_before_any_job_is_its_error(folder):
     sentence = "raw, raw root: 41 known files are gone, first t2/a.uff. Nothing was changed."
     write("run", f'ConfigError in file "/srv/t/Snakefile", line 11:\n{sentence}\n  File "/srv/t/Snakefile", line 11\n')
     assert failure_reason() == sentence
@@ -167,7 +167,7 @@ def test_a_run_that_was_stopped_before_any_job_says_what_it_met(folder):
     assert failure_reason(since=log.stat().st_mtime_ns + 1) == ""  # of an earlier run
 
 
-def test_a_run_that_ended_in_a_traceback_says_its_exception_or_its_log(folder):
+def test_the_reason_of_a_run_that_ended_with_a_traceback_is_its_exception_or_its_log(folder):
     write("run", "Building DAG of jobs...\n")
     assert failure_reason() == "see .snakemake/log/run.snakemake.log"
     write(
@@ -178,7 +178,7 @@ def test_a_run_that_ended_in_a_traceback_says_its_exception_or_its_log(folder):
     assert failure_reason() == "turnout.errors.StateError: no state"
 
 
-def test_a_message_whose_first_line_ends_with_a_colon_has_its_second_one(folder):
+def test_a_reason_whose_first_line_ends_with_a_colon_includes_the_second_line(folder):
     write("run", "WorkflowError:\nWrite-protected output files for rule register:\n    results/registry/a\n    b\n")
     assert failure_reason() == "Write-protected output files for rule register: results/registry/a"
 
@@ -190,12 +190,12 @@ def write(name, text, later=0):
     os.utime(log, (log.stat().st_mtime + later, log.stat().st_mtime + later))
 
 
-def test_the_line_of_a_night_that_failed_says_why(folder):
+def test_the_last_line_of_a_failed_run_states_the_reason(folder):
     error = 'ConfigError in file "Snakefile", line 11:\\nconfig/config.yaml, line 1: unknown key.\\n'
     more = (
         "log = Path('.snakemake/log/now.snakemake.log')\nlog.parent.mkdir(parents=True)\n"
         f"log.write_text('{error}')\nraise SystemExit(1)"
     )
-    said = night(folder, {}, [], more)
-    assert said.startswith("failed with exit code 1: ") and "\n" not in said
-    assert said.endswith("; why: config/config.yaml, line 1: unknown key.")
+    last_line = run_night(folder, {}, [], more)
+    assert last_line.startswith("failed with exit code 1: ") and "\n" not in last_line
+    assert last_line.endswith("; why: config/config.yaml, line 1: unknown key.")

@@ -1,4 +1,4 @@
-"""A measurement whose files were moved counts at its new place alone."""
+"""A measurement whose files were moved is used only at its new place."""
 
 from dataclasses import replace
 
@@ -16,8 +16,8 @@ from turnout.workflow.tasks import Stage
 SHARDS = ["00of02", "01of02"]
 
 
-def test_a_measurement_that_was_moved_counts_once_and_one_that_was_deleted_stays(fleet):
-    """A folder of the wrong day is renamed, one file goes to the day it belongs to, one is deleted on purpose."""
+def test_a_moved_measurement_is_used_once_and_a_deleted_measurement_is_kept(fleet):
+    """A folder gets its correct day, one file moves to its correct day, and one file is deleted."""
     fleet.put("t1/2024-05-14/A_2.txt", "belongs to the day before")
     fleet.run()
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
@@ -31,13 +31,13 @@ def test_a_measurement_that_was_moved_counts_once_and_one_that_was_deleted_stays
     }  # fmt: skip
     n_batch = len(batch_paths([fleet.state]))
     fleet.run()
-    assert len(batch_paths([fleet.state])) == n_batch  # withdrawn once
+    assert len(batch_paths([fleet.state])) == n_batch  # it is withdrawn only once
     (fleet.raw / "t0/2024-05-31").rename(fleet.raw / "t0/2024-05-13")
     fleet.run()
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9] and fleet.lengths()["t0/hammer/A/2024-05-31"] == []
 
 
-def test_a_measurement_that_was_moved_counts_once_though_the_job_was_killed_before_it_knew(fleet, monkeypatch):
+def test_a_moved_measurement_is_used_once_after_the_job_was_killed_before_the_withdrawal(fleet, monkeypatch):
     fleet.run()
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")
 
@@ -52,8 +52,8 @@ def test_a_measurement_that_was_moved_counts_once_though_the_job_was_killed_befo
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [] and fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
 
 
-def test_a_measurement_that_was_moved_to_where_it_cannot_be_read_stays(fleet):
-    """The unit that holds the file now gives no row: those that there are are not taken back."""
+def test_a_measurement_that_was_moved_to_an_unreadable_unit_is_kept(fleet):
+    """The unit with the moved file gives no row, so the earlier rows are not withdrawn."""
     fleet.run()
     fleet.put("t0/2024-05-31/A_2.txt", "damaged")
     (fleet.raw / "t0/2024-05-13/A_1.txt").rename(fleet.raw / "t0/2024-05-31/A_1.txt")
@@ -61,7 +61,7 @@ def test_a_measurement_that_was_moved_to_where_it_cannot_be_read_stays(fleet):
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
 
 
-def test_a_campaign_that_was_moved_to_another_turnout_counts_there_alone(fleet):
+def test_a_campaign_that_was_moved_to_another_turnout_is_used_only_there(fleet):
     fleet.run()
     (fleet.raw / "t1/2024-05-13").rename(fleet.raw / "t2/2024-05-31")
     fleet.run()
@@ -73,11 +73,11 @@ def test_a_campaign_that_was_moved_to_another_turnout_counts_there_alone(fleet):
 
 
 class TwoShards(Fleet):
-    """t0 to t3 are of one shard, t4 of the other; what their jobs leave, in any order, is looked through."""
+    """A fleet with t0 to t3 in one shard and t4 in the other; moved files are searched after the jobs."""
 
     stages = {"hammer": None}
 
-    def night(self, order):
+    def run_night(self, order):
         CALLS.clear()
         write_plans(self.configuration, self.raw, self.plan.parent, 2)
         for kind, gather in self.stages.items():
@@ -85,9 +85,9 @@ class TwoShards(Fleet):
                 stage = Stage(kind, length, "1", gather=gather)
                 plan = self.plan.with_name(f"{name}.json")
                 run_shard(plan, self.state_of(kind, name), stage, self.configuration, self.raw)
-        return self.look_through()
+        return self.withdraw_moved_files()
 
-    def look_through(self):
+    def withdraw_moved_files(self):
         return withdraw_moved(self.folder / "work", self.stages, SHARDS, self.configuration.settings["fleet"])
 
     def state_of(self, kind, shard):
@@ -100,26 +100,26 @@ class TwoShards(Fleet):
 
 
 @pytest.mark.parametrize("order", [SHARDS, SHARDS[::-1]])
-def test_a_campaign_that_was_moved_to_a_turnout_of_another_shard_counts_there_alone(tmp_path, order):
+def test_a_campaign_that_was_moved_to_a_turnout_of_another_shard_is_used_only_there(tmp_path, order):
     assert shard_of("t0", 2) != shard_of("t4", 2)
     fleet = TwoShards(tmp_path, 5)
-    assert fleet.night(order) == 0
+    assert fleet.run_night(order) == 0
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t4/2024-05-31")
-    assert fleet.night(order) == 1
+    assert fleet.run_night(order) == 1
     assert fleet.lengths() == {f"t{i}/hammer/A/2024-05-13": [9] if i else [] for i in range(5)} | {
         "t4/hammer/A/2024-05-31": [9]
     }
     old = fleet.state.with_name(f"{shard_of('t0', 2)}.json")
-    assert read_postponed(old) == (1, {})  # what builds on it is asked for again
-    assert fleet.night(order) == 0 and CALLS == [] and read_postponed(old) == (1, {})
+    assert read_postponed(old) == (1, {})  # later stages are requested again
+    assert fleet.run_night(order) == 0 and CALLS == [] and read_postponed(old) == (1, {})
     (fleet.raw / "t4/2024-05-31").rename(fleet.raw / "t0/2024-05-13")
-    assert fleet.night(order) == 1
+    assert fleet.run_night(order) == 1
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9] and fleet.lengths()["t4/hammer/A/2024-05-31"] == []
 
 
-def test_what_was_moved_is_withdrawn_though_the_job_was_killed_before_it_was_written(tmp_path, monkeypatch):
+def test_a_moved_campaign_is_withdrawn_after_the_job_was_killed_before_the_withdrawal(tmp_path, monkeypatch):
     fleet = TwoShards(tmp_path, 5)
-    fleet.night(SHARDS)
+    fleet.run_night(SHARDS)
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t4/2024-05-31")
 
     def killed(*_):
@@ -127,32 +127,32 @@ def test_what_was_moved_is_withdrawn_though_the_job_was_killed_before_it_was_wri
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("turnout.workflow.duplicate_files.withdrawal", killed)
-        fleet.night(SHARDS)
+        fleet.run_night(SHARDS)
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
-    assert fleet.look_through() == 1
+    assert fleet.withdraw_moved_files() == 1
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == []
 
 
-def test_the_same_file_at_two_turnouts_counts_at_both_while_the_plan_of_one_is_not_there(tmp_path):
-    """Without its plan nobody can say that a unit is gone."""
+def test_the_same_file_at_two_turnouts_is_used_at_both_while_a_plan_is_missing(tmp_path):
+    """Without its plan it is unknown whether a unit has vanished."""
     fleet = TwoShards(tmp_path, 5)
     fleet.put("t4/2024-05-13/A_1.txt", "turnout 0")
-    fleet.night(SHARDS)
+    fleet.run_night(SHARDS)
     (fleet.plan.with_name(f"{shard_of('t0', 2)}.json")).unlink()
-    assert fleet.look_through() == 0
+    assert fleet.withdraw_moved_files() == 0
 
 
-def test_a_campaign_that_was_moved_to_where_it_cannot_be_read_stays_though_of_another_shard(tmp_path):
+def test_a_campaign_that_was_moved_to_an_unreadable_unit_of_another_shard_is_kept(tmp_path):
     fleet = TwoShards(tmp_path, 5)
-    fleet.night(SHARDS)
+    fleet.run_night(SHARDS)
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t4/2024-05-31")
     fleet.put("t4/2024-05-31/A_2.txt", "damaged")
-    assert fleet.night(SHARDS) == 0
+    assert fleet.run_night(SHARDS) == 0
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
 
 
 def visit_of(plan, configuration):
-    """The newest campaign of each turnout, as a stage of its own looks at it."""
+    """The newest campaign of each turnout, as a separate stage uses it."""
     newest = {p.unit.turnout: p.unit for p in sorted(read_plan(plan), key=lambda p: p.unit.label)}
     for unit in newest.values():
         own = configuration.turnout(unit.turnout).hashes["mismatch"]
@@ -161,19 +161,19 @@ def visit_of(plan, configuration):
         )
 
 
-def test_what_was_found_from_a_visit_that_was_moved_is_withdrawn_and_of_an_older_visit_stays(tmp_path):
+def test_findings_of_a_moved_visit_are_withdrawn_and_those_of_an_older_visit_are_kept(tmp_path):
     fleet = TwoShards(tmp_path, 5)
     fleet.stages = {"hammer": None, "mismatch": visit_of}
     fleet.put("t0/2024-06-13/A_1.txt", "wrongly filed")
     fleet.put("t1/2024-06-13/A_1.txt", "rightly filed")
-    fleet.night(SHARDS)
+    fleet.run_night(SHARDS)
     (fleet.raw / "t0/2024-06-13").rename(fleet.raw / "t4/2024-06-13")
     fleet.put("t1/2024-07-13/A_1.txt", "newer")
-    assert fleet.night(SHARDS) == 2
+    assert fleet.run_night(SHARDS) == 2
     found = fleet.lengths("mismatch")
     assert {unit: found[unit] for unit in found if not unit.startswith(("t2", "t3"))} == {
         "t0/mismatch/2024-06-13": [], "t0/mismatch/2024-05-13": [9],
         "t1/mismatch/2024-06-13": [13], "t1/mismatch/2024-07-13": [5],
         "t4/mismatch/2024-05-13": [9], "t4/mismatch/2024-06-13": [13],
     }  # fmt: skip
-    assert fleet.night(SHARDS) == 0
+    assert fleet.run_night(SHARDS) == 0

@@ -1,4 +1,4 @@
-"""The unattended run: one at a time, and what a killed one left is cleared."""
+"""The nightly run: one at a time, and the remains of a killed run are removed."""
 
 import os
 import signal
@@ -22,22 +22,22 @@ def profiles(tmp_path):
         (tmp_path / name / "config.yaml").write_text("cores: 1\n")
 
 
-def test_two_at_once_are_one_too_many(tmp_path):
+def test_a_second_nightly_run_at_the_same_time_is_an_error(tmp_path):
     with FileLock(tmp_path / ".nightly.lock"), pytest.raises(TurnoutError, match="another nightly run is going on"):
         nightly([], "profiles/default", work=tmp_path)
 
 
-def test_a_run_that_hangs_is_ended_and_said(tmp_path, monkeypatch):
+def test_a_run_that_exceeds_the_time_limit_is_stopped_and_reported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    # the interpreter is asked for "-m snakemake"; this one only sleeps
+    # nightly starts "-m snakemake"; this module only sleeps
     (tmp_path / "snakemake.py").write_text("import time\ntime.sleep(60)\n")
     monkeypatch.setattr(module.sys, "executable", sys.executable)
-    night = nightly([], "profiles/default", limit=1.0, work=tmp_path / "work")
-    assert night.code == EXIT_TIME_LIMIT and "stopped at the time limit" in str(night)
+    report = nightly([], "profiles/default", limit=1.0, work=tmp_path / "work")
+    assert report.code == EXIT_TIME_LIMIT and "stopped at the time limit" in str(report)
 
 
-def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
-    """Else a fleet whose first fill takes a week would tell nothing for a week. The killed run has left its lock."""
+def test_results_before_the_time_limit_are_published(tmp_path, monkeypatch):
+    """A first run of a large fleet may take a week. The killed run has left its lock."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
         "import sys, time\nfrom pathlib import Path\nlock = Path('.snakemake/locks')\n"
@@ -47,13 +47,13 @@ def test_what_was_computed_until_the_limit_is_published(tmp_path, monkeypatch):
         "else:\n    lock.mkdir(parents=True)\n    Path('work/launched').write_text('')\n    time.sleep(60)\n"
     )
     (tmp_path / "work").mkdir()
-    assert module._run([], 6.0, tmp_path / "work") == EXIT_TIME_LIMIT  # 0 if the run is waited for
+    assert module._run([], 6.0, tmp_path / "work") == EXIT_TIME_LIMIT  # the code is 0 if the function waits for the run
     assert module.GENERATION.exists()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
-    """Snakemake and its job leave their process numbers and wait; the job does not listen to SIGTERM."""
+    """Snakemake and its job write their process numbers and wait; the job ignores SIGTERM."""
     (tmp_path / "snakemake.py").write_text(
         "import os, signal, subprocess, sys, time\nfrom pathlib import Path\n"
         "if sys.argv[1:] == ['job']:\n    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
@@ -63,10 +63,14 @@ def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
     )
     (tmp_path / "config").mkdir()
     (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\n")
-    night = [sys.executable, "-m", "turnout.cli.main", "nightly"]
+    command = [sys.executable, "-m", "turnout.cli.main", "nightly"]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     run = subprocess.Popen(
-        night, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, stderr=subprocess.PIPE, preexec_fn=_listens
+        command,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": path},
+        stderr=subprocess.PIPE,
+        preexec_fn=_restore_signals,
     )
     pids = tmp_path / "pids"
     while not pids.exists() or len(pids.read_text().splitlines()) < 2:
@@ -75,16 +79,16 @@ def test_a_signal_ends_the_run_and_its_jobs(tmp_path, number):
     run.send_signal(number)
     assert run.wait(60) == 128 + number and run.stderr.read() == b""
     for pid in map(int, pids.read_text().split()):
-        assert not _lives(pid)
+        assert not _is_alive(pid)
 
 
-def _listens():
-    """What is started in the background, as a suite may be, ignores what its terminal sends."""
+def _restore_signals():
+    """Restore the default signals, as a process in the background ignores those of its terminal."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
 
 
-def _lives(pid):
+def _is_alive(pid):
     try:
         return open(f"/proc/{pid}/stat").read().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
@@ -104,7 +108,7 @@ def test_only_jobs_of_this_folder_are_cancelled(tmp_path, monkeypatch):
     assert (tmp_path / "cancelled").read_text() == "11\n"
 
 
-def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
+def test_the_remains_of_a_killed_run_are_removed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text("")
     for name in ("backups", "locks"):
@@ -114,7 +118,7 @@ def test_remains_of_a_killed_run_are_cleared(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("profile", ["nosuch", "profiles/nosuch"])
-def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, monkeypatch, profile):
+def test_a_missing_profile_is_an_error_before_the_run_starts(tmp_path, monkeypatch, profile):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "profiles/own").mkdir(parents=True)
     (tmp_path / "profiles/own/config.yaml").touch()
@@ -127,13 +131,13 @@ def test_a_profile_that_is_not_there_is_said_before_anything_begins(tmp_path, mo
 
 
 @pytest.mark.parametrize("folder", ["work", "results", "results/registry", "results/pages", "logs", ".snakemake", "."])
-def test_a_folder_that_cannot_be_written_is_named_before_anything_begins(tmp_path, monkeypatch, folder):
+def test_a_folder_without_write_permission_is_an_error_before_the_run_starts(tmp_path, monkeypatch, folder):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text("open('begun', 'w')\n")
     (tmp_path / folder).mkdir(parents=True, exist_ok=True)
     locked = (tmp_path / folder).resolve()
     access = os.access
-    # root may write into every folder, so no permission can be tested: the answer is that of a read-only disk
+    # root can write into every folder, so no permission can be tested: this simulates a read-only disk
     monkeypatch.setattr(module.os, "access", lambda path, mode: Path(path).resolve() != locked and access(path, mode))
     with pytest.raises(TurnoutError, match=f"^{locked}, the folder: it cannot be written.* Correct its permissions"):
         nightly([], "profiles/default")
@@ -149,15 +153,15 @@ def test_a_folder_that_cannot_be_written_is_named_before_anything_begins(tmp_pat
         ("import os\nos.kill(os.getpid(), 15)", True, 143, "Snakemake was ended by SIGTERM"),
     ],
 )
-def test_every_failed_night_has_a_reason(tmp_path, monkeypatch, program, quiet, code, reason):
+def test_every_failed_run_has_a_reason(tmp_path, monkeypatch, program, quiet, code, reason):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(program)
-    night = nightly([], "profiles/default", quiet=quiet)
-    assert night.code == code and f"failed with exit code {code}: " in str(night) and reason in night.reason
+    report = nightly([], "profiles/default", quiet=quiet)
+    assert report.code == code and f"failed with exit code {code}: " in str(report) and reason in report.reason
 
 
-def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monkeypatch):
-    """Quarantine from the states, rejected tests from the registry; the units of one turnout come from both."""
+def test_the_three_turnouts_with_most_unused_recordings_are_listed(tmp_path, monkeypatch):
+    """Quarantine is from the states, rejected tests are from the registry; units of one turnout are from both."""
     from turnout.registry.job import register
     from turnout.workflow.batches import UnitResult, read_results, write_batch
 
@@ -178,13 +182,15 @@ def test_the_three_turnouts_of_which_most_was_not_used_are_named(tmp_path, monke
         f"known = {{u: UnitState('', '', '1', s, 'b') for u, s in {known!r}.items()}}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\n"
     )
-    said = str(nightly([], "p"))
-    assert "9 processed, 7 of these with rows in quarantine, 1 hammer test rejected" in said and "\n" not in said
-    assert 'worst: t2 (3), t4 (2), t5 (2), see turnout query "from quarantine_open" and "from rejected"' in said
+    line = str(nightly([], "p"))
+    assert "9 processed, 7 of these with rows in quarantine, 1 hammer test rejected" in line and "\n" not in line
+    assert 'worst: t2 (3), t4 (2), t5 (2), see turnout query "from quarantine_open" and "from rejected"' in line
 
 
-def test_another_number_of_shards_counts_no_unit_twice_and_still_sees_what_vanishes(fleet, tmp_path, monkeypatch):
-    """Three units in one shard, then in two: what the one shard left is no further unit, and no file still there."""
+def test_after_a_change_of_the_number_of_shards_units_are_counted_once_and_vanished_files_are_reported(
+    fleet, tmp_path, monkeypatch
+):
+    """Three units in one shard, then in two: the state of the one shard is not used any more."""
     monkeypatch.chdir(tmp_path)
     fleet.run()
     (tmp_path / "snakemake.py").write_text(
@@ -202,26 +208,26 @@ def test_another_number_of_shards_counts_no_unit_twice_and_still_sees_what_vanis
     assert "3 units known, 0 processed, 0 of these with rows in quarantine, 1 vanished" in str(nightly([], "p"))
 
 
-def test_it_is_said_in_one_line():
-    said = str(NightReport(1, 100, 7, 2, 3))
+def test_the_report_is_one_line():
+    line = str(NightReport(1, 100, 7, 2, 3))
     assert (
-        said == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
+        line == "failed with exit code 1: 100 units known, 7 processed, 2 of these with rows in quarantine, 3 vanished"
     )
 
 
-def test_what_a_job_that_did_not_come_to_its_end_has_kept_is_counted(tmp_path, monkeypatch):
+def test_units_that_an_unfinished_job_stored_are_counted(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
         "from pathlib import Path\nfrom turnout.workflow.state import UnitState, State\n"
         "known = {'t1/hammer/A/1': UnitState('', '', '1', 'ok', 'b')}\n"
         "State(known, ['b']).save(Path('work/hammer/00of01.json'))\nraise SystemExit(1)\n"
     )
-    night = nightly([], "profiles/default", work=tmp_path / "work")
-    assert (night.code, night.units, night.processed) == (1, 1, 1)
+    report = nightly([], "profiles/default", work=tmp_path / "work")
+    assert (report.code, report.units, report.processed) == (1, 1, 1)
 
 
-def test_where_jobs_die_what_the_others_computed_is_published(tmp_path, monkeypatch):
-    """The first run fails with its jobs and does not reach the registry, the second one may only publish."""
+def test_the_results_of_other_jobs_are_published_if_jobs_fail(tmp_path, monkeypatch):
+    """The first run fails before the registry; the second run may only publish."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text(
         "import sys\nfrom pathlib import Path\n"
@@ -236,16 +242,16 @@ def test_where_jobs_die_what_the_others_computed_is_published(tmp_path, monkeypa
         "raise SystemExit(1)\n"
     )
     assert "the registry was not published" in str(nightly([], "p"))
-    assert len((tmp_path / "said").read_text().splitlines()) == 1  # no job was tried: nothing to publish
+    assert len((tmp_path / "said").read_text().splitlines()) == 1  # no job was started: nothing to publish
     (tmp_path / "begins").touch()
     assert "the registry was not published" in str(nightly([], "p"))
     (tmp_path / "publish").touch()
-    night = nightly([], "p")
-    assert (night.code, night.published) == (1, True)
+    report = nightly([], "p")
+    assert (report.code, report.published) == (1, True)
     assert "--rerun-incomplete --allowed-rules all register" in (tmp_path / "said").read_text().splitlines()[-1]
 
 
-def test_a_run_that_somebody_started_by_hand_is_not_robbed_of_its_lock(tmp_path, monkeypatch):
+def test_the_lock_of_a_run_that_a_user_started_is_not_removed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake").write_text("import time\nprint('up', flush=True)\ntime.sleep(60)\n")
     with subprocess.Popen([sys.executable, str(tmp_path / "snakemake")], stdout=subprocess.PIPE) as by_hand:

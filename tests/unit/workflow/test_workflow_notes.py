@@ -1,4 +1,4 @@
-"""`turnout check` holds campaigns.csv and trains.csv against the files beside them."""
+"""`turnout check` compares campaigns.csv and trains.csv with the recording files."""
 
 from datetime import datetime, timedelta
 
@@ -27,22 +27,22 @@ def raw(tmp_path, repository, monkeypatch):
     return tmp_path / "raw/line_7/s1"
 
 
-def checked(capsys):
+def check_lines(capsys):
     code = main(["check"])
     return code, [line.strip() for line in capsys.readouterr().out.splitlines() if ".csv, " in line]
 
 
-def test_campaigns_that_agree_with_the_files_say_nothing(raw, capsys):
-    assert checked(capsys) == (0, [])  # nobody noted anything: none is accused
+def test_campaigns_that_agree_with_the_files_give_no_message(raw, capsys):
+    assert check_lines(capsys) == (0, [])  # no notes at all give no message
     (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n20240902,2024-09-02T09:00,14\n")
-    assert checked(capsys) == (0, [])
+    assert check_lines(capsys) == (0, [])
 
 
 @pytest.mark.parametrize(
     "text", [None, "campaign,started_at_utc\n2024-05-13,2024-05-13T09:00\n2024-09-02,2024-09-02T09:00\n"]
 )
-def test_a_turnout_without_any_rail_temperature_is_remarked(raw, capsys, text):
-    """No fault, as the recordings may state it. The file may be missing, elsewhere, or lack the column."""
+def test_a_turnout_without_any_rail_temperature_has_a_remark(raw, capsys, text):
+    """It is no fault, as recordings may state it. The file may be missing, elsewhere, or lack the column."""
     if text:
         (raw / "campaigns.csv").write_text(text)
     code = main(["check"])
@@ -53,11 +53,11 @@ def test_a_turnout_without_any_rail_temperature_is_remarked(raw, capsys, text):
     assert main(["check"]) == 0 and "rail temperature" not in capsys.readouterr().out
 
 
-def test_a_campaign_without_files_and_files_without_a_campaign_are_said(raw, capsys):
+def test_a_campaign_without_files_and_files_without_a_campaign_are_reported(raw, capsys):
     rows = "2024-05-13,2024-05-13T09:00,12\n\n2024-09-20,2024-09-20T09:00,14\n"
     (raw / "campaigns.csv").write_text(HEADER + rows)
-    code, said = checked(capsys)
-    assert code == 1 and said == [
+    code, lines = check_lines(capsys)
+    assert code == 1 and lines == [
         "line_7/s1/campaigns.csv, line 4, column 1: no hammer file is of campaign 2024-09-20. Correct its day, put its "
         "files there, or remove the row.",
         "line_7/s1/campaigns.csv, line 1: no row for campaign 2024-09-02, of which there are 2 files: it counts as "
@@ -66,14 +66,14 @@ def test_a_campaign_without_files_and_files_without_a_campaign_are_said(raw, cap
     ]
 
 
-def test_a_row_that_cannot_be_used_is_said_once(raw, capsys):
+def test_a_row_that_cannot_be_used_is_reported_once(raw, capsys):
     (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n2024-09-02,2024-09-02T09:00,warm\n")
-    code, (said,) = checked(capsys)
-    assert code == 1 and "rail_temperature_c is 'warm'" in said
+    code, (lines,) = check_lines(capsys)
+    assert code == 1 and "rail_temperature_c is 'warm'" in lines
 
 
 def passages(raw, seconds):
-    """A file at each of these seconds after a quarter past ten."""
+    """A file at each of these seconds after 10:15."""
     (raw / "passages").mkdir()
     for moment in (datetime(2024, 5, 13, 10, 15) + timedelta(seconds=s) for s in seconds):
         (raw / "passages" / f"{moment:%Y%m%dT%H%M%SZ}.h5").write_bytes(b"x")
@@ -83,22 +83,22 @@ TRAINS = (0, 1340, 2950, 4610, 7333, 11020)
 
 
 @pytest.mark.parametrize("hours", [2, -5])
-def test_trains_listed_in_local_time_are_said(raw, capsys, hours):
+def test_trains_listed_in_local_time_are_reported(raw, capsys, hours):
     passages(raw, TRAINS)
     times = [datetime(2024, 5, 13, 10 + hours, 15, 20) + timedelta(seconds=s) for s in TRAINS[1:]]
     (raw / "trains.csv").write_text("passed_at_utc\n" + "".join(f"{t:%Y-%m-%dT%H:%M:%S}\n" for t in times))
-    code, (said,) = checked(capsys)
+    code, (lines,) = check_lines(capsys)
     late = "after" if hours > 0 else "before"
-    assert code == 1 and said == (
+    assert code == 1 and lines == (
         f"line_7/s1/trains.csv, column passed_at_utc: of 6 passages none has a train within 90 s, and 5 have one "
         f"{abs(hours)} h {late}. Write passed_at_utc in UTC, not in local time."
     )
 
 
 @pytest.mark.parametrize("listed", [TRAINS, TRAINS[:1], (600, 5000), ()])
-def test_trains_of_which_some_were_not_recorded_say_nothing(raw, capsys, listed):
-    """A table of operation lists more trains than were recorded, or fewer."""
+def test_trains_without_recordings_and_recordings_without_trains_give_no_message(raw, capsys, listed):
+    """A timetable may contain more trains than were recorded, or fewer."""
     passages(raw, TRAINS)
     times = [datetime(2024, 5, 13, 10, 15, 20) + timedelta(seconds=s) for s in listed]
     (raw / "trains.csv").write_text("passed_at_utc\n" + "".join(f"{t:%Y-%m-%dT%H:%M:%S}\n" for t in times))
-    assert checked(capsys) == (0, [])
+    assert check_lines(capsys) == (0, [])

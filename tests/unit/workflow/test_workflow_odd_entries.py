@@ -1,4 +1,4 @@
-"""Entries of a raw folder that nobody can use: each is a problem by name, and every sound file beside it a unit."""
+"""Entries of a raw folder that cannot be used: each is a reported problem, and every correct file gives a unit."""
 
 import errno
 import os
@@ -34,7 +34,7 @@ def fleet(tmp_path):
 
 
 def planned(fleet):
-    """(turnouts with units, problems as path, place and what was found)."""
+    """(turnouts with units, problems as path, place and message)."""
     write_plans(load_configuration(fleet / "config"), fleet / "raw", fleet / "plan", 1, accept_vanished=True)
     units = [p.unit for p in read_plan(fleet / "plan/00of01.json")]
     problems = [(p["path"], p["where"], p["found"]) for _, p in read_problems(fleet / "plan/00of01.json")]
@@ -51,7 +51,7 @@ def planned(fleet):
         ("hammer/root", "../..", "link", "leads back to a folder that it lies in"),
     ],
 )
-def test_a_link_that_leads_nowhere_or_in_a_circle_is_a_problem(fleet, link, target, place, found):
+def test_a_broken_or_circular_link_is_a_problem(fleet, link, target, place, found):
     (fleet / "raw/t1" / link).symlink_to(target)
     assert planned(fleet) == (["t1", "t2"], [(f"t1/{link}", place, found)])
 
@@ -68,7 +68,7 @@ def test_a_folder_with_the_name_of_a_recording_is_a_problem(fleet, content):
     assert len(problems) == 1 + len(content)
 
 
-def test_two_links_to_each_others_folder_are_followed_once(fleet):
+def test_two_links_to_the_folder_of_the_other_are_followed_once(fleet):
     for name, other in (("a", "b"), ("b", "a")):
         (fleet / "raw/t1" / name).mkdir()
         (fleet / "raw/t1" / name / "over").symlink_to(f"../{other}")
@@ -82,7 +82,7 @@ def test_a_link_to_another_folder_of_the_raw_root_is_followed(fleet):
     assert planned(fleet) == (["t1", "t1", "t2"], [])
 
 
-def test_a_name_in_another_encoding_is_a_problem_that_can_be_written(fleet):
+def test_a_name_that_is_not_utf8_is_a_problem_with_an_escaped_path(fleet):
     with open(os.fsencode(fleet / "raw/t1" / DAY) + b"/Pr\xfcfung.uff", "wb"):
         pass
     os.mkdir(os.fsencode(fleet / "raw/t2") + b"/\xe4lter")
@@ -93,9 +93,9 @@ def test_a_name_in_another_encoding_is_a_problem_that_can_be_written(fleet):
     ]  # fmt: skip
 
 
-def test_a_file_that_may_not_be_looked_at_is_a_problem(fleet):
+def test_a_file_whose_status_cannot_be_read_is_a_problem(fleet):
     class Closed:
-        """An entry of a folder that may be listed and not be entered: to root nothing is closed."""
+        """An entry of a folder that can be listed but not entered, as root can enter every folder."""
 
         def stat(self):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -107,11 +107,13 @@ def test_a_file_that_may_not_be_looked_at_is_a_problem(fleet):
     ]  # fmt: skip
 
 
-def test_a_file_that_may_not_be_read_is_new_once_it_may(fleet, monkeypatch):
-    """Its permission changes neither its size nor its time: the plan has to."""
+def test_a_file_without_read_permission_is_planned_after_it_gets_the_permission(fleet, monkeypatch):
+    """Its permission changes neither its size nor its time, but the plan must change."""
     path = fleet / f"raw/t1/{DAY}/A_1.uff"
     path.chmod(0o600)
-    monkeypatch.setattr("turnout.workflow.scan.os.access", lambda path, mode: "t1" not in path)  # we may be root
+    monkeypatch.setattr(
+        "turnout.workflow.scan.os.access", lambda path, mode: "t1" not in path
+    )  # as root can read every file
     turnouts, problems = planned(fleet)
     assert turnouts == ["t2"] and problems == [(f"t1/{DAY}/A_1.uff", "file", "may not be read")]
     path.chmod(0o644)
@@ -125,7 +127,7 @@ def test_notes_that_cannot_be_read_are_a_problem(fleet):
     assert [(path, found) for path, _, found in problems] == [("t1/campaigns.csv", "Is a directory")]
 
 
-def test_a_file_where_the_folder_of_a_turnout_belongs_is_a_problem(fleet):
+def test_a_file_in_place_of_the_folder_of_a_turnout_is_a_problem(fleet):
     (fleet / "raw/t1").rename(fleet / "away")
     (fleet / "raw/t1").write_bytes(b"")
     turnouts, problems = planned(fleet)
@@ -134,7 +136,7 @@ def test_a_file_where_the_folder_of_a_turnout_belongs_is_a_problem(fleet):
 
 
 @pytest.mark.parametrize("name", ["Campaigns.csv", "campaign.csv", "trains.CSV"])
-def test_a_table_whose_name_is_misspelt_is_named(fleet, name):
+def test_a_table_with_a_misspelt_name_is_reported(fleet, name):
     (fleet / "raw/t1" / name).write_bytes(b"x")
     write_plans(load_configuration(fleet / "config"), fleet / "raw", fleet / "plan", 1, accept_vanished=True)
     (problem,) = [p for _, p in read_problems(fleet / "plan/00of01.json")]

@@ -1,4 +1,4 @@
-"""Scan and plan: every file is in a unit, reported, or known to be unfinished; a plan changes with its meaning."""
+"""Scan and plan: every file is in a unit, reported, or known as unfinished; a plan changes only with its content."""
 
 import os
 
@@ -81,7 +81,7 @@ def test_files_become_units(fleet):
         ("t1/.git/config", False),
     ],
 )
-def test_a_stranger_is_reported_unless_it_is_unfinished_or_hidden(fleet, name, reported):
+def test_an_unknown_file_is_reported_unless_it_is_unfinished_or_hidden(fleet, name, reported):
     add(fleet, name)
     found = scan(turnout(fleet), fleet / "raw")
     assert [(e.path, e.reason) for e in found.problems] == ([(name, "name_unknown")] if reported else [])
@@ -117,7 +117,7 @@ def test_an_empty_folder_is_reported(fleet):
         ("t1/hammer/2024-05-13/notes/A_1.uff", "its name follows no pattern of the layout."),
     ],
 )
-def test_the_part_by_which_alone_a_name_misses_the_pattern_is_named(fleet, name, detail):
+def test_the_only_part_of_a_name_that_does_not_match_the_pattern_is_reported(fleet, name, detail):
     add(fleet, name)
     (problem,) = scan(turnout(fleet), fleet / "raw").problems
     assert detail in str(problem)
@@ -133,7 +133,7 @@ def test_the_part_by_which_alone_a_name_misses_the_pattern_is_named(fleet, name,
         ("t2/passages/19040101T000000Z.tdms", "'19040101T000000Z' is before 1990"),
     ],
 )
-def test_an_impossible_date_is_a_named_problem(fleet, name, found):
+def test_an_impossible_date_is_a_reported_problem(fleet, name, found):
     before = scan(turnout(fleet, "t2"), fleet / "raw")
     add(fleet, name)
     after = scan(turnout(fleet, "t2"), fleet / "raw")
@@ -142,7 +142,7 @@ def test_an_impossible_date_is_a_named_problem(fleet, name, found):
     assert (problem.path, problem.reason) == (name, "name_unknown") and found in str(problem)
 
 
-def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
+def test_the_command_plan_reports_new_and_changed_units(fleet, capsys, monkeypatch):
     from turnout.cli.main import main
     from turnout.fingerprint import fingerprint
     from turnout.workflow.state import State, UnitState
@@ -157,21 +157,21 @@ def test_plan_says_what_is_new_and_what_changed(fleet, capsys, monkeypatch):
         (fleet / "elsewhere/hammer").mkdir(parents=True, exist_ok=True)
         State({u: k for u, k in units.items() if "/hammer/" in u}).save(fleet / "elsewhere/hammer" / plan.name)
 
-    def said():
+    def plan_output():
         assert main(["plan", *folders]) == 0
         return capsys.readouterr().out
 
-    assert "5 units, 1 never computed, 0 changed" in said()  # the passage
+    assert "5 units, 1 never computed, 0 changed" in plan_output()  # the passage
     add(fleet, "t1/hammer/2024-05-13/A_2.uff", b"another content")
-    assert "changed  t1/hammer/A/2024-05-13" in said()
+    assert "changed  t1/hammer/A/2024-05-13" in plan_output()
     layout = fleet / "config/layouts/main.yaml"
     layout.write_text(layout.read_text().replace("force: {source: 0", "force: {source: 2"))
-    assert "4 changed since" in said()
+    assert "4 changed since" in plan_output()
     assert main(["plan", *folders[:2], "--raw", "nothere"]) == 2
     assert "nothere, --raw: no such folder" in capsys.readouterr().err
 
 
-def test_a_plan_says_the_same_as_the_scan(fleet):
+def test_a_plan_contains_the_units_of_the_scan(fleet):
     plans(fleet)
     planned = [p.unit for p in read_plan(fleet / "work/plan/00of01.json")]
     assert planned == [u for t in ("t1", "t2") for u in scan(turnout(fleet, t), fleet / "raw").units]
@@ -189,7 +189,7 @@ def test_a_plan_is_written_only_when_its_content_changes(fleet):
     assert str(fleet) not in path.read_text()
 
 
-def test_only_the_shards_of_the_asked_turnouts_are_scanned(fleet):
+def test_only_the_shards_of_the_requested_turnouts_are_scanned(fleet):
     names = plans(fleet, shards=64, turnouts=["t2"])
     assert names == [shard_of("t2", 64)]
     assert sorted(p.name for p in (fleet / "work/plan").iterdir()) == [f"{names[0]}.json"]
@@ -203,7 +203,7 @@ def test_every_turnout_is_in_one_shard():
     assert max(abs(s - 500) for s in shares) < 5 * (3500 / 7 * 6 / 7) ** 0.5
 
 
-def test_a_corrected_campaign_changes_its_units_only(fleet):
+def test_a_corrected_campaign_changes_only_its_units(fleet):
     header = "campaign,started_at_utc,rail_temperature_c\n"
     notes = fleet / "raw/t1/campaigns.csv"
     notes.write_text(header + "2024-05-13,2024-05-13T09:00,\n2024-06-13,2024-06-13T09:00,15\n")
@@ -215,7 +215,7 @@ def test_a_corrected_campaign_changes_its_units_only(fleet):
     assert {u for u in before if before[u] != after[u]} == {"t1/hammer/A/2024-05-13", "t1/hammer/AS/2024-05-13"}
 
 
-def test_a_corrected_train_changes_the_passages_of_its_hour_only(fleet):
+def test_a_corrected_train_changes_only_the_passages_of_its_hour(fleet):
     add(fleet, "t1/passages/20240513T201500Z.tdms")
     trains = fleet / "raw/t1/trains.csv"
     trains.write_text("passed_at_utc,type\n2024-05-13T10:16:00,IC3\n2024-05-13T20:16:00,IC3\n")
@@ -227,7 +227,7 @@ def test_a_corrected_train_changes_the_passages_of_its_hour_only(fleet):
     assert {u for u in before if before[u] != after[u]} == {"t1/passage/20240513T101500Z.tdms"}
 
 
-def test_a_lost_disk_is_not_taken_for_tidying_up(fleet):
+def test_a_missing_disk_stops_the_run(fleet):
     for k in range(40):
         add(fleet, f"t2/passages/202405{1 + k % 28:02d}T{k // 28:02d}0000Z.wav")
     plans(fleet)
@@ -241,7 +241,7 @@ def test_a_lost_disk_is_not_taken_for_tidying_up(fleet):
 
 
 @pytest.mark.parametrize("mount", ["nothing", "an empty folder", "a link to nothing", "a link to itself"])
-def test_a_disk_that_is_not_mounted_stops_the_run_of_a_small_fleet_too(fleet, mount):
+def test_a_disk_that_is_not_mounted_stops_the_run_of_a_small_fleet(fleet, mount):
     plans(fleet)
     text = (fleet / "work/plan/00of01.json").read_text()
     (fleet / "raw").rename(fleet / "away")
@@ -254,8 +254,8 @@ def test_a_disk_that_is_not_mounted_stops_the_run_of_a_small_fleet_too(fleet, mo
     assert (fleet / "work/plan/00of01.json").read_text() == text
 
 
-def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
-    """Its row was taken out on purpose; its raw folder may be there or not."""
+def test_files_of_a_removed_turnout_are_not_reported_as_missing(fleet):
+    """Its row was removed on purpose; its raw folder may exist or not."""
     for k in range(20):
         add(fleet, f"t2/hammer/2024-05-13/AS_{k}.mat")
     plans(fleet)
@@ -264,8 +264,8 @@ def test_files_of_a_turnout_that_is_taken_out_are_not_lost(fleet):
     assert {p.unit.turnout for p in read_plan(fleet / "work/plan/00of01.json")} == {"t1"}
 
 
-def test_a_table_that_has_lost_all_rows_stops_the_run(fleet):
-    """A file that was cut off after its header: an empty worklist would look as if nothing needed attention."""
+def test_a_turnouts_table_that_has_lost_all_rows_stops_the_run(fleet):
+    """The file was truncated after its header: an empty worklist would suggest that nothing needs attention."""
     plans(fleet, shards=2)
     texts = {path: path.read_text() for path in (fleet / "work/plan").iterdir()}
     (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\n")
@@ -276,8 +276,8 @@ def test_a_table_that_has_lost_all_rows_stops_the_run(fleet):
     plans(fleet, shards=2)
 
 
-def test_a_row_of_the_configuration_that_does_not_count_is_in_quarantine(fleet):
-    """The night would call itself sound, and judge an alarm without the maintenance that explains it."""
+def test_an_unused_row_of_the_configuration_is_in_quarantine(fleet):
+    """Otherwise an alarm would be evaluated without the maintenance that explains it."""
     before = fleet_hash(load_configuration(fleet / "config"))
     (fleet / "config/events.csv").write_text(
         "turnout,section,date,kind\nt1,,2024-05-01,tamping\nt3,,2024-05-01,tamping\n"
@@ -292,39 +292,39 @@ def test_a_row_of_the_configuration_that_does_not_count_is_in_quarantine(fleet):
     assert len({before, fleet_hash(configuration), fleet_hash(load_configuration(fleet / "config"))}) == 3
 
 
-def test_plan_announces_that_the_next_run_will_stop_and_what_to_do(fleet, capsys, monkeypatch):
+def test_the_command_plan_states_that_the_next_run_will_stop_and_the_remedy(fleet, capsys, monkeypatch):
     from turnout.cli.main import main
 
     monkeypatch.chdir(fleet)
     for k in range(40):
         add(fleet, f"t2/hammer/2024-05-13/AS_{k}.mat")
 
-    def said():
+    def plan_output():
         assert main(["plan", "--shards", "2"]) == 0
         return capsys.readouterr().out
 
-    assert "gone" not in said()  # no run has seen them
+    assert "gone" not in plan_output()  # no run has scanned them
     plans(fleet, shards=2)
     (fleet / "raw/t2/hammer/2024-05-13/AS_7.mat").unlink()
-    text = said()
+    text = plan_output()
     assert "1 known file is gone, t2/hammer/2024-05-13/AS_7.mat: what it gave stays" in text and "accept" not in text
     (fleet / "raw/t2").rename(fleet / "raw/away")
-    text = said()
+    text = plan_output()
     assert "the next run will stop: raw, raw root: 41 known files are gone, first t2/hammer/2024-05-13/AS_0" in text
     assert "turnout nightly -- --config accept_vanished=true" in text
     plans(fleet, shards=2, accept_vanished=True)
-    assert "gone" not in said()
+    assert "gone" not in plan_output()
     (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\n")
-    assert "the next run will stop: turnouts.tsv, the table: no row is left of the 2 turnouts" in said()
+    assert "the next run will stop: turnouts.tsv, the table: no row is left of the 2 turnouts" in plan_output()
     plans(fleet, shards=2, accept_vanished=True)
-    assert "stop" not in said()
+    assert "stop" not in plan_output()
     (fleet / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tmain\n")
     (fleet / "raw").rename(fleet / "away")
     assert main(["plan", "--shards", "2"]) == 1  # no input can be used
     assert "the next run will stop: raw, raw root: there is no such folder. Mount" in capsys.readouterr().out
 
 
-def test_a_few_files_may_go(fleet):
+def test_a_few_files_can_be_deleted(fleet):
     plans(fleet)
     (plan,) = (fleet / "work/plan").glob("*.json")
     n_before = plan.read_text().count("hammer/2024-05-13/A_1.uff")
@@ -333,7 +333,7 @@ def test_a_few_files_may_go(fleet):
     assert plan.read_text().count("hammer/2024-05-13/A_1.uff") == n_before - 1
 
 
-def test_a_file_of_a_logger_that_never_stops_holds_the_trains_of_its_day(fleet):
+def test_a_continuous_recording_depends_on_the_trains_of_its_day(fleet):
     add(fleet, "t1/passages/20240514T000000Z.tdms")
     add(fleet, "t1/passages/20240515T000000Z.tdms")
     trains = fleet / "raw/t1/trains.csv"
@@ -346,7 +346,7 @@ def test_a_file_of_a_logger_that_never_stops_holds_the_trains_of_its_day(fleet):
     assert changed == {"t1/passage/20240514T000000Z.tdms"}
 
 
-def test_an_event_is_another_one_with_other_resets_and_one_where_it_is_noted_twice(fleet):
+def test_an_event_with_other_resets_has_another_id_and_a_repeated_row_is_one_event(fleet):
     header = "turnout,section,date,kind,resets,note\n"
     row = "t1,A,2024-05-20,tamping,{},first pass\n"
     ids = []
@@ -358,8 +358,8 @@ def test_an_event_is_another_one_with_other_resets_and_one_where_it_is_noted_twi
     assert ids[0][0] != ids[1][0] and ids[0][1] != ids[1][1]
 
 
-def test_what_passages_are_judged_with_is_an_input_of_their_jobs_once_it_is_there(fleet, monkeypatch, repository):
-    """Clusters that `turnout trains` makes are looked at by the next run, for the rule has them as input."""
+def test_files_of_clusters_and_loads_are_inputs_of_passage_jobs_when_they_exist(fleet, monkeypatch, repository):
+    """The next run uses the clusters that `turnout trains` writes, as they are an input of the rule."""
     monkeypatch.chdir(fleet)
     assert launch({}, scan=False).learned == ()
     (fleet / "config/passages").mkdir()
@@ -373,7 +373,7 @@ def test_what_passages_are_judged_with_is_an_input_of_their_jobs_once_it_is_ther
     assert "learned=RUN.learned" in (repository / "rules/passage.smk").read_text()
 
 
-def test_a_first_run_without_a_raw_root_is_an_error_and_one_with_an_empty_raw_root_is_none(fleet):
+def test_a_first_run_needs_a_raw_root_which_may_be_empty(fleet):
     (fleet / "raw").rename(fleet / "away")
     with pytest.raises(ConfigError, match=r"raw, raw root: there is no such folder. Mount the disk"):
         plans(fleet)

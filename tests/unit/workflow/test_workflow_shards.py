@@ -1,4 +1,4 @@
-"""The shard runner: what is computed, what is kept, what a kill or a fault leaves."""
+"""The runner of shards: computed and stored units, and the state after a kill or a fault."""
 
 import errno
 import json
@@ -22,7 +22,7 @@ from turnout.workflow.state import State, batch_paths, load_state
 from turnout.workflow.tasks import Stage
 
 
-def test_first_run_then_nothing_then_one(fleet):
+def test_a_run_computes_only_new_units(fleet):
     assert str(fleet.run()) == "hammer 00of01: 3 known, 3 processed, 0 quarantined"
     assert fleet.lengths() == {f"t{i}/hammer/A/2024-05-13": [9] for i in range(3)}
     assert fleet.run().processed == 0 and CALLS == []
@@ -31,7 +31,7 @@ def test_first_run_then_nothing_then_one(fleet):
     assert fleet.lengths()["t1/hammer/A/2024-05-13"] == [9, 3]
 
 
-def test_touched_is_refreshed_and_rewritten_is_computed(fleet):
+def test_a_touched_file_is_not_computed_again_and_a_rewritten_file_is(fleet):
     fleet.run()
     path = fleet.raw / "t0/2024-05-13/A_1.txt"
     os.utime(path, (1, 1))
@@ -41,7 +41,7 @@ def test_touched_is_refreshed_and_rewritten_is_computed(fleet):
     assert fleet.run().processed == 1
 
 
-def test_new_code_and_new_configuration_compute_again(fleet):
+def test_new_code_and_a_new_configuration_compute_all_units_again(fleet):
     fleet.run()
     assert fleet.run(algo="2").processed == 3
     layout = fleet.folder / "config/layouts/main.yaml"
@@ -49,7 +49,7 @@ def test_new_code_and_new_configuration_compute_again(fleet):
     assert fleet.run(algo="2").processed == 3
 
 
-def test_a_configuration_newer_than_the_plan_waits(fleet):
+def test_units_whose_configuration_is_newer_than_the_plan_wait(fleet):
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     layout = fleet.folder / "config/layouts/main.yaml"
     layout.write_text(layout.read_text().replace("position: 1", "position: 2"))
@@ -58,7 +58,7 @@ def test_a_configuration_newer_than_the_plan_waits(fleet):
     assert fleet.run().processed == 3
 
 
-def test_damage_and_faults_are_rows_and_leave_when_repaired(fleet):
+def test_damage_and_faults_are_rows_of_the_quarantine_until_they_are_repaired(fleet):
     fleet.put("t0/2024-05-13/A_1.txt", "damaged")
     fleet.put("t1/2024-05-13/A_1.txt", "bug")
     summary = fleet.run()
@@ -74,18 +74,18 @@ def test_damage_and_faults_are_rows_and_leave_when_repaired(fleet):
     assert fleet.rows()["t0/hammer/A/2024-05-13"]["quarantine"] == []
 
 
-def test_strict_raises(fleet):
+def test_strict_raises_the_error(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "bug")
     with pytest.raises(ZeroDivisionError):
         fleet.run(strict=True)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_fault_of_the_machine_leaves_its_unit_for_the_next_run_and_the_others_go_on(fleet, threads):
+def test_a_fault_of_the_machine_postpones_only_its_unit(fleet, threads):
     fleet.put("t0/2024-05-13/A_1.txt", "bad sector")
     fleet.put("t1/2024-05-13/A_1.txt", "too large")
-    said = str(fleet.run(threads=threads))
-    assert said == "hammer 00of01: 3 known, 1 processed, 0 quarantined, 2 postponed"
+    printed = str(fleet.run(threads=threads))
+    assert printed == "hammer 00of01: 3 known, 1 processed, 0 quarantined, 2 postponed"
     assert set(fleet.lengths()) == {"t2/hammer/A/2024-05-13"}
     jobs, units = read_postponed(fleet.state)
     assert jobs == 1 and units == {
@@ -102,7 +102,7 @@ def test_a_fault_of_the_machine_leaves_its_unit_for_the_next_run_and_the_others_
     assert read_postponed(fleet.state) == (2, {}) and judge([fleet.state], fleet.configuration).complaints == ()
 
 
-def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(fleet, monkeypatch):
+def test_a_file_without_read_permission_is_read_after_it_gets_the_permission(fleet, monkeypatch):
     def closed(path):
         raise PermissionError(errno.EACCES, "Permission denied")
 
@@ -112,8 +112,8 @@ def test_a_file_that_is_closed_after_it_was_planned_is_read_once_it_is_open(flee
     assert fleet.run().processed == 3
 
 
-def n_read(unit, turnout, raw_root, algo=""):
-    """How many samples each file has."""
+def count_samples(unit, turnout, raw_root, algo=""):
+    """Rows with the number of samples of each file."""
     rows: dict[str, list] = {"recordings": [], "quarantine": []}
     for path, *_ in unit.files:
         (recording,) = read(path, raw_root, turnout.hammer.descriptions[unit.label.partition("/")[0]]).recordings
@@ -121,7 +121,7 @@ def n_read(unit, turnout, raw_root, algo=""):
     return rows
 
 
-def test_a_file_that_its_library_could_not_read_for_a_bad_sector_is_read_when_it_can_be(fleet, monkeypatch):
+def test_a_file_with_a_read_error_of_the_disk_is_read_in_the_next_run(fleet, monkeypatch):
     for k in range(3):
         np.savez(fleet.raw / "a.npz", fs=51200.0, units=["N", "g"], data=np.arange(10.0 + 4 * k).reshape(2, -1))
         (fleet.raw / "a.npz").rename(fleet.raw / f"t{k}/2024-05-13/A_1.txt")
@@ -133,15 +133,15 @@ def test_a_file_that_its_library_could_not_read_for_a_bad_sector_is_read_when_it
         return load(path, **more)
 
     monkeypatch.setattr("turnout.readers.npz.np.load", bad)
-    summary = fleet.run(stage=Stage("hammer", n_read, "1"))
+    summary = fleet.run(stage=Stage("hammer", count_samples, "1"))
     assert (summary.processed, summary.quarantined, summary.postponed) == (2, 0, 1)
     monkeypatch.undo()
-    summary = fleet.run(stage=Stage("hammer", n_read, "1"))
+    summary = fleet.run(stage=Stage("hammer", count_samples, "1"))
     assert (summary.processed, summary.quarantined, summary.postponed) == (1, 0, 0)
     assert fleet.lengths() == {f"t{k}/hammer/A/2024-05-13": [5 + 2 * k] for k in range(3)}
 
 
-def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(fleet, monkeypatch):
+def test_a_read_error_during_the_hash_of_a_file_affects_only_its_unit(fleet, monkeypatch):
     fleet.run()
     os.utime(fleet.raw / "t0/2024-05-13/A_1.txt", (1, 1))
     sound = tasks.sha256_of
@@ -161,7 +161,7 @@ def test_a_sector_that_cannot_be_read_for_the_key_is_its_units_affair_alone(flee
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_a_full_disk_at_one_unit_leaves_that_unit(tmp_path, threads):
+def test_a_full_disk_during_one_unit_postpones_only_that_unit(tmp_path, threads):
     fleet = Fleet(tmp_path, 4, "fleet: {checkpoint_units: 1}\n")
     fleet.put("t2/2024-05-13/A_1.txt", "full")
     assert fleet.run(threads=threads).postponed == 1
@@ -171,7 +171,7 @@ def test_a_full_disk_at_one_unit_leaves_that_unit(tmp_path, threads):
     assert set(fleet.lengths()) == {f"t{i}/hammer/A/2024-05-13" for i in range(4)}
 
 
-def test_a_full_disk_while_writing_loses_nothing(fleet, monkeypatch):
+def test_a_full_disk_while_the_state_is_written_loses_no_result(fleet, monkeypatch):
     fleet.run()
     before = fleet.state.read_bytes()
     fleet.put("t0/2024-05-13/A_2.txt", "new")
@@ -199,7 +199,7 @@ def test_results_do_not_depend_on_checkpoints_or_processes(tmp_path):
     assert found[0] == found[1] == found[2]
 
 
-def test_a_kill_between_batch_and_state_leaves_an_orphan_that_is_cleared(fleet, monkeypatch):
+def test_a_batch_without_a_state_after_a_kill_is_removed(fleet, monkeypatch):
     fleet.run()
     fleet.put("t0/2024-05-13/A_2.txt", "new")
     monkeypatch.setattr(State, "save", lambda self, path: os._exit(9))
@@ -214,7 +214,7 @@ def test_a_kill_between_batch_and_state_leaves_an_orphan_that_is_cleared(fleet, 
     assert {p.name for p in folder.iterdir()} == set(load_state(fleet.state).batches)
 
 
-def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
+def test_rows_of_vanished_units_are_kept_and_their_open_quarantine_is_withdrawn(fleet):
     fleet.put("t0/2024-05-13/A_1.txt", "damaged")
     fleet.run()
     for i in (0, 1):
@@ -226,7 +226,7 @@ def test_vanished_units_keep_their_rows_and_open_quarantine_is_withdrawn(fleet):
     assert fleet.run().quarantined == 1
 
 
-def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_alone(fleet):
+def test_a_file_that_vanishes_during_the_run_affects_only_its_unit(fleet):
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
     summary = fleet.run(plan=False)
@@ -234,14 +234,14 @@ def test_a_file_that_vanishes_during_the_run_is_a_row_or_an_error_of_its_unit_al
 
 
 @pytest.mark.parametrize("has_its_time", [True, False])
-def test_a_file_that_was_gone_and_comes_back_as_it_was_is_computed(has_its_time, fleet):
-    """Copied back with its time, it is as the plan of the night without it had it."""
+def test_a_missing_file_is_computed_when_it_is_restored(has_its_time, fleet):
+    """If it is copied back with its time, it equals the file in the plan of the run without it."""
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     path = fleet.raw / "t0/2024-05-13/A_1.txt"
     content, times = path.read_bytes(), (path.stat().st_atime_ns, path.stat().st_mtime_ns)
     path.unlink()
     assert fleet.run(plan=False).quarantined == 1
-    assert fleet.run(plan=False).processed == 0  # still gone: nothing new
+    assert fleet.run(plan=False).processed == 0  # still missing: nothing new
     path.write_bytes(content)
     if has_its_time:
         os.utime(path, ns=times)
@@ -250,7 +250,7 @@ def test_a_file_that_was_gone_and_comes_back_as_it_was_is_computed(has_its_time,
 
 
 def test_a_file_that_changed_since_the_plan_is_computed_again(fleet):
-    """The result is of the new content, and the next night computes it once more: it may have been half written."""
+    """The result is that of the new content; the next run repeats it, as the file may have been incomplete."""
     write_plans(fleet.configuration, fleet.raw, fleet.plan.parent, 1)
     fleet.put("t0/2024-05-13/A_1.txt", "longer than it was")
     assert fleet.run(plan=False).processed == 3
@@ -260,7 +260,7 @@ def test_a_file_that_changed_since_the_plan_is_computed_again(fleet):
 
 
 def test_a_file_that_changes_while_it_is_computed_is_computed_again(fleet):
-    """A writer gives the file other content of the same size and time: only its number differs."""
+    """The new content has the same size and time: only the inode of the file differs."""
     path = fleet.raw / "t0/2024-05-13/A_1.txt"
     times = (path.stat().st_atime_ns, path.stat().st_mtime_ns)
 
@@ -281,12 +281,12 @@ def test_a_file_that_changes_while_it_is_computed_is_computed_again(fleet):
     assert fleet.run(stage=stage).processed == 0
 
 
-def test_one_turnout_alone(fleet):
+def test_a_run_can_be_limited_to_one_turnout(fleet):
     assert fleet.run(only=["t1"]).processed == 1 and CALLS == ["t1/A/2024-05-13"]
     assert fleet.run().processed == 2
 
 
-def test_a_context_is_part_of_the_key_and_handed_on(fleet):
+def test_a_context_is_part_of_the_key_and_an_argument_of_the_function(fleet):
     seen = []
 
     def compute(unit, turnout, raw_root, algo, context):
@@ -313,7 +313,7 @@ def test_a_row_that_cannot_be_written_is_a_fault_of_its_unit(fleet):
 
 
 @pytest.mark.parametrize("content", ['{"batches":[],"unit":{\n\n}}\n', "no JSON\n}}\n"])
-def test_a_state_file_that_somebody_else_wrote_is_said(fleet, content):
+def test_a_state_file_of_another_program_is_an_error(fleet, content):
     fleet.run()
     fleet.state.write_text(content)
     with pytest.raises(TurnoutError, match=r"not a state file .* Delete it and .*00of01\.done: its shard is then"):
@@ -322,7 +322,7 @@ def test_a_state_file_that_somebody_else_wrote_is_said(fleet, content):
     assert fleet.run().processed == 3
 
 
-def test_a_batch_reads_as_it_was_written(fleet):
+def test_a_batch_is_read_as_it_was_written(fleet):
     fleet.run()
     (path,) = batch_paths([fleet.state])
     assert [(u, t, len(r)) for u, t, r in read_batch(path)] == [
@@ -352,7 +352,7 @@ def test_the_units_of_a_damaged_batch_are_computed_again(fleet, damage, caplog):
     assert fleet.run().processed == 0
 
 
-def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeypatch):
+def test_a_stage_that_uses_a_damaged_batch_requests_it_again(fleet, monkeypatch):
     class Params(dict):
         __getattr__ = dict.__getitem__
 
@@ -371,22 +371,22 @@ def test_a_stage_that_builds_on_a_damaged_batch_asks_for_it_again(fleet, monkeyp
     assert read_postponed(fleet.state) == (1, {})
 
 
-def test_results_that_count_are_those_of_the_last_batch_and_of_the_last_number_of_shards(fleet):
-    def told():
+def test_current_results_are_those_of_the_last_batch_and_the_last_number_of_shards(fleet):
+    def results():
         return [(r.unit, r.algo) for r in current_results(fleet.folder / "work", "hammer", "t1")]
 
     fleet.run()
-    assert told() == [("t1/hammer/A/2024-05-13", "1")]
+    assert results() == [("t1/hammer/A/2024-05-13", "1")]
     fleet.run(algo="2", only=["t1"])
-    assert told() == [("t1/hammer/A/2024-05-13", "2")]
-    assert len(batch_paths([fleet.state])) == 2  # what was computed before is still in its batch
+    assert results() == [("t1/hammer/A/2024-05-13", "2")]
+    assert len(batch_paths([fleet.state])) == 2  # the earlier result is still in its batch
     older = fleet.state.with_name("00of02.json")
     older.write_bytes(fleet.state.read_bytes())
     os.utime(older, ns=(0, 0))
-    assert told() == [("t1/hammer/A/2024-05-13", "2")]
+    assert results() == [("t1/hammer/A/2024-05-13", "2")]
 
 
-def test_a_token_may_speak_of_each_unit(fleet):
+def test_a_token_can_depend_on_the_unit(fleet):
     fleet.put("t1/2024-06-13/A_1.txt", "later")
     newest = ["2024-05-13"]
     stage = Stage(
@@ -400,7 +400,7 @@ def test_a_token_may_speak_of_each_unit(fleet):
 
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("text", ["no package", "no package for a record"])
-def test_a_missing_package_stops_the_run_and_sets_no_file_aside(text, threads, fleet):
+def test_a_missing_package_stops_the_run_and_puts_no_file_in_quarantine(text, threads, fleet):
     fleet.put("t1/2024-05-13/A_1.txt", text)
     with pytest.raises(InstallationError, match="package h5py"):
         fleet.run(threads=threads)

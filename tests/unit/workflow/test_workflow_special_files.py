@@ -1,4 +1,4 @@
-"""A name that stands for no file, and any error code of one file, concerns that file; all other units are computed."""
+"""A name that is no regular file, or an error code of one file, affects only that file; other units are computed."""
 
 import errno
 import json
@@ -26,7 +26,7 @@ OTHERS = {"t0/hammer/A/2024-05-13", "t2/hammer/A/2024-05-13"}
 UNIT = "t1/hammer/A/2024-05-13"
 
 
-def put_socket(path):
+def make_socket(path):
     folder = os.getcwd()
     os.chdir(path.parent)  # the name of a socket has at most 107 bytes
     try:
@@ -36,42 +36,42 @@ def put_socket(path):
         os.chdir(folder)
 
 
-def put_device(path):
+def make_device(path):
     try:
-        os.mknod(path, stat.S_IFCHR | 0o666, os.makedev(1, 5))  # /dev/zero: it has no end
+        os.mknod(path, stat.S_IFCHR | 0o666, os.makedev(1, 5))  # /dev/zero: reading it never ends
     except PermissionError:
-        pytest.skip("only root may make a device file")
+        pytest.skip("only root can create a device file")
 
 
-def put_sparse(path):
-    """A size of 1 TB with a few bytes in it."""
+def make_sparse_file(path):
+    """A file with a size of 1 TB and a content of a few bytes."""
     with path.open("wb") as stream:
         stream.write(b"1 2\n")
         stream.truncate(10**12)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "uff", "tdms", "h5", "mat", "wav", "lvm", "npz", "parquet"])
-def test_a_sparse_file_is_named_without_reading_it(tmp_path, suffix):
-    put_sparse(tmp_path / f"A7_1.{suffix}")
+def test_a_sparse_file_is_rejected_without_reading_it(tmp_path, suffix):
+    make_sparse_file(tmp_path / f"A7_1.{suffix}")
     with pytest.raises(ReadError, match=f"A7_1.{suffix}, the file: it has a size of 1000000000000 bytes") as caught:
         read(f"A7_1.{suffix}", tmp_path, RawDescription(channels=()))
     assert caught.value.reason == "claims_too_much"
 
 
-def put_dangling_link(path):
+def make_dangling_link(path):
     path.symlink_to(path.with_name("nothing"))
 
 
-# kind: how it is made, what the plan says of it, reason
+# kind: function that creates it, message of the plan, reason
 NO_FILES = {
-    "sparse file": (put_sparse, "has a size of 1000000000000 bytes", "claims_too_much"),
-    "dangling link": (put_dangling_link, "leads to nothing", "unreadable"),
+    "sparse file": (make_sparse_file, "has a size of 1000000000000 bytes", "claims_too_much"),
+    "dangling link": (make_dangling_link, "leads to nothing", "unreadable"),
     "link in a circle": (lambda path: path.symlink_to(path.name), os.strerror(errno.ELOOP), "unreadable"),
 }
 
 
 @pytest.mark.parametrize("kind", NO_FILES)
-def test_a_name_without_content_is_named_by_the_plan_and_all_others_are_computed_every_night(fleet, kind):
+def test_the_plan_reports_a_name_without_content_in_every_run_and_all_others_are_computed(fleet, kind):
     make, finding, reason = NO_FILES[kind]
     path = fleet.raw / "t1/2024-05-13/A_1.txt"
     path.unlink()
@@ -84,11 +84,11 @@ def test_a_name_without_content_is_named_by_the_plan_and_all_others_are_computed
         assert finding in problems[0]["found"]
 
 
-SPECIAL = {"socket": put_socket, "pipe": os.mkfifo, "character device": put_device, "folder": os.mkdir}
+SPECIAL = {"socket": make_socket, "pipe": os.mkfifo, "character device": make_device, "folder": os.mkdir}
 
 
 @pytest.mark.parametrize("kind", [kind for kind in SPECIAL if kind != "folder"])
-def test_what_is_no_file_is_named_by_the_plan_and_all_others_are_computed_every_night(fleet, kind):
+def test_the_plan_reports_a_special_file_in_every_run_and_all_others_are_computed(fleet, kind):
     path = fleet.raw / "t1/2024-05-13/A_1.txt"
     path.unlink()
     SPECIAL[kind](path)
@@ -102,14 +102,14 @@ def test_what_is_no_file_is_named_by_the_plan_and_all_others_are_computed_every_
 
 
 @pytest.mark.parametrize("kind", SPECIAL)
-def test_a_reader_names_it_without_opening_it(tmp_path, kind):
+def test_a_reader_rejects_a_special_file_without_opening_it(tmp_path, kind):
     SPECIAL[kind](tmp_path / "A7_1.uff")
     with pytest.raises(ReadError, match=f"A7_1.uff, the path: it is a {kind}"):
         read("A7_1.uff", tmp_path, RawDescription(channels=()))
 
 
 @pytest.mark.parametrize("kind", SPECIAL)
-def test_a_file_that_became_something_else_after_the_plan_holds_back_nothing(fleet, kind):
+def test_a_special_file_that_replaced_a_file_after_the_plan_delays_nothing(fleet, kind):
     fleet.run()
     path = fleet.raw / "t1/2024-05-13/A_1.txt"
     (planned,) = [p for p in read_plan(fleet.plan) if p.unit.turnout == "t1"]
@@ -119,7 +119,7 @@ def test_a_file_that_became_something_else_after_the_plan_holds_back_nothing(fle
 
 
 @pytest.mark.parametrize("name", ["campaigns.csv", "trains.csv"])
-def test_notes_that_are_a_pipe_do_not_stop_the_plan(fleet, name):
+def test_a_pipe_in_place_of_notes_does_not_stop_the_plan(fleet, name):
     os.mkfifo(fleet.raw / "t1" / name)
     fleet.run()
     assert set(fleet.lengths()) >= OTHERS
@@ -127,17 +127,17 @@ def test_notes_that_are_a_pipe_do_not_stop_the_plan(fleet, name):
     assert problems == ["it is a pipe, not a file"]
 
 
-VANISHED_CODES = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR}  # the file is gone: its stage says so
+VANISHED_CODES = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR}  # the file is missing: its stage reports it
 CODES = dict(enumerate(sorted(errno.errorcode), 1))  # turnout -> every code of this platform; t0 is intact
 
 
 def code_of(path):
-    """The code that the file of a turnout fails with, 0 for t0."""
+    """The error code with which the file of a turnout fails, 0 for t0."""
     return CODES.get(int(re.search(r"\bt(\d+)", str(path))[1]), 0)
 
 
-def test_any_error_code_of_one_file_leaves_its_unit_and_no_other(tmp_path, monkeypatch):
-    """The first night each file but one fails with a code of its own when it is hashed; the second night none does."""
+def test_an_error_code_of_one_file_postpones_only_its_unit(tmp_path, monkeypatch):
+    """In the first run each file but one fails with its own code when it is hashed; in the second run none fails."""
     fleet, hashed = Fleet(tmp_path, len(CODES) + 1), tasks.sha256_of
 
     def failing(path):
@@ -156,8 +156,8 @@ def test_any_error_code_of_one_file_leaves_its_unit_and_no_other(tmp_path, monke
     assert len(fleet.lengths()) == len(CODES) + 1 and read_postponed(fleet.state)[1] == {}
 
 
-def test_any_error_code_while_computing_is_said_by_unit(tmp_path):
-    """Damaged data may cause a few of them: these are rows of quarantine, all others faults of the machine."""
+def test_an_error_code_during_the_computation_is_reported_for_its_unit(tmp_path):
+    """Damaged data can cause some of the codes: these give rows of quarantine, the others are machine faults."""
     fleet = Fleet(tmp_path, len(CODES) + 1)
 
     def failing(unit, turnout, raw_root, algo=""):
@@ -172,8 +172,8 @@ def test_any_error_code_while_computing_is_said_by_unit(tmp_path):
     assert all(is_infrastructure(OSError(code, "")) for code in waiting)
 
 
-def test_a_want_of_memory_is_a_quarantine_row_the_second_night(fleet):
-    """So the night does not fail for ever; touching the file tries it again."""
+def test_a_lack_of_memory_is_a_row_of_the_quarantine_in_the_second_run(fleet):
+    """So the run does not fail for ever; the unit is tried again when its file is touched."""
     fleet.put("t1/2024-05-13/A_1.txt", "too large")
     assert str(fleet.run()) == "hammer 00of01: 3 known, 2 processed, 0 quarantined, 1 postponed"
     summary = fleet.run()
@@ -186,7 +186,7 @@ def test_a_want_of_memory_is_a_quarantine_row_the_second_night(fleet):
     assert fleet.rows()[UNIT]["quarantine"] == []
 
 
-def test_an_attempt_of_the_same_run_is_no_second_night(fleet):
+def test_further_attempts_in_the_same_run_are_not_counted_as_a_second_run(fleet):
     fleet.put("t1/2024-05-13/A_1.txt", "too large")
     first, second = datetime(2026, 11, 22, 2), datetime(2026, 11, 23, 2)
     for _ in range(3):
@@ -200,8 +200,8 @@ def quarantine(fleet, unit=UNIT):
 
 
 @pytest.mark.parametrize("when", ["hashed", "computed"])
-def test_every_error_code_that_stays_is_a_quarantine_row_the_second_night(tmp_path, monkeypatch, when):
-    """Every code of the platform at once, each at a file of its own: no unit is left for a third night."""
+def test_every_permanent_error_code_is_a_row_of_the_quarantine_in_the_second_run(tmp_path, monkeypatch, when):
+    """Every code of the platform at once, each for its own file: no unit is left for a third run."""
     fleet, hashed = Fleet(tmp_path, len(CODES) + 1), tasks.sha256_of
 
     def fail(path):
@@ -231,7 +231,7 @@ def test_every_error_code_that_stays_is_a_quarantine_row_the_second_night(tmp_pa
             assert reason == ("internal_error" if code in DATA_ERRNOS and when == "computed" else "read_fault")
             assert f"[Errno {code}]" in found and str(tmp_path) not in found
     assert len(first.units) == len(CODES) + 1
-    summary = fleet.run(stage=stage)  # the third night tries them again and finds the same
+    summary = fleet.run(stage=stage)  # the third run tries the units again with the same result
     assert (summary.processed, summary.postponed) == (0, 0) and load_state(fleet.state) == first
     monkeypatch.undo()
     assert fleet.run().retried == 0
@@ -240,8 +240,8 @@ def test_every_error_code_that_stays_is_a_quarantine_row_the_second_night(tmp_pa
     ]
 
 
-def unreadable(monkeypatch, *names):
-    """Let files with these names fail with EIO."""
+def make_unreadable(monkeypatch, *names):
+    """Make the reading of files with these names fail with EIO."""
     hashed = tasks.sha256_of
 
     def failing(path):
@@ -252,9 +252,9 @@ def unreadable(monkeypatch, *names):
     monkeypatch.setattr(tasks, "sha256_of", failing)
 
 
-def test_the_readable_files_of_a_unit_are_used_beside_one_that_stays_unreadable(fleet, monkeypatch):
+def test_the_readable_files_of_a_unit_with_a_permanently_unreadable_file_are_used(fleet, monkeypatch):
     fleet.put("t1/2024-05-13/A_2.txt", "another impact")
-    unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
+    make_unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
     assert fleet.run().postponed == 1
     assert (summary := fleet.run()).postponed == 0 and summary.retried == 1
     assert fleet.lengths()[UNIT] == [len("another impact")]
@@ -267,15 +267,15 @@ def test_the_readable_files_of_a_unit_are_used_beside_one_that_stays_unreadable(
     assert len(fleet.lengths()[UNIT]) == 3 and fleet.run().processed == 0
 
 
-def test_the_rows_of_a_file_stay_where_it_can_no_longer_be_read(fleet, monkeypatch):
-    """A new version of the program computes everything again; a disk that fails by then takes no measurement away."""
+def test_the_rows_of_a_file_that_becomes_unreadable_are_kept(fleet, monkeypatch):
+    """A new version of the program computes all units again; a disk that fails meanwhile removes no measurement."""
     fleet.run()
     before = fleet.lengths()
-    unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
+    make_unreadable(monkeypatch, "t1/2024-05-13/A_1.txt")
     for _ in range(3):
         fleet.run(algo="2")
         assert fleet.lengths() == before
-    for _ in range(2):  # and so does the next version
+    for _ in range(2):  # the next version has the same result
         fleet.run(algo="3")
         assert fleet.lengths() == before
     fleet.put("t1/2024-05-13/A_2.txt", "another impact")
@@ -288,8 +288,8 @@ def test_the_rows_of_a_file_stay_where_it_can_no_longer_be_read(fleet, monkeypat
     assert sorted(fleet.lengths()[UNIT]) == sorted([*before[UNIT], len("another impact")])
 
 
-def test_a_file_that_changes_while_it_is_computed_is_computed_again_though_it_was_put_back_with_its_time(fleet):
-    """Between its hash and its rows it holds other bytes: these rows must not stay under the hash of the first ones."""
+def test_a_file_that_changes_during_the_computation_is_computed_again_after_it_is_restored(fleet):
+    """Between hash and rows it has other bytes: these rows must not be stored under the first hash."""
     path = fleet.raw / "t1/2024-05-13/A_1.txt"
     content, times = path.read_text(), (path.stat().st_atime_ns, path.stat().st_mtime_ns)
 

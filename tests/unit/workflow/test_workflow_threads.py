@@ -1,4 +1,4 @@
-"""A stage job and a command start one BLAS thread; jobs of the registry return the memory that Arrow has freed."""
+"""Jobs of stages and commands use one BLAS thread; jobs of the registry return the memory that Arrow has freed."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ print(max([pool["num_threads"] for pool in threadpool_info()], default=1))
 """
 
 
-def test_one_thread_is_asked_for_before_numpy_comes(repository):
+def test_one_thread_is_set_before_numpy_is_imported(repository):
     two = {"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "MKL_NUM_THREADS": "2"}
     done = subprocess.run(
         [sys.executable, "-c", CODE], env=os.environ | two, capture_output=True, text=True, check=True
@@ -29,7 +29,7 @@ def test_one_thread_is_asked_for_before_numpy_comes(repository):
     assert calls[:2] == ["from turnout.threads import use_one_thread", "use_one_thread()"]
 
 
-def test_a_command_asks_for_one_thread_before_numpy_comes():
+def test_a_command_sets_one_thread_before_numpy_is_imported():
     code = "import sys, turnout.cli.main as m; m.use_one_thread = lambda: sys.exit('numpy' in sys.modules)"
     code += "; m.main(['check'])"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -1,4 +1,4 @@
-"""Two runs in one folder: the second one ends before it changes anything that the first one needs."""
+"""Two runs in one folder: the second run ends before it changes anything that the first run needs."""
 
 import pytest
 from filelock import FileLock
@@ -22,7 +22,7 @@ def test_a_second_run_changes_no_plan_of_the_first(fleet, monkeypatch):
     assert {path: path.read_bytes() for path in fleet.plan.parent.iterdir()} != before
 
 
-def test_a_run_keeps_others_out_until_its_process_ends(fleet, monkeypatch):
+def test_a_run_holds_its_lock_until_its_process_ends(fleet, monkeypatch):
     fleet.run()
     monkeypatch.chdir(fleet.folder)
     launch({}, scan=True)
