@@ -18,7 +18,7 @@ OTHER_MEANINGS = {
     "location": "a parameter of the public function simulate_hammer",
     "place": "to take place; a column of the quarantine table",
     "points": "points of fit, percent",
-    "sound": "the last line of a night, read by scripts of users; the sound level of a passage",
+    "sound": "the sound level of a passage",
     "twin": "the same case without its effect",
     "what is left": "the remainder of a division",
     "where receptance is meant": "a remark",

@@ -162,7 +162,7 @@ def test_the_commands_of_the_tutorial_give_the_shown_output(installed, repositor
     assert len((project / "README.md").read_text(encoding="utf-8").splitlines()) <= 10
     (project / "Snakefile").unlink()  # a project needs neither its own Snakefile nor profiles
     shutil.rmtree(project / "profiles")
-    assert "sound: 2 units known, 0 processed" in call("turnout", "nightly", cwd=project)
+    assert "ok: 2 units known, 0 processed" in call("turnout", "nightly", cwd=project)
 
 
 def test_init_does_not_change_an_existing_project(installed):

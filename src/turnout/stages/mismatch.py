@@ -22,10 +22,10 @@ from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.mismatch_groups import Group, groups, members_of
-from turnout.stages.mismatch_inputs import gather_inputs
+from turnout.stages.mismatch_inputs import Note, gather_inputs
 from turnout.stages.mismatch_rows import finding_tables
 from turnout.stages.raw_files import quarantine_row
-from turnout.stages.track_files import digest_of_model, track_of
+from turnout.stages.track_files import digest_of_model, improbable_entries, track_of
 from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
@@ -139,6 +139,7 @@ def diagnose_visit(
     track, accepted = track_of(turnout, options.track)
     units = members_of(unit, scan(turnout, Path(raw_root)).units)
     inputs = gather_inputs(units, turnout, raw_root, track, passage_tables)
+    inputs.notes += [Note(f"improbable: {entry}") for entry in improbable_entries(turnout, options.track)]
     contents = [[path, _content_hash(Path(raw_root) / path)] for path, *_ in unit.files]
     identity = digest(
         [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]

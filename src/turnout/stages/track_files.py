@@ -14,6 +14,7 @@ from turnout.errors import SimulationError, TurnoutError
 from turnout.simulate import load_track
 from turnout.simulate.parameters import base_track_file
 from turnout.stages.accepted_effects import effects_of
+from turnout.stages.parameter_ranges import improbable_values
 
 if TYPE_CHECKING:
     from turnout.simulate import TurnoutTrack
@@ -99,6 +100,35 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
     paths += sorted(own_file.parent.glob("*.y*ml")) if name else []
     digests = [[path.name, sha256_of(path)] for path in dict.fromkeys(paths) if path.is_file()]
     return hashlib.sha256(json.dumps(digests).encode()).hexdigest()[:16]
+
+
+def improbable_entries(turnout: TurnoutConfig, name: str | None = None) -> list[str]:
+    """Numbers that no track or vehicle has, in the files that a diagnosis of the turnout uses.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    name : str or None
+        Name or file of a track; None: the turnout's own, else that of its layout.
+
+    Returns
+    -------
+    list of str
+        One sentence per number, with file, line and entry.
+
+    Raises
+    ------
+    SimulationError
+        There is no track file.
+    """
+    sentences: list[str] = []
+    for path in (*_extended_files(track_file(turnout, name)), *(Path(turnout.folder) / "vehicles").glob("*.yaml")):
+        try:
+            sentences += map(str, improbable_values(read_parameters(path)))
+        except (TurnoutError, OSError):
+            continue  # whoever uses the file reports it; axle patterns are no parameters
+    return sorted(sentences)
 
 
 def _extended_files(path: Path) -> list[Path]:

@@ -60,7 +60,7 @@ class NightReport:
     reason: str = ""
 
     def __str__(self) -> str:
-        well = "every job ran, but nothing could be used" if self.nothing_usable else "sound"
+        well = "every job ran, but nothing could be used" if self.nothing_usable else "ok"
         outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
             self.code, f"failed with exit code {self.code}"
         )

@@ -272,6 +272,15 @@ def test_a_wrong_layout_is_reported_because_of_the_track_file(soft):
     assert [f["sections"] for f in tables["mismatch_findings"]] == ["B"]
 
 
+def test_a_stiffness_with_a_wrong_prefix_is_stated_with_the_finding(soft):
+    file = soft / "config/tracks/small.yaml"
+    file.write_text(
+        file.read_text().replace("ballast_stiffness: {value: 100, unit: M", "ballast_stiffness: {value: 100, unit: ")
+    )
+    text = reported(diagnose_turnout("t1"))
+    assert re.search(r"improbable: .*small\.yaml, line \d+, support\.ballast_stiffness: 100 N/m is outside", text)
+
+
 def test_a_recording_from_another_turnout_is_not_used(soft):
     """Its sensors are three times as far apart: no known train has axles at these times."""
     near = dict(small.PLACES)
