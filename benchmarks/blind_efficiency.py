@@ -20,7 +20,7 @@ from turnout.config import load_configuration, with_raw
 from turnout.mismatch.calibrated import change_candidates, compare_onsets, estimate_history
 from turnout.mismatch.calibrated.file_comparison import evidence_from_first
 from turnout.mismatch.calibrated.history import Event
-from turnout.mismatch.calibrated.levels import own_levels
+from turnout.mismatch.calibrated.levels import error_levels
 from turnout.mismatch.calibrated.model_answer import NAMES
 from turnout.mismatch.calibrated.soft_ballast_or_gap import evidence_of_gap
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
@@ -88,7 +88,7 @@ def efficiency(folder, case, truth, rows):
         by_effect, levels = list(zip(steps, gains)), None
     else:
         explained = [Event(v.time, {}, c, 1.0) for v, c in zip(visits, changes) if c]
-        levels = own_levels(parameters, visits, [*events, *explained])
+        levels = error_levels(parameters, visits, [*events, *explained])
         history = estimate_history(
             parameters, ideal, events, repeats_between_visits=False, accepted=None, levels=levels
         )

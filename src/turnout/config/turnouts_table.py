@@ -196,7 +196,7 @@ def _row(text: str, line: int, header: tuple[str, ...], name: str) -> tuple[Row,
     for title, key in ROW.items():
         if key.required and title not in row.values:
             errors.append(row.place(title).error(f"{title} is empty", f"Write {key.meaning}"))
-    if not errors and leads_out(row.raw):
+    if not errors and is_outside_root(row.raw):
         message = f"raw is {row.raw!r}, outside the raw root"
         errors.append(row.place("raw").error(message, "Write a folder below the raw root, without '..'"))
     elif "raw" in row.values:
@@ -208,7 +208,7 @@ def _row(text: str, line: int, header: tuple[str, ...], name: str) -> tuple[Row,
     return row, errors
 
 
-def leads_out(path: str) -> bool:
+def is_outside_root(path: str) -> bool:
     """Whether a relative path leads out of its folder.
 
     Parameters
@@ -223,7 +223,7 @@ def leads_out(path: str) -> bool:
 
     Examples
     --------
-    >>> leads_out("line_7/T00042"), leads_out("../other"), leads_out("/data")
+    >>> is_outside_root("line_7/T00042"), is_outside_root("../other"), is_outside_root("/data")
     (False, True, True)
     """
     return PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or "\\" in path

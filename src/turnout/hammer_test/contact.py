@@ -42,7 +42,7 @@ def measure_contact(cut: Cut, level: float) -> Contact:
     force = cut.polarity * cut.force
     top = int(np.argmax(force))
     peak = float(force[top])
-    onset, end = run_around(force, top, level * peak)
+    onset, end = interval_above_level(force, top, level * peak)
     rise, fall = crossing(force, top, 0.5 * peak, -1), crossing(force, top, 0.5 * peak, 1)
     n_quiet = max(0, min(cut.first, onset) - max(2, round(0.2 * (end - onset + 1))))
     if n_quiet >= 8:
@@ -57,7 +57,7 @@ def measure_contact(cut: Cut, level: float) -> Contact:
     )  # fmt: skip
 
 
-def run_around(x: np.ndarray, top: int, level: float) -> tuple[int, int]:
+def interval_above_level(x: np.ndarray, top: int, level: float) -> tuple[int, int]:
     """First and last index of the unbroken run of samples above ``level`` around ``top``.
 
     Parameters
@@ -76,7 +76,7 @@ def run_around(x: np.ndarray, top: int, level: float) -> tuple[int, int]:
 
     Examples
     --------
-    >>> run_around(np.array([0.0, 3, 0, 2, 5, 2, 0]), 4, 1.0)
+    >>> interval_above_level(np.array([0.0, 3, 0, 2, 5, 2, 0]), 4, 1.0)
     (3, 5)
     """
     below = np.flatnonzero(x[:top] <= level)
@@ -110,7 +110,7 @@ def crossing(x: np.ndarray, top: int, level: float, step: int) -> float:
     >>> float(crossing(x, 2, 3.0, 1)), float(crossing(x, 2, 2.5, -1))
     (2.5, 1.5)
     """
-    first, last = run_around(x, top, level)
+    first, last = interval_above_level(x, top, level)
     if step > 0:
         return float(last) if last + 1 >= x.size else last + (x[last] - level) / (x[last] - x[last + 1])
     return float(first) if first == 0 else first - (x[first] - level) / (x[first] - x[first - 1])
@@ -201,7 +201,7 @@ def further_contacts(cut: Cut, contact: Contact, settings: ReceptanceSettings) -
         is_close = lower <= k < upper
         stands_out = prominence >= max(MIN_CLOSE_PROMINENCE, noise) and contact.half_width >= MIN_CLOSE_SAMPLES
         if k != top and (not is_close or stands_out):
-            onset, end = run_around(force, k, max(FURTHER_CONTACT_LEVEL * force[k], noise / 2))
+            onset, end = interval_above_level(force, k, max(FURTHER_CONTACT_LEVEL * force[k], noise / 2))
             contacts.append(FurtherContact(onset, end, int(k), float(force[k])))
     return contacts, level
 

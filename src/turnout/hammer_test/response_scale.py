@@ -56,7 +56,7 @@ def judge_response_scale(impacts: Sequence[Impact], response: str) -> tuple[Impa
     tuple of Impact
         The impacts, with a rejection "out_of_scale" in the accepted ones if the test is out of scale.
     """
-    measured = rails_that_resist([i for i in impacts if i.accepted])
+    measured = equivalent_free_rails([i for i in impacts if i.accepted])
     if measured is None or measured.is_track:
         return tuple(impacts)
     rails, limits = measured.rails, measured.limits
@@ -77,7 +77,7 @@ class Resistance(NamedTuple):
     is_track: bool
 
 
-def rails_that_resist(impacts: Sequence[Impact]) -> Resistance | None:
+def equivalent_free_rails(impacts: Sequence[Impact]) -> Resistance | None:
     r"""Mobility of a free rail 54E1 over that of the impacts, at a real Laplace variable.
 
     .. math:: \frac{Y_{54E1}(s)}{Y(s)}, \qquad Y(s) = \frac{\sum F(s) A(s)}{s \sum F(s)^2}, \qquad

@@ -15,7 +15,7 @@ from turnout.hammer_test.response_order import (
     judge_response_order,
 )
 from turnout.hammer_test.response_quality import find_track_impacts
-from turnout.hammer_test.response_scale import rails_that_resist
+from turnout.hammer_test.response_scale import equivalent_free_rails
 from turnout.records import Channel, Recording
 
 SECTIONS = "OT", "SP", "CLP", "A7", "A8", "A9", "ASM", "ASD"
@@ -105,7 +105,7 @@ def test_a_velocity_in_mm_s_is_rejected_with_its_reason_and_an_acceleration_is_a
 def test_the_scale_of_a_response_alone_does_not_reveal_a_velocity():
     """The scale alone corresponds to 2.2 times the actual number of rails, as at a crossing."""
     impacts = [i for i in find_impacts(hammer_test("SP", (1.0, 1.0), 1), "force", "rail") if i.accepted]
-    assert rails_that_resist(impacts).is_track
+    assert equivalent_free_rails(impacts).is_track
 
 
 @pytest.mark.parametrize("section", ["OT", "A9"])

@@ -8,7 +8,7 @@ from scipy import signal
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test.response_quality import find_track_impacts, response_lag
-from turnout.hammer_test.response_scale import RATES, free_rail_mobility, rails_that_resist
+from turnout.hammer_test.response_scale import RATES, equivalent_free_rails, free_rail_mobility
 from turnout.records import Channel, Recording
 
 RATE = 20000.0
@@ -39,7 +39,7 @@ def test_an_intact_test_is_accepted_with_the_mobility_of_its_modes(impact_sample
         free_rail_mobility(s) / sum(s / m / (s**2 + 2 * zeta * w * s + w**2) for m, w, zeta in modes) for s in RATES
     )
     expected = low * (high / low) ** (-RATES[0] / (RATES[1] - RATES[0]))
-    assert rails_that_resist(impacts).rails == pytest.approx(expected, rel=0.05)
+    assert equivalent_free_rails(impacts).rails == pytest.approx(expected, rel=0.05)
     assert 0 <= np.median([response_lag(i) for i in impacts]) <= 5
 
 

@@ -19,8 +19,8 @@ from turnout.hammer_test.response_scale import (
     SHEAR_COEFFICIENT,
     SHEAR_MODULUS,
     YOUNGS_MODULUS,
+    equivalent_free_rails,
     free_rail_mobility,
-    rails_that_resist,
 )
 from turnout.records import Channel, Recording
 
@@ -36,7 +36,7 @@ def track_test(section, ballast=1.0, railpad=1.0, n=5, seed=1):
 
 
 def rails_of(recordings):
-    return rails_that_resist([i for i in find_impacts(recordings, "force", "rail") if i.accepted])
+    return equivalent_free_rails([i for i in find_impacts(recordings, "force", "rail") if i.accepted])
 
 
 def random_foundation(rng, s):
@@ -81,12 +81,12 @@ def test_rails_and_crossings_are_within_the_range_and_outside_with_the_smallest_
 def test_tracks_are_accepted_and_each_factor_is_found(section, ballast, railpad):
     found = find_impacts(track_test(section, ballast, railpad), "force", "rail")
     impacts = [i for i in found if i.accepted]
-    rails, limits, is_track = rails_that_resist(impacts)
+    rails, limits, is_track = equivalent_free_rails(impacts)
     assert RAILS[0] <= rails <= RAILS[1] and limits == RAILS and is_track
     for factor in FACTORS:
         scaled = [replace(i, acceleration=i.acceleration * factor, noise_acceleration=i.noise_acceleration * factor)
                   for i in impacts]  # fmt: skip
-        assert not rails_that_resist(scaled).is_track, factor
+        assert not equivalent_free_rails(scaled).is_track, factor
 
 
 @pytest.mark.parametrize("channel", [0, 1])
@@ -131,4 +131,4 @@ def test_a_single_mass_of_a_heavy_track_is_accepted_and_not_ten_times_as_much():
 
 
 def test_without_impacts_or_response_there_is_no_value():
-    assert rails_that_resist([]) is None
+    assert equivalent_free_rails([]) is None

@@ -14,7 +14,7 @@ from turnout.mismatch.calibrated import (
     VisitInformation,
     estimate_history,
 )
-from turnout.mismatch.calibrated.information import marginalize, repeated_error_weights, with_own_values
+from turnout.mismatch.calibrated.information import marginalize, repeated_error_weights, with_visit_deviations
 
 N_MASS = 4
 CHAIN = tuple(
@@ -215,7 +215,7 @@ def test_deviations_of_a_visit_add_to_the_covariance_of_its_data():
     rng = np.random.default_rng(5)
     rows, y, sds = rng.normal(size=(8, 4)), rng.normal(size=8), np.array([0.0, 0.7, 0.0, 2.0])
     precision = np.linalg.inv(np.eye(8) + rows @ np.diag(sds**2) @ rows.T)
-    matrix, vector = with_own_values(rows.T @ rows, rows.T @ y, sds)
+    matrix, vector = with_visit_deviations(rows.T @ rows, rows.T @ y, sds)
     assert_allclose(matrix, rows.T @ precision @ rows, atol=1e-12)
     assert_allclose(vector, rows.T @ precision @ y, atol=1e-12)
 

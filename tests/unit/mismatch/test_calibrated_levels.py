@@ -17,7 +17,7 @@ from turnout.mismatch.calibrated import (
 )
 from turnout.mismatch.calibrated.file_comparison import model_error, model_error_sds
 from turnout.mismatch.calibrated.history import Event
-from turnout.mismatch.calibrated.levels import own_levels
+from turnout.mismatch.calibrated.levels import error_levels
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 
 SUPPORTS = tuple(StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.0, "ballast", k, 0.6 * k) for k in range(9))
@@ -41,7 +41,7 @@ def visits_with(rng, repeated, n_visit=5, change=0.0, first=2, group="A: impacts
 def test_the_level_is_the_share_of_the_variance_that_does_not_repeat(repeated):
     """Mean of n = 200 turnouts with 4 later visits, of which the stated variance counts as a fifth."""
     rng = np.random.default_rng(5)
-    found = [own_levels(SUPPORTS, visits_with(rng, repeated, sd=0.005))["A: impacts at 1.20 m"] for _ in range(200)]
+    found = [error_levels(SUPPORTS, visits_with(rng, repeated, sd=0.005))["A: impacts at 1.20 m"] for _ in range(200)]
     if repeated:
         assert np.mean(found) == pytest.approx((1.0 + 4 * (1.0 - repeated)) / 5, abs=0.02)
     else:
@@ -56,7 +56,7 @@ def test_the_level_is_the_same_if_a_visit_has_less_information_than_the_file():
     1 + 1 / (k + 1) that is expected.
     """
     rng = np.random.default_rng(15)
-    found = [own_levels(SUPPORTS, visits_with(rng, 0.8, sd=1.0))["A: impacts at 1.20 m"] for _ in range(200)]
+    found = [error_levels(SUPPORTS, visits_with(rng, 0.8, sd=1.0))["A: impacts at 1.20 m"] for _ in range(200)]
     k = np.arange(1, 5)
     innovations = (0.8 / (k + 1) ** 2 + 0.2 * (1.0 + k / (k + 1) ** 2)) / (1.0 + 1.0 / (k + 1))
     assert np.mean(found) == pytest.approx((1.0 + innovations.sum()) / 5, abs=0.02)
@@ -100,10 +100,10 @@ def test_a_group_that_first_appears_at_a_later_visit_has_its_full_error():
     visits = visits_with(rng, 0.8)
     other = visits_with(rng, 0.8, 3, group="A: impacts at 3.00 m")
     mixed = [*visits, *(VisitInformation(f"w{k}", 3.0 + k, v.groups) for k, v in enumerate(other))]
-    assert set(own_levels(SUPPORTS, mixed)) == {"A: impacts at 1.20 m"}
+    assert set(error_levels(SUPPORTS, mixed)) == {"A: impacts at 1.20 m"}
     fast = visits_with(rng, 0.8, group="A: locomotive, 120 km/h")
     slow = visits_with(rng, 0.8, 1, group="A: locomotive, 110 km/h")
-    assert set(own_levels(SUPPORTS, [*fast, VisitInformation("w", 4.0, slow[0].groups)])) == {
+    assert set(error_levels(SUPPORTS, [*fast, VisitInformation("w", 4.0, slow[0].groups)])) == {
         "A: locomotive, 120 km/h", "A: locomotive, 110 km/h",
     }  # fmt: skip
 
@@ -128,8 +128,8 @@ def test_a_change_below_the_stated_errors_is_named_by_the_scatter_of_the_turnout
 
 def test_a_change_does_not_raise_the_level_once_it_is_modelled():
     visits = visits_with(np.random.default_rng(9), 0.9, change=-1.2)
-    raised = own_levels(SUPPORTS, visits)["A: impacts at 1.20 m"]
-    explained = own_levels(SUPPORTS, visits, [Event(1.0, {NAMES[4]: 1.0})])["A: impacts at 1.20 m"]
+    raised = error_levels(SUPPORTS, visits)["A: impacts at 1.20 m"]
+    explained = error_levels(SUPPORTS, visits, [Event(1.0, {NAMES[4]: 1.0})])["A: impacts at 1.20 m"]
     assert explained < 0.5 < raised
 
 

@@ -14,7 +14,7 @@ from turnout.mismatch.calibrated.change_course import courses_of
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
-from turnout.mismatch.calibrated.levels import own_levels
+from turnout.mismatch.calibrated.levels import error_levels
 from turnout.mismatch.calibrated.model_answer import (
     CHANGE,
     NAMES,
@@ -222,14 +222,14 @@ def _evidence_of_changes(
     Where an alarm asks, a change of any size is stated: there the errors are the stated ones.
     """
     ordinary = [c for c in candidates if not is_under_load(c)]
-    levels = {} if is_alarmed else own_levels(parameters, visits, events)
+    levels = {} if is_alarmed else error_levels(parameters, visits, events)
     for is_last in (is_alarmed, True):
         history = _history_of_changes(parameters, visits, events, levels)
         evidence = compare_onsets(history, ordinary)
         if is_last or not evidence:
             break
         change = _events_of_change(evidence[0], parameters, ordinary)
-        levels = own_levels(parameters, visits, [*events, *change])
+        levels = error_levels(parameters, visits, [*events, *change])
     return levels, history, with_evidence_under_load(evidence, parameters, visits, events, candidates, levels)
 
 

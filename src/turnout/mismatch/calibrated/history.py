@@ -14,7 +14,7 @@ import numpy as np
 
 from turnout.mismatch.calibrated.belief import Belief, Innovation, StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights, with_own_values
+from turnout.mismatch.calibrated.information import VisitInformation, repeated_error_weights, with_visit_deviations
 
 BEFORE_ALL = -np.inf  # time of an event before all visits
 
@@ -109,7 +109,7 @@ def estimate_history(
         Visits that are used whatever their innovation. None: all.
     levels : mapping or None
         Group -> variance of what its errors do not repeat from visit to visit, over the variance of its errors, as
-        ``own_levels``. None: 1. For changes alone.
+        ``error_levels``. None: 1. For changes alone.
     constant_errors : bool
         Whether the values before all visits have the error of the model that all visits share, see
         ``Belief.with_constant_error``. Then the first visit tells it, and it cancels in a change. Otherwise each visit
@@ -136,14 +136,14 @@ def estimate_history(
     prior = Belief.of_file(parameters).with_noise(noise.before_all())
     if constant_errors and ordered:
         of_first = ordered[0].total(names, repeated_error_weights(ordered[:1], repeated_share))
-        prior = prior.with_constant_error(with_own_values(*of_first, own_sds)[0])
+        prior = prior.with_constant_error(with_visit_deviations(*of_first, own_sds)[0])
     belief, time = prior, ordered[0].time if ordered else 0.0
     for visit in ordered:
         predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief
         own_weights = repeated_error_weights([visit], repeated_share)
         repeated = {g.group: own_weights[g.group] / (levels or {}).get(g.group, 1.0) for g in visit.groups}
         total = visit.total(names, {**repeated, **(weights or {})})
-        matrix, vector = with_own_values(*total, own_sds)
+        matrix, vector = with_visit_deviations(*total, own_sds)
         test = tested.get(visit.visit)
         innovation = test.innovation if test else predicted.innovation(matrix, vector)
         is_used = test.is_used if test else accepted is None or visit.visit in accepted or innovation.is_expected

@@ -53,7 +53,7 @@ def marginalize(
     return 0.5 * (remaining + remaining.T), vector[a] - weights @ vector[b]
 
 
-def with_own_values(matrix: np.ndarray, vector: np.ndarray, sds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def with_visit_deviations(matrix: np.ndarray, vector: np.ndarray, sds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     r"""Information of a visit on values to which it adds deviations of its own, which are integrated out.
 
     .. math:: \Lambda' = \Lambda - \Lambda S (1 + S \Lambda S)^{-1} S \Lambda, \quad
@@ -77,7 +77,7 @@ def with_own_values(matrix: np.ndarray, vector: np.ndarray, sds: np.ndarray) -> 
 
     Examples
     --------
-    >>> matrix, vector = with_own_values(np.array([[4.0]]), np.array([8.0]), np.array([0.5]))
+    >>> matrix, vector = with_visit_deviations(np.array([[4.0]]), np.array([8.0]), np.array([0.5]))
     >>> matrix.tolist(), vector.tolist()  # the variance 1/4 of the data and 1/4 of the visit add up
     ([[2.0]], [4.0])
     """

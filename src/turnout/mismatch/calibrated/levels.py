@@ -30,7 +30,7 @@ def kind_of(group: str) -> str:
     return IMPACTS if IMPACTS in group else TRAINS
 
 
-def own_levels(
+def error_levels(
     parameters: Sequence[StateParameter], visits: Sequence[VisitInformation], events: Sequence[Event] = ()
 ) -> dict[str, float]:
     r"""Variance of the errors that do not repeat from visit to visit, over the stated variance, by group.
