@@ -165,6 +165,7 @@ def conversion(unit: str) -> Conversion:
     0.0
     """
     text = unit.strip().strip("[]").replace("\u03bc", "µ").strip()
+    text = re.sub(r"/\(([^()/*·]+)\)$", r"/\1", text)  # "m/(s^2)"
     factor = 1.0
     if (match := _NUMBER.match(text)) and text not in _CANONICAL:
         factor, text = float(match[1]), match[2].strip()

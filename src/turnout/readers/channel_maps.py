@@ -161,8 +161,8 @@ def index_of(
             return names.index(key)
     if wanted in record.not_numbers:
         content = record.not_numbers[wanted]
-        problem = f"the channel {wanted!r} holds {content}, no real numbers"
-        remedy = "Export its samples as whole or floating-point numbers"
+        problem = f"the channel {wanted!r} holds {content}"
+        remedy = "Export its samples as whole or floating-point numbers, at the rate of the other channels"
         if isinstance(content, UnreadObject):
             problem = f"the channel {wanted!r} is {content.with_article}, no array of real numbers"
             remedy = content.remedy(wanted)

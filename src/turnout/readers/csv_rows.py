@@ -19,7 +19,7 @@ from turnout.readers.csv_cells import (
     decode_line,
     first_cells,
 )
-from turnout.readers.csv_header import entries_of_lines
+from turnout.readers.csv_entries import entries_of_lines
 from turnout.readers.csv_row_reader import N_SUMMARY_ROWS, RowReader
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
@@ -125,7 +125,7 @@ def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) 
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
         line = data[start:end].strip()
-        if line and not re.match(rb'["#;,\t|]*(?!(?i:nan|inf(?:inity)?)\b)[A-Za-z\x80-\xff]', line):
+        if line and not re.match(rb"[\W_]*(?!(?i:nan|inf(?:inity)?)\b)[A-Za-z\x80-\xff]", line):
             break
         has_number = any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:])
         if has_number and not STATISTICS.match(decode_line(line)):

@@ -16,7 +16,7 @@ from functools import lru_cache
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.other_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.precision import Interval, readings
-from turnout.readers.rate_units import SECONDS, RateUnit, rate_unit, words_of
+from turnout.readers.rate_units import CYRILLIC, SECONDS, RateUnit, rate_unit, words_of
 from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
 from turnout.readers.scale_words import (
     LEVELS,
@@ -61,11 +61,18 @@ GROUPED_DIGITS = re.compile(r"\d{1,3} \d{3}\b")
 PIECES = re.compile(r"[;|\n]|,(?!\d)")
 NAMED = re.compile(r"(?:.*[:=]\s*)?([^\W\d][^:=]{0,40}?)\s*[:=]\s*([^:=]+|\d+\s?:\s?\d+)")
 PART_OF_SECOND = re.compile(r"\b1\s?/\s?(\d[\d.,' ]*)\s?(s|sec|ms)\b")  # "1/20000 s"
+# Words of a name that means the duration of the recording: "Duration [s]", "Total measurement time", "Messdauer".
+DURATION_WORD = re.compile(
+    r"durations?|dauer|duree|durata|duracion|varighed|(?:mess|aufnahme|aufzeichnungs)(?:dauer|zeit)|acquisition|mesure"
+    r"|misura|medicion|recor(?:d|ding|ded)|measur(?:ement|ing|ed)"
+)
+BESIDE_DURATION = frozenset("total time length of the s sec second seconds min".split())
 RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
 # How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
 CONVERSION = re.compile(
     r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?!1(?![\d.,]))\d|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
-    r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
+    r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:re)?scaled\b[^\d;,]{0,8}\d"
+    r"|\bslope\b[^;]{1,20}\b(?:intercept|offset)\b|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
     rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
     r"|(?:/\s?|\bper\s)(?:bit|lsb|count|digit|code|step|adu|div)s?\b|\b(?-i:Q)\d{1,2}(?:\.\d{1,2})?\b",
     re.IGNORECASE,
@@ -98,8 +105,6 @@ CONVERTED = re.compile(
     r"|angewend\w*|applique\w*"
 )
 AFFIRMED = frozenset("yes true ja oui si on 1".split())
-# Letters of units in Russian.
-CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))
 CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
 # Names that a format defines: start of the abscissa, state of the scaling, versions, numbers of dimensions.
 STANDARD_NAMES = frozenset(
@@ -117,7 +122,7 @@ class Candidate:
     ``is_weak`` is True if only little speaks for it. ``rates`` are the sampling rates that it may mean. ``number`` is
     the bare number, NaN if it has a unit; ``unit`` the unit if the text is one; ``seconds`` the times it may mean. [s]
     ``is_of_other`` is True if the name speaks of something else: then only a number that contradicts the rate plainly
-    counts.
+    counts. ``is_of_record`` is True if the name means the duration of the recording and nothing else.
     """
 
     statement: str
@@ -128,6 +133,7 @@ class Candidate:
     unit: str = ""
     seconds: tuple[float, ...] = ()
     is_of_other: bool = False
+    is_of_record: bool = False
 
 
 @lru_cache(maxsize=16384)
@@ -337,7 +343,9 @@ def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = 
     stated = RateUnit(False, Fraction(1000)) if unit in ("k", "ks", "kS") else rate_unit(unit) if unit else None
     if stated is not None:
         if not _is_compared(name, f"{number} {unit}"):
-            yield from _of_rate(match[0], number, stated, is_weak=subject == WEAK or len(unit) == 1)
+            is_of_record = not is_part and _means_duration(name)
+            for candidate in _of_rate(match[0], number, stated, is_weak=subject == WEAK or len(unit) == 1):
+                yield replace(candidate, is_of_record=is_of_record and candidate.statement == DURATION)
     elif not unit:
         is_round = value.is_integer() and (value % 100 == 0 or value % 1024 == 0)
         if is_round and RATES_IN_TEXT[0] <= value <= RATES_IN_TEXT[1]:
@@ -350,6 +358,12 @@ def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = 
             yield Candidate(SCALE_OR_OFFSET, match[0], True)
         elif not is_part and amplitude is None and not HARMLESS_UNIT.fullmatch(unit):
             yield from _of_number(name, number, "", subject)  # a unit that is not known
+
+
+def _means_duration(name: str) -> bool:
+    """Whether a name means the duration of the recording and nothing else."""
+    further = [word for word in words_of(name) if word not in BESIDE_DURATION]
+    return bool(further) and all(map(DURATION_WORD.fullmatch, further))
 
 
 def _of_rate(text: str, number: str, unit: RateUnit, is_weak: bool) -> Iterator[Candidate]:

@@ -19,7 +19,7 @@ from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.channel_groups import STATED_SCALES
 from turnout.readers.claims import Hdf5Claims, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
-from turnout.readers.metadata_names import ATTRIBUTES_MARK, TIME_NAMES
+from turnout.readers.metadata_names import ATTRIBUTES_MARK, CHANNEL_NAMES, TIME_NAMES
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.packing import apply_packing, unstated_fills
 from turnout.readers.sample_variables import Attributes, matrices
@@ -96,7 +96,7 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
         for key, value in attributes.items():
             if key in UNIT_ATTRIBUTES and isinstance(value, str):
                 units[name] = value
-            elif key.lower() in ("channels", "channel_names", "units"):
+            elif key.lower() in ("channels", "channel_names", "units", *(CHANNEL_NAMES if member.ndim > 1 else ())):
                 variables.setdefault(key, value)
             elif key not in PACKING_ATTRIBUTES and (
                 is_scale_name(key) or (isinstance(value, str) and scales_in_text(value))

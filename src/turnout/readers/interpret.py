@@ -27,7 +27,7 @@ from turnout.readers.simultaneous_records import add_shared, shared_channels, si
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
-from turnout.readers.time_axes import all_statements
+from turnout.readers.time_axes import all_statements, is_count_or_time
 from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import LongRecording, RawDescription, Recording
 
@@ -345,7 +345,16 @@ def _faults(
         for i, channel_statistics in enumerate(statistics.by_channel())
         if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
     }
-    return _missing_sample_errors(record, channel_maps, statistics, where, source) | of_statistics
+    of_axes = {
+        i: source.error(f"{where}, channel {mapping.channel.name!r}", AXIS_PROBLEM, AXIS_REMEDY, "channel_missing")
+        for i, mapping in enumerate(channel_maps)
+        if mapping.channel.quantity in ("force", "acceleration") and is_count_or_time(record.samples[mapping.index])
+    }
+    return _missing_sample_errors(record, channel_maps, statistics, where, source) | of_axes | of_statistics
+
+
+AXIS_PROBLEM = "its samples rise in equal steps: they are times or count the samples, and no sensor measured them"
+AXIS_REMEDY = "Correct 'source' of this channel in the layout; export each channel without a time of its own beside it"
 
 
 def _sample_count(record: RawRecord, where: str, promised: int | None, source: Source) -> int:

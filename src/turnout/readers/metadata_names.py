@@ -19,6 +19,7 @@ SAMPLE_COUNT_NAMES = (
 TIME_NAMES = ("time", "t", "time_s")
 CHANNEL_NAMES = (
     "channels", "channel_names", "names", "labels", "channel_labels", "signal_names", "sensor_names", "column_names",
+    "columns", "block0_items",  # the last one by pandas, in HDF5
 )  # fmt: skip
 UNIT_NAMES = ("units", "unit", "channel_units")
 ATTRIBUTES_MARK = " (attributes)"  # behind the name of a variable: the name of its attributes

@@ -8,9 +8,10 @@ import numpy as np
 from turnout.readers.lazy import Column
 from turnout.readers.source import BLOCK_SIZE
 
-# Nulls of well logs; lowest codes of converters with 16, 24 and 32 bits, of which the highest code is clipping; fill
-# value of masked arrays.
-OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31, 1e20)
+# Highest codes of converters with 16, 24 and 32 bits: clipping among whole numbers, and no physical value among others.
+HIGHEST_CODES = (2.0**15 - 1, 2.0**23 - 1, 2.0**31 - 1)
+# Nulls of well logs; codes of converters; fill value of masked arrays.
+OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31, 1e20, *HIGHEST_CODES)
 MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
 MIN_NINES_OF_NEGATIVE = 2  # before the decimal point, as in -99.99, under the conditions of ``count_alone``
 MIN_NINES_OF_SINGLE = 4  # in all: -99.9 is a measured value in 1 of 1000 records, where it does not repeat
@@ -49,7 +50,8 @@ def count_alone(column: Column, code: float) -> int:
     form has neighbours that are near to it. Samples that are not finite are passed over.
 
     Beside a code with two nines before the decimal point, the signal must not take its lowest other value: it does so
-    on its way to a limit at which it is clipped. With fewer than four nines in all the code must repeat.
+    on its way to a limit at which it is clipped. With fewer than four nines in all the code must repeat. The highest
+    code of a converter counts only beside numbers that are not whole.
 
     Parameters
     ----------
@@ -71,12 +73,14 @@ def count_alone(column: Column, code: float) -> int:
     (1, 0)
     """
     count, smallest_jump, largest_step, lowest, lowest_beside = 0, np.inf, 0.0, np.inf, np.inf
+    are_whole = True
     for block in _overlapping_blocks(column):
         own_code = np.asarray(code).astype(block.dtype)
         count += int(np.count_nonzero(block[:BLOCK_SIZE] == own_code))
         block = block[np.isfinite(block)]
         is_code = block == own_code
         values = block.astype(float)
+        are_whole = are_whole and bool((values == np.rint(values)).all())
         lowest = min(lowest, values[~is_code].min(initial=np.inf))
         steps = np.abs(np.diff(values))
         into_code = is_code[:-1] ^ is_code[1:]
@@ -84,7 +88,7 @@ def count_alone(column: Column, code: float) -> int:
         smallest_jump = min(smallest_jump, steps[into_code].min(initial=np.inf))
         beside = np.maximum(values[:-1], values[1:])[into_code]  # the code itself is lower
         lowest_beside = min(lowest_beside, beside.min(initial=np.inf))
-    if not largest_step < smallest_jump < np.inf:
+    if not largest_step < smallest_jump < np.inf or (are_whole and abs(code) in HIGHEST_CODES):
         return 0
     if abs(code) < 10**MIN_NINES_OF_NEGATIVE:
         n_nines = f"{code:.7g}".count("9")

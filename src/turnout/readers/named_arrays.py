@@ -19,6 +19,7 @@ What is recognised (names in any case, except ``t``):
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
+from turnout.readers.time_axes import HEAD_SIZE, rises_evenly
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
 
@@ -256,7 +258,22 @@ def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Sou
     block = block if block.shape[0] == rows else block.T
     names = names or [str(i) for i in range(rows)]
     units = units if len(units) == rows else [units[0] if len(units) == 1 else ""] * rows
-    return _raw_record(names, list(block), units, facts, k, n)
+    record = _raw_record(names, list(block), units, facts, k, n)
+    axes = {} if record.time is not None else _axes(facts.variables, block.shape[1])
+    if not axes:
+        return record
+    name, axis = next(iter(axes.items()))  # each variable of samples beside a matrix is no channel of it
+    return replace(record, time=np.asarray(axis, dtype=float), time_label=name)
+
+
+def _axes(variables: Mapping[str, Any], n_sample: int) -> dict[str, np.ndarray]:
+    """The vectors of as many numbers as samples that rise evenly: times, under any name."""
+    return {
+        name: value
+        for name, value in variables.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.shape == (n_sample,)
+        if rises_evenly(value[:HEAD_SIZE])
+    }
 
 
 def _raw_record(
@@ -290,14 +307,14 @@ def _raw_record(
 
 
 def _not_numbers(variables: Mapping[str, Any]) -> dict[str, str | UnreadObject]:
-    """What the variables hold that could be channels and are no real numbers."""
-    arrays = {n: kind_of(v.dtype) for n, v in variables.items() if isinstance(v, np.ndarray) and _is_other(v)}
-    return arrays | {n: v for n, v in variables.items() if isinstance(v, UnreadObject)}
-
-
-def _is_other(array: np.ndarray) -> bool:
-    """Whether an array is as long as samples and holds no real numbers."""
-    return array.size > MAX_ENTRIES and array.dtype.kind not in "fiumM"
+    """What the variables hold that could be channels and are no real numbers, or too few."""
+    arrays = {n: v for n, v in variables.items() if isinstance(v, ARRAYS) and v.size > MAX_ENTRIES}
+    of_numbers = {n: v for n, v in arrays.items() if v.dtype.kind in "fiumM"}
+    longest = max((v.size for v in of_numbers.values()), default=0)
+    contents = {n: f"{kind_of(v.dtype)}, no real numbers" for n, v in arrays.items() if n not in of_numbers}
+    shorter = {n: v.size for n, v in of_numbers.items() if v.ndim == 1 and v.size < longest}
+    contents |= {n: f"{size} samples, and another channel {longest}" for n, size in shorter.items()}
+    return contents | {n: v for n, v in variables.items() if isinstance(v, UnreadObject)}
 
 
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:

@@ -75,7 +75,8 @@ def read_raw(source: Source) -> RawFile:
     if n_row and not names:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
-    not_numbers = {name: kind_of(x.dtype) for name, x in columns.items() if x.dtype.kind not in "fiumM"}
+    others = {name: x.dtype for name, x in columns.items() if x.dtype.kind not in "fiumM"}
+    not_numbers = {name: f"{kind_of(dtype)}, no real numbers" for name, dtype in others.items()}
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     stamped = [name for name, x in columns.items() if x.dtype.kind == "M"]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}

@@ -32,6 +32,8 @@ TIME_UNITS = {
 PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}
 RATE_UNIT = re.compile(r"(k|m|g)?(?:hz|hertz|sps)")
 
+CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))  # letters of units in Russian
+
 
 @dataclass(frozen=True)
 class RateUnit:
@@ -61,7 +63,8 @@ def rate_unit(text: str) -> RateUnit | None:
     >>> rate_unit("kS/s").scale, rate_unit("µs/pt").is_step, rate_unit("Samples per second").scale, rate_unit("V")
     (Fraction(1000, 1), True, Fraction(1, 1), None)
     """
-    plain = text.strip("[](){} .").casefold().replace("é", "e").replace("\u03bc", "µ")
+    latin = text.replace("мк", "µ").translate(CYRILLIC)
+    plain = latin.strip("[](){} .").casefold().replace("é", "e").replace("\u03bc", "µ")
     plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
     if match := RATE_UNIT.fullmatch(plain):
         return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))

@@ -188,7 +188,9 @@ class Source:
                 raise absent from error
             if isinstance(error.__context__, KeyboardInterrupt):  # the library made an exception of its own of it
                 raise KeyboardInterrupt from error
-            message = " ".join(str(error).split())[:200] or type(error).__name__
+            message = " ".join(str(error).split())[:200]
+            if not re.search(r"[^\W\d]", message):  # a number alone, the key of a KeyError
+                message = f"{type(error).__name__} {message}".strip()
             fault = (
                 None
                 if _requests_more_memory_than(MAX_COMPRESSION_RATIO * self.size, error)
@@ -229,7 +231,7 @@ class RawRecord:
     stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied;
     ``unit_conflicts`` are statements about units of channels that contradict each other, by index.
-    ``not_numbers`` are variables without real numbers, name -> what they hold, for messages about missing channels.
+    ``not_numbers`` are variables that are no channels, name -> what they hold, for messages about missing channels.
     ``audio`` is "whole" for an audio file of whole numbers, which are fractions of full scale, "floating" for one of
     floating-point numbers, which may be none, and "" for any other file.
     """

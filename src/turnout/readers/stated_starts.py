@@ -32,6 +32,7 @@ OF_BEGIN = frozenset("of the der de la du del og at on".split())
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
 TIME_WORD = re.compile(r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|started|begun|recorded")
 MAX_UNREAD = 120  # characters of a start that cannot be read
+MAX_PRE_TRIGGER = 3600.0  # s
 MAX_ZONE_DIFFERENCE = timedelta(hours=26)  # two zones on both sides of the date line
 
 
@@ -123,7 +124,15 @@ def with_stated_start(record: RawRecord) -> RawRecord:
         return replace(record, unread_start=contradicting[0][:60]) if contradicting else record
     if len({_naive(time) for time in times}) != 1:
         return replace(record, unread_start=" or ".join(stated)[:MAX_UNREAD])
-    return replace(record, started_at=times[0])
+    return replace(record, started_at=times[0] + _pre_trigger(record))
+
+
+def _pre_trigger(record: RawRecord) -> timedelta:
+    """Time from the trigger to the first sample if the stated start is that of the trigger, at 0 of the time column."""
+    names = [entry.name for entry in record.entries if is_start_name(entry.name) and any(times_of_entry(entry))]
+    is_of_trigger = all(any(word.startswith("trigg") for word in words_of(name)) for name in names)
+    first = 0.0 if record.time is None or not record.is_time_in_seconds else float(record.time[0])
+    return timedelta(seconds=first if is_of_trigger and -MAX_PRE_TRIGGER < first < 0.0 else 0.0)
 
 
 def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:

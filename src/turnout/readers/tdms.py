@@ -263,6 +263,9 @@ def _record(channels: Sequence[nptdms.TdmsChannel], *context: Any) -> RawRecord 
         return error
 
 
+UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+
+
 def _complete_record(
     channels: Sequence[nptdms.TdmsChannel],
     k: int,
@@ -306,7 +309,7 @@ def _complete_record(
         names=tuple(c.name for c in channels),
         samples=samples,
         entries=(*of_file, *of_remarks, *_entries(channels, groups)),
-        units=tuple(str(c.properties.get("unit_string", "") or "") for c in channels),
+        units=tuple(next((str(c.properties[n]) for n in UNIT_PROPERTIES if c.properties.get(n)), "") for c in channels),
         **start_fields(
             *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
             declared=facts.label_of(START_NAMES),
@@ -357,7 +360,11 @@ def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mappin
 
 
 def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> None:
-    """ReadError if steps or starts differ; a channel begins at its time stamp plus ``wf_start_offset``."""
+    """ReadError if steps or starts of the channels that state a step differ, or of all if none does.
+
+    A channel begins at its time stamp plus ``wf_start_offset``.
+    """
+    channels = [c for c in channels if "wf_increment" in c.properties] or channels
     facts = [Metadata(c.properties, source) for c in channels]
     steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
     stamps = start_offsets([parse_time(f.record_value(("wf_start_time",), 0, 1)) for f in facts])

@@ -175,7 +175,7 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         if has_other_unit:
             continue
         by_name = is_time_name(name)
-        if not by_name and not _rises_evenly(column[:HEAD_SIZE]):
+        if not by_name and not rises_evenly(column[:HEAD_SIZE]):
             continue
         unit_of_count = _unit_of_count(column, name) if by_name and not is_time_unit else None
         scale = known.scale if is_time_unit and known else unit_of_count or 1
@@ -185,14 +185,45 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         yield place, np.asarray(column[:], dtype=float) * float(scale), is_in_seconds, certainty
 
 
+def is_count_or_time(column: Column) -> bool:
+    """Whether a column rises evenly at its beginning and at its end, as times and counts do and no measured signal.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        Samples of a channel as they are in the file.
+
+    Returns
+    -------
+    bool
+        False for fewer than 64 samples.
+
+    Examples
+    --------
+    >>> is_count_or_time(np.arange(100)), is_count_or_time(np.sin(0.01 * np.arange(1000)))
+    (True, False)
+    """
+    n_sample = len(column)
+    if n_sample < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
+        return False
+    step = float(column[1:2][0]) - float(column[:1][0])
+    return step > 0.0 and all(_is_on_line(column[k : k + HEAD_SIZE]) for k in (0, max(0, n_sample - HEAD_SIZE)))
+
+
+MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measures nothing
+
+
 def _check_counters(record: RawRecord, measured: Set[int], where: str, source: Source) -> None:
-    """ReadError if a column that counts the samples leaves one out.
+    """ReadError if a column that counts the samples leaves one out, or shows that they are in another order.
 
     A counter that begins again is no gap: it counts within a record, or has reached its largest number.
     """
     for i, (name, column) in enumerate(zip(record.names, record.samples)):
         if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
             continue
+        if _counts_in_disorder(column):
+            problem = f"the samples are not in the order in which column {name!r} counts them"
+            raise source.error(where, problem, "Sort the rows by this column and export them again", "clock_backwards")
         steps = np.diff(np.asarray(column[:HEAD_SIZE], dtype=float))
         if np.count_nonzero(steps == 1.0) < MIN_COUNTING_SHARE * len(steps):
             continue
@@ -204,21 +235,46 @@ def _check_counters(record: RawRecord, measured: Set[int], where: str, source: S
             raise source.error(where, problem, remedy, reason="truncated")
 
 
+def _counts_in_disorder(column: Column) -> bool:
+    """Whether a column holds consecutive whole numbers, each once, in no order."""
+    head = np.asarray(column[:HEAD_SIZE], dtype=float)
+    if (np.diff(head) > 0).all() or not (head == np.rint(head)).all() or len(np.unique(head)) < len(head):
+        return False
+    count = np.sort(np.asarray(column[:], dtype=float))
+    return bool((np.diff(count) == 1.0).all()) and not (np.diff(head) == -1.0).all()
+
+
 MIN_COUNTING_SHARE = 0.9  # of the first steps of a counter are 1; it may begin again some times
 
 
-def _rises_evenly(head: np.ndarray) -> bool:
-    """Whether the first samples of a column lie on a rising line; whole numbers in steps of 1 only count."""
-    head = np.asarray(head, dtype=float)
-    if len(head) < MIN_AXIS_SIZE or not np.isfinite(head).all():
+def rises_evenly(head: np.ndarray) -> bool:
+    """Whether the first samples of a column are those of a time axis: on a rising line, in other steps than 1.
+
+    Parameters
+    ----------
+    head : (n,) array
+        The first numbers of a column.
+
+    Returns
+    -------
+    bool
+        False for whole numbers in steps of 1, which count the samples, and for fewer than 8 numbers.
+    """
+    return _is_on_line(head) and not (np.diff(np.asarray(head, dtype=float)) == 1.0).all()
+
+
+def _is_on_line(samples: np.ndarray) -> bool:
+    """Whether samples lie on a rising line; one jump may be in it."""
+    samples = np.asarray(samples, dtype=float)
+    if len(samples) < MIN_AXIS_SIZE or not np.isfinite(samples).all():
         return False
-    steps = np.diff(head)
+    steps = np.diff(samples)
+    if (steps <= 0).any():
+        return False
     step = float(np.median(steps))
-    if (steps <= 0).any() or (step == 1.0 and (steps == 1.0).all()):
-        return False
-    line = head[0] + (head[-1] - head[0]) * np.arange(len(head)) / (len(head) - 1)
+    line = samples[0] + (samples[-1] - samples[0]) * np.arange(len(samples)) / (len(samples) - 1)
     n_jump = np.count_nonzero(np.abs(steps - step) > 0.5 * step)
-    return bool(np.abs(head - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= MAX_JUMPS)
+    return bool(np.abs(samples - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= MAX_JUMPS)
 
 
 def _constant_columns(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:

@@ -81,7 +81,7 @@ UNREADABLE_WORDS = frozenset(("gps", "tai"))  # scales of time without leap seco
 ORIGIN_YEARS = {"1601": "1601", "1899": "1899", "1900": "1899", "1904": "1904", "1970": "1970"}
 SINCE = re.compile(r"([^\W\d_]+) +(?:since|seit|depuis|siden|sedan|sinds|desde|dal|od) +(.+?)[\])]?$")
 ORIGIN = re.compile(
-    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:\.0*)?)?)? ?(?:Z|UTC|[+-]0?0:?00)?",
+    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(\.\d*)?)?)? ?(?:Z|UTC|[+-]0?0:?00)?",
 )
 # Digits that begin with a day of these years and go on: of 13 or 16 digits they may count ms or µs as well.
 DATE_IN_FRONT = re.compile(r"(?:199\d|20[0-5]\d)(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])\d")
@@ -213,12 +213,13 @@ def _declared_counts(declared: str) -> tuple[Count, ...] | None:
 
 def _count_since(unit: Fraction, origin: re.Match[str]) -> tuple[Count, ...]:
     """The count of a unit [s] since a declared time, which is in UTC."""
-    fields = [int(field or default) for field, default in zip(origin.groups(), (0, 1, 1, 0, 0, 0))]
+    *day_and_time, fraction = origin.groups()
+    fields = [int(field or default) for field, default in zip(day_and_time, (0, 1, 1, 0, 0, 0))]
     try:
         start = datetime(*fields)  # type: ignore[misc, arg-type]
     except ValueError:
         return ()
-    seconds = Fraction(round((datetime(1970, 1, 1) - start).total_seconds()))
+    seconds = Fraction(round((datetime(1970, 1, 1) - start).total_seconds())) - Fraction(f"0{fraction or '.'}0")
     return (Count(origin[0], unit, seconds / unit, True, frozenset()),)
 
 

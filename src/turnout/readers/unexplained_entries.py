@@ -105,7 +105,7 @@ class RecordFacts:
         if any(1 / MAX_DURATION_RATIO <= r <= MAX_DURATION_RATIO or _is_multiple(r, MULTIPLES) for r in ratios):
             return False
         if ratios and not candidate.rates:
-            return True
+            return not candidate.is_of_record
         if np.isnan(candidate.number):  # its unit is known
             return bool(candidate.rates) and not any(is_near_rate(i.rate, self.rate) for i in candidate.rates)
         return abs(candidate.number * self.rate / n - 1.0) <= DURATION_TOLERANCE

@@ -14,7 +14,7 @@ from turnout.units import IGNORED
 
 RANGE = re.compile(
     r"^(?:adc|input|measur\w*|channel|voltage|physical|mess|eingangs?|sensor)*(?:range|bereich|fullscale|gamme|fsr)"
-    r"(?:min|max|high|low)?$"
+    r"(?:min|max|high|low)?$|^(?:phys(?:ical)?|dig(?:ital)?)(?:min|max)(?:imum)?(?:value)?$"
 )
 
 

@@ -20,7 +20,7 @@ from pyarrow import parquet
 from turnout.errors import ReadError
 from turnout.readers import read, read_unconverted
 from turnout.readers.interpret import errors_without_layout
-from turnout.readers.missing_codes import missing_code
+from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.records import RawChannel, RawDescription
 
 N = 3000
@@ -350,6 +350,8 @@ def test_a_packed_file_is_named_as_such(program, name, tmp_path):
 
 
 def test_a_code_of_single_precision_is_one_and_its_neighbours_are_measured_values():
-    """The highest code of a converter with 16 bits is clipping, and 1000 is no null of a well log."""
+    """The highest code of a converter is clipping among whole numbers, and 1000 is no null of a well log."""
     assert missing_code(float(np.float32(1e20))) == 1e20 and missing_code(-32768.0) == -32768.0
-    assert [missing_code(value) for value in (32767.0, -32767.0, 1000.0, 1.0001e20)] == [None] * 4
+    assert [missing_code(value) for value in (32766.0, -32766.0, 1000.0, 1.0001e20)] == [None] * 4
+    physical = np.array([0.5, 2.0, 32767.0, 1.0])
+    assert (count_alone(physical, 32767.0), count_alone(np.rint(physical), 32767.0)) == (1, 0)

@@ -1,0 +1,137 @@
+"""Entries of the lines of a text file above and below its numbers."""
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from turnout.readers.channel_delays import is_delay_name
+from turnout.readers.channel_descriptions import is_description_name
+from turnout.readers.csv_cells import cells_of, is_number
+from turnout.readers.csv_columns import is_line_of_names
+from turnout.readers.entries import COLON, FREE_TEXT, Entry, entries_of_text
+from turnout.readers.exponential_windows import is_window_name
+from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.overload_flags import is_of_overload
+from turnout.readers.rate_units import rate_unit
+from turnout.readers.rate_words import is_rate_name
+from turnout.readers.scale_words import is_of_drawing, is_scale_name
+from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
+from turnout.readers.stated_quantities import is_quantity_name
+from turnout.readers.stated_sensitivities import is_sensitivity_name
+from turnout.readers.time_texts import is_day, looks_dated
+from turnout.readers.unit_names import is_unit_name
+
+HEAD_LINE = re.compile(
+    rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*(?:{COLON}|[=,;\t])\s*(.*)$"
+)
+
+
+def entries_of_lines(
+    lines: Sequence[str], separator: str, names: Sequence[str], first_line: int = 1
+) -> Iterator[Entry]:
+    """Entries of lines of text: "name: value" lines, pairs of cells, names above values, and free text.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Lines above or below the numbers.
+    separator : str
+        Separator of the cells.
+    names : sequence of str
+        Names of the columns; their line is no entry.
+    first_line : int
+        Number of the first of the lines in the file, from 1.
+
+    Yields
+    ------
+    Entry
+        Each with its line.
+    """
+    table = [cells_of(line, separator) for line in lines]
+    for i, (line, cells) in enumerate(zip(lines, table)):
+        place = f"line {first_line + i}"
+        text = line.strip().lstrip("#%*/!'\" ").strip()
+        if not text or is_line_of_names(cells, names):
+            continue
+        if len(statements := [match for cell in cells if (match := HEAD_LINE.match(cell))]) == len(cells) > 1:
+            is_list = len(cells) == len(names) and len({match[1] for match in statements}) == 1
+            if is_list and not any(re.search("[=:;]", match[3]) for match in statements):  # one for each column
+                yield Entry(place, statements[0][1], [match[3] for match in statements])
+            else:
+                for cell in cells:
+                    yield from entries_of_lines([cell], separator, names, first_line + i)
+            continue
+        pairs = [(a, b) for a, b in pairwise(cells) if a and b and not is_number(a)]
+        for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
+            if name and is_number(second) and rate_unit(third):
+                pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
+            elif name and rate_unit(second) and is_number(third):
+                pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
+            elif name and is_day(second) and re.match(r"\d{1,2}[:.]\d{2}", third):  # "Start;13.05.2026;10:20:30"
+                pairs = [(name, f"{second} {third}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
+        if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
+            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
+        is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
+        if len(cells) == 1 and (dated := _dated_line(text)):
+            pairs.append(dated)
+        elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn and not _ends_in_time(match[1]):
+            name = f"{match[1]} {match[2]}" if match[2] else match[1]
+            pairs.append((name, match[3].strip(separator + ' "')))
+        entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
+        is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
+        if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
+            entries = [Entry(place, cells[0], cells[1:])]  # one for each column
+        elif len(cells) > 2 and _has_value_for_each(cells, names):
+            entries = [Entry(place, cells[0], [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
+        elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
+            entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
+        yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
+        is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
+        if pairs and not is_drawn and not is_settled:
+            yield from entries_of_text(text, place)
+
+
+def _ends_in_time(name: str) -> bool:
+    """Whether a text is no name but a statement: its last words are a time, "Record length 0.5 s"."""
+    match = re.search(r" \d+(?:[.,]\d+)? ?([^\W\d]+)$", name)
+    unit = rate_unit(match[1]) if match else None
+    return unit is not None and unit.is_step
+
+
+MAX_WORDS_OF_START = 5
+
+
+def _dated_line(text: str) -> tuple[str, str] | None:
+    """Name and value of a line that states a start without a mark between them, "start 2026-05-13 10:20:30"."""
+    words = text.split()
+    for n in range(1, min(len(words), MAX_WORDS_OF_START + 1)):
+        name, value = " ".join(words[:n]), " ".join(words[n:])
+        if re.search("[:=,;]", name):  # the mark itself
+            return None
+        if may_state_start(name) and (looks_dated(value) or is_day(value) or CLOCK_ALONE.fullmatch(value)):
+            return name, value
+    return None
+
+
+def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line has texts of columns behind a word for such texts, as "Sensor;hammer;accelerometer".
+
+    There is one for each column, or for each but the first, which is often that of the time.
+    """
+    texts = cells[1:]
+    return (
+        len(texts) in (len(names), len(names) - 1) and is_description_name(cells[0]) and not any(map(is_number, texts))
+    )
+
+
+NO_VALUE = re.compile(r"[-–—]*|n\.?/?a\.?|none|keine?", re.IGNORECASE)  # a cell of a channel without one
+DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d)")
+
+
+def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line has a sensitivity or a scale for each column, or for each but the first: all begin alike."""
+    begin_with_number = {
+        re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if not NO_VALUE.fullmatch(text)
+    }
+    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0])
+    return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1
