@@ -53,12 +53,14 @@ def entries_of_lines(
         text = line.strip().lstrip("#%*/!'\" ").strip()
         if not text or is_line_of_names(cells, names):
             continue
-        if len(statements := [match for cell in cells if (match := HEAD_LINE.match(cell))]) == len(cells) > 1:
-            is_list = len(cells) == len(names) and len({match[1] for match in statements}) == 1
-            if is_list and not any(re.search("[=:;]", match[3]) for match in statements):  # one for each column
-                yield Entry(place, statements[0][1], [match[3] for match in statements])
+        filled = cells if cells[0] else cells[1:]
+        statements = [HEAD_LINE.match(cell) for cell in filled if re.search("[:=]", cell)]
+        if len(matches := [match for match in statements if match]) == len(filled) > 1:
+            is_list = len(cells) == len(names) and len({match.group(1, 2) for match in matches}) == 1
+            if is_list and not any(re.search("[=:;]", match[3]) for match in matches):  # one for each column
+                yield Entry(place, f"{matches[0][1]} {matches[0][2] or ''}".strip(), [match[3] for match in matches])
             else:
-                for cell in cells:
+                for cell in filled:
                     yield from entries_of_lines([cell], separator, names, first_line + i)
             continue
         pairs = [(a, b) for a, b in pairwise(cells) if a and b and not is_number(a)]

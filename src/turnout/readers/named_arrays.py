@@ -47,6 +47,7 @@ from turnout.readers.metadata_names import (
     TIME_NAMES,
     UNIT_NAMES,
 )
+from turnout.readers.other_subjects import STRONG, subject_of
 from turnout.readers.recording_versions import check_groups
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.signal_structures import with_signal_structures
@@ -267,12 +268,12 @@ def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Sou
 
 
 def _axes(variables: Mapping[str, Any], n_sample: int) -> dict[str, np.ndarray]:
-    """The vectors of as many numbers as samples that rise evenly: times, under any name."""
+    """The vectors of as many numbers as samples that rise evenly: times, unless a name speaks of something else."""
     return {
         name: value
         for name, value in variables.items()
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.shape == (n_sample,)
-        if rises_evenly(value[:HEAD_SIZE])
+        if subject_of(name) != STRONG and rises_evenly(value[:HEAD_SIZE])
     }
 
 

@@ -141,6 +141,7 @@ def test_numbers_of_varying_length_have_no_first_row_of_another_kind(units, tmp_
     "line",
     [
         "dx=3.90625E-5 s;dx=3.90625E-5 s",
+        "dx [ms]: 0.0390625;dx [ms]: 0.0390625",
         "Bandwidth: 10 kHz;Sample rate: 25.6 kHz",
         "Kanal=1, fs=25600 Hz;Kanal=2, fs=25600 Hz",
     ],
@@ -154,6 +155,13 @@ def test_a_cell_that_is_a_statement_is_read_by_itself(line, units, tmp_path):
     assert is_read(recordings) and not errors
     recordings, errors = outcome(path, rate=RATE / 2, units=units)
     assert not recordings and "25600 Hz" in errors[0]
+
+
+def test_a_statement_for_each_column_but_that_of_the_time(tmp_path):
+    head = ";fs=25600 Hz;fs=25600 Hz\nt [s];force [N];rail [m/s²]\n"
+    path = text(tmp_path / "a.csv", head, [[f"{t:.7f}" for t in TIME], *SAMPLES])
+    recordings, errors = outcome(path)
+    assert is_read(recordings) and not errors
 
 
 def test_different_steps_in_the_cells_of_a_line_are_an_error(units, tmp_path):
@@ -223,6 +231,17 @@ def test_a_table_of_pandas_in_hdf5_has_its_names_and_its_times(kind, units, tmp_
     assert is_read(recordings) and not errors
     recordings, errors = outcome(tmp_path / "a.h5", rate=RATE / 2, units=units)
     assert not recordings and "instead of 12800 Hz" in errors[0]
+
+
+@pytest.mark.parametrize(("name", "is_error"), [("position_m", False), ("temperature", False), ("axis", True)])
+def test_a_vector_beside_a_matrix_is_its_time_unless_its_name_is_of_something_else(name, is_error, units, tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["rate"] = RATE
+        file["channel_names"] = np.array([b"force", b"rail"])
+        file["values"] = SAMPLES.T
+        file[name] = 25.0 * TIME
+    recordings, errors = outcome(tmp_path / "a.h5", units=units)
+    assert (not recordings and "two rates" in errors[0]) if is_error else is_read(recordings)
 
 
 def test_times_since_a_moment_with_a_fraction_state_the_start(tmp_path):

@@ -171,7 +171,7 @@ def test_the_hammer_file_of_pyfrf_has_five_impacts(shared_data):
 )
 def test_rejections_and_remarks_of_reading_with_a_layout_are_listed_as_problems(head, end, words, tmp_path):
     rows = "\n".join(f"{np.sin(k):.6f};{np.cos(k):.6f}" for k in range(60))
-    text = f"rate;5000\n{head}\nforce [N];rail [g]\n3.5;0.5\n{rows}{end}"
+    text = f"rate;5000\n{head}\nforce [N];rail [g]\n3.500000;0.500000\n{rows}{end}"
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     problems = file_contents(tmp_path / "a.csv").problems
     assert any(words in problem for problem in problems) if words else problems == ()
