@@ -1,6 +1,6 @@
-"""Recordings as loggers and analysers write them: what a file states about scale and structure is applied or named.
+"""Recordings of loggers and analysers: stated scales and structures are applied or reported.
 
-The files are written by the programs in ``shared/inputs/recordings``. Their impacts are known exactly.
+The programs in ``shared/inputs/recordings`` write the files. Their impacts are known exactly.
 """
 
 import os
@@ -83,7 +83,7 @@ def test_the_linear_scale_of_a_tdms_file_is_applied(made, impacts):
     ("name", "kind"),
     [("piecewise", "PiecewisePolynomial"), ("maplin", "MapRanges"), ("piecewise_force_only", "PiecewisePolynomial")],
 )
-def test_a_scale_that_cannot_be_applied_is_rejected_by_name(made, name, kind):
+def test_a_scale_that_cannot_be_applied_is_rejected(made, name, kind):
     path = made("01_tdms_scale_kind") / f"{name}.tdms"
     errors = errors_of(path, layout())
     assert len(errors) == 10
@@ -93,7 +93,7 @@ def test_a_scale_that_cannot_be_applied_is_rejected_by_name(made, name, kind):
     assert "unit: 'N!'" in errors[0]
 
 
-def test_a_unit_that_overrules_the_file_decides_about_its_scale(made, impacts):
+def test_a_unit_that_overrides_the_file_determines_its_scale(made, impacts):
     path = made("01_tdms_scale_kind") / "piecewise_force_only.tdms"
     samples = samples_of(path, layout("0.4 N!"))
     np.testing.assert_allclose(samples[:, 0], impacts[:, 0], atol=0.21)
@@ -117,7 +117,7 @@ def test_fill_values_of_netcdf_are_missing_samples(made):
     )
 
 
-def test_packed_numbers_that_stay_in_the_file_are_unpacked_block_by_block(tmp_path):
+def test_packed_numbers_of_long_records_are_unpacked_block_by_block(tmp_path):
     packed = np.arange(300_000, dtype="int32") * 7 % 1000
     with h5py.File(tmp_path / "long.h5", "w") as file:
         file.attrs["rate"] = RATE
@@ -129,7 +129,7 @@ def test_packed_numbers_that_stay_in_the_file_are_unpacked_block_by_block(tmp_pa
     np.testing.assert_array_equal(recording.read(500, 700)[1], 0.5 * packed[500:700] - 3.0)
 
 
-def test_a_gain_that_may_be_in_the_numbers_is_rejected_by_name(made):
+def test_a_gain_that_may_already_be_applied_is_rejected(made):
     errors = errors_of(made("05_hdf5_scale_factor") / "gain_offset.h5", layout())
     assert "channel 'force': the file states gain = 0.4, and nothing says whether its numbers already" in errors[0]
 
@@ -165,12 +165,12 @@ def test_a_gain_is_rejected_in_every_format_that_can_state_one(tmp_path):
 
 
 @pytest.mark.parametrize("facts", [{"gain": 1.0, "offset": 0.0}, {"time_offset": 3.0}, {"sensitivity": 10.0}, {}])
-def test_a_neutral_scale_and_other_facts_are_no_reason_to_reject(tmp_path, facts):
+def test_a_neutral_scale_and_other_entries_are_accepted(tmp_path, facts):
     np.savez(tmp_path / "a.npz", force=np.arange(9.0), rail=np.arange(9.0), fs=RATE, units=["N", "m/s2"], **facts)
     assert samples_of(tmp_path / "a.npz", layout()).shape == (1, 2, 9)
 
 
-def test_the_warning_of_a_library_is_passed_on(tmp_path):
+def test_the_warning_of_a_library_is_reported(tmp_path):
     path = tmp_path / "version.tdms"
     with nptdms.TdmsWriter(path) as file:
         facts = {"wf_increment": 1 / RATE}
@@ -187,7 +187,7 @@ def test_the_warning_of_a_library_is_passed_on(tmp_path):
     assert warning.reason == "library_warning" and "Unrecognised version number: 4999" in str(warning)
 
 
-def test_numbers_above_full_scale_are_no_fractions_of_it(made, stream):
+def test_numbers_above_full_scale_are_rejected_as_fractions_of_it(made, stream):
     folder = made("10_wav_float")
     channels = (
         RawChannel("force", 0, "force", unit="10 V", sensitivity=1.0, sensitivity_unit="mV/N"),
@@ -211,7 +211,7 @@ def test_the_groups_of_one_record_are_joined(made, stream, name):
     np.testing.assert_array_equal(samples_of(made("13_tdms_groups_per_task") / name, layout()), stream[None])
 
 
-def test_groups_that_start_at_other_times_are_not_joined(tmp_path):
+def test_groups_with_different_starts_are_not_joined(tmp_path):
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
         for group, name, start in (("Hammer", "force", 0), ("Accel", "rail", 1)):
             facts = {"wf_increment": 1 / RATE, "wf_start_time": np.datetime64(f"2026-05-13T08:00:0{start}")}
@@ -225,12 +225,12 @@ def test_a_big_endian_tdms_file_is_complete(made, impacts):
     np.testing.assert_array_equal(samples_of(made("28_tdms_big_endian") / "big_endian.tdms", layout()), impacts)
 
 
-def test_lvm_with_one_x_column_per_channel(made, impacts):
+def test_lvm_with_one_x_column_per_channel_is_read(made, impacts):
     np.testing.assert_allclose(samples_of(made("03_lvm_multi") / "multi.lvm", layout()), impacts, atol=5.1e-7)
 
 
 @pytest.mark.parametrize("name", ["one_header.lvm", "one_header_x.lvm"])
-def test_lvm_with_one_header_for_ten_impacts(made, impacts, name):
+def test_lvm_with_one_header_for_ten_impacts_is_read(made, impacts, name):
     np.testing.assert_allclose(samples_of(made("04_lvm_one_header") / name, layout()), impacts, atol=5.1e-7)
 
 
@@ -246,30 +246,30 @@ def test_lvm_with_one_header_and_continued_time_is_one_record(made, impacts, tmp
     assert "29993 rows follow its header of 3000 samples: no whole number of writes" in error
 
 
-def test_lvm_without_a_header_says_what_it_is(made):
+def test_the_error_of_lvm_without_a_header_states_its_cause(made):
     (error,) = errors_of(made("04_lvm_one_header") / "no_header.lvm", layout())
     assert "LabVIEW wrote it with the setting 'Segment headers: no headers'" in error and "Copy" not in error
 
 
 @pytest.mark.parametrize("name", ["thousands_tab.txt", "thousands_dot.txt", "thousands_only_rail.txt"])
-def test_marks_for_thousands_are_named(made, name):
+def test_separators_of_thousands_are_an_error(made, name):
     (error,) = errors_of(made("15_csv_cells") / name, layout())
     assert "has a mark for thousands" in error and ("column 'rail'" if "only" in name else "column 'force'") in error
 
 
-def test_decimals_are_no_marks_for_thousands(tmp_path):
-    """Temperatures in steps of a half, and numbers of three decimals of which some are whole."""
+def test_decimals_are_not_read_as_separators_of_thousands(tmp_path):
+    """Temperatures in steps of a half, and numbers with three decimals, some of which are whole."""
     rows = [f"{20 + i % 2 / 2:g};{1 + (i % 7) * 0.125:g}\n" for i in range(200)]
     (tmp_path / "a.csv").write_text("force [N];rail [m/s²]\n" + "".join(rows))
     assert samples_of(tmp_path / "a.csv", layout())[0, :, 1].tolist() == [20.5, 1.125]
 
 
 @pytest.mark.parametrize("name", ["footer.csv", "quoted.csv", "quoted_comma.csv", "sep_line.csv"])
-def test_text_of_spreadsheets_and_loggers(made, stream, name):
+def test_text_of_spreadsheets_and_loggers_is_read(made, stream, name):
     np.testing.assert_allclose(samples_of(made("15_csv_cells") / name, layout())[0], stream, atol=5.1e-5)
 
 
-def test_the_sign_of_infinity_is_named_with_its_line(made):
+def test_the_sign_of_infinity_is_an_error(made):
     (error,) = errors_of(made("15_csv_cells") / "infinity.csv", layout())
     assert "column 'force': '∞' is no number" in error
 
@@ -286,7 +286,7 @@ def test_text_without_its_last_line_break_is_read(tmp_path):
     assert error.reason == "truncated" and "line 41: the last line has no line break" in str(error)
 
 
-def test_a_universal_file_without_time_responses_says_what_it_holds(shared_data):
+def test_the_error_of_a_universal_file_without_time_responses_states_its_content(shared_data):
     folder = shared_data / "uff58_reader_samples"
     found = []
     for path in sorted(folder.rglob("*.uff")):
@@ -296,26 +296,26 @@ def test_a_universal_file_without_time_responses_says_what_it_holds(shared_data)
 
 
 @pytest.mark.parametrize("copies", [2, 3])
-def test_a_file_appended_to_itself_is_named(tmp_path, copies):
+def test_a_file_appended_to_itself_is_an_error(tmp_path, copies):
     rows = "".join(f"{i}.25,{i}.5\n" for i in range(40))
     path = tmp_path / "a.csv"
     path.write_text(("force [N],rail [m/s²]\n" + rows) * copies)
     (error,) = errors_of(path, layout())
     assert f"are in it {copies} times: it was appended to itself" in error
-    path.write_text("force [N],rail [m/s²]\n" + rows * copies)  # a periodic signal is none
+    path.write_text("force [N],rail [m/s²]\n" + rows * copies)  # a periodic signal is no such file
     assert samples_of(path, layout()).shape[2] == 40 * copies
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.wav", "a.mat", "a.h5"])
 @pytest.mark.parametrize("value", [b"\0", b"\xff", b" "])
 @pytest.mark.parametrize("size", [1, 4096, 2**21 + 1])
-def test_a_file_of_one_byte_all_along_is_empty(tmp_path, name, value, size):
+def test_a_file_with_only_one_repeated_byte_is_reported_as_empty(tmp_path, name, value, size):
     (tmp_path / name).write_bytes(value * size)
     (error,) = errors_of(tmp_path / name, layout())
     assert f"all of its {size} bytes are 0x{value[0]:02X}: nothing was written to it" in error
 
 
-def test_one_other_byte_is_enough(tmp_path):
+def test_a_file_with_one_other_byte_is_not_reported_as_empty(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(b" " * 2**21 + b"x")
     (error,) = errors_of(path, layout())
@@ -339,7 +339,7 @@ def test_bytes_inserted_into_audio_are_found(tmp_path):
 
 
 def as_whole_wav(path, numbers, n_byte, n_valid=None):
-    """Whole numbers of n_byte bytes each; with n_valid, the header states how many of their bits are valid."""
+    """Write whole numbers of n_byte bytes each; n_valid is the stated number of valid bits."""
     n = numbers.shape[1]
     fmt = struct.pack("<HHIIHH", 1 if n_valid is None else 0xFFFE, n, 25600, 25600 * n * n_byte, n * n_byte, 8 * n_byte)
     if n_valid is not None:
@@ -351,7 +351,7 @@ def as_whole_wav(path, numbers, n_byte, n_valid=None):
 
 @pytest.mark.parametrize(("n_byte", "n_valid"), [(4, 24), (4, 20), (3, 20), (2, 12)])
 @pytest.mark.parametrize("is_lazy", [False, True])
-def test_valid_bits_may_be_the_high_or_the_low_ones(n_byte, n_valid, is_lazy, tmp_path):
+def test_valid_bits_can_be_the_high_or_the_low_bits(n_byte, n_valid, is_lazy, tmp_path):
     fractions = np.random.default_rng(8).uniform(-0.9, 0.9, size=(300, 2))
     numbers = np.round(fractions * 2 ** (n_valid - 1)).astype(int)
     channels = (RawChannel("force", 0, "force", unit="22000 N"), RawChannel("rail", 1, "acceleration", unit="1 m/s²"))
@@ -402,7 +402,7 @@ def broadcast(rate, date=b"2024-05-13", clock=b"10:02:03"):
         (b"iXML", lambda rate: f"<BWFXML><SPEED><FILE_SAMPLE_RATE>{rate}</FILE_SAMPLE_RATE></SPEED></BWFXML>".encode()),
     ],
 )
-def test_chunks_of_field_recorders_are_statements_of_the_rate(tag, content, tmp_path):
+def test_the_rate_in_chunks_of_field_recorders_is_compared(tag, content, tmp_path):
     layout = wav_with(tmp_path, tag, content(25600))
     result = read("a.wav", tmp_path, layout)
     assert not result.errors and result.recordings[0].rate == 25600.0
@@ -413,14 +413,14 @@ def test_chunks_of_field_recorders_are_statements_of_the_rate(tag, content, tmp_
     assert error.reason == "wrong_rate" and "25600" in str(error) and "48000" in str(error)
 
 
-def test_a_start_in_a_chunk_that_no_calendar_has_is_reported(tmp_path):
+def test_an_impossible_start_date_in_a_chunk_is_reported(tmp_path):
     layout = wav_with(tmp_path, b"bext", broadcast(25600, date=b"2024-02-30"))
     (error,) = read("a.wav", tmp_path, layout).errors
     assert error.reason == "start_unknown" and "2024-02-30" in str(error)
 
 
 @pytest.mark.parametrize("rate", [None, 20000.0, 25600.0])
-def test_columns_of_two_sampling_rates_are_named_with_both_and_with_what_to_do(made, rate):
+def test_the_error_of_two_sampling_rates_states_both_and_a_remedy(made, rate):
     channels = (
         RawChannel("force", "force", "force", unit="N"),
         RawChannel("rail", "rail", "acceleration", unit="m/s²"),
@@ -431,7 +431,7 @@ def test_columns_of_two_sampling_rates_are_named_with_both_and_with_what_to_do(m
 
 
 def write_tasks(path, numbers_of_tasks, seconds=None):
-    """One group per task and impact; each group holds the number of its impact."""
+    """One group per task and impact; each group contains the number of its impact."""
     with nptdms.TdmsWriter(path) as file:
         for (task, name), numbers in zip((("Hammer", "force"), ("Accel", "rail")), numbers_of_tasks):
             for number in numbers:
@@ -442,8 +442,8 @@ def write_tasks(path, numbers_of_tasks, seconds=None):
                 file.write_segment([nptdms.ChannelObject(f"Mod1 {task} {number}", name, samples, facts)])
 
 
-def test_the_groups_of_two_tasks_belong_together_by_their_numbers_or_their_starts(tmp_path):
-    """The force of one impact beside the acceleration of the next looks intact."""
+def test_the_groups_of_two_tasks_are_joined_by_their_numbers_or_starts(tmp_path):
+    """The force of one impact with the acceleration of the next would look intact."""
     write_tasks(tmp_path / "a.tdms", ((9, 10, 11), (9, 10, 11)))
     samples = samples_of(tmp_path / "a.tdms", layout("N", "m/s²"))
     np.testing.assert_allclose(samples.mean(axis=2), [[9, 9], [10, 10], [11, 11]], atol=0.01)
@@ -455,7 +455,7 @@ def test_the_groups_of_two_tasks_belong_together_by_their_numbers_or_their_start
     assert len(samples_of(tmp_path / "a.tdms", layout("N", "m/s²"))) == 2
 
 
-def test_a_group_of_equal_length_without_a_time_axis_is_named(tmp_path):
+def test_a_group_of_equal_length_without_a_time_axis_is_an_error(tmp_path):
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
         facts = {"wf_increment": 1 / RATE}
         file.write_segment([nptdms.ChannelObject("Hammer", "force", np.arange(9.0), facts)])
@@ -464,8 +464,8 @@ def test_a_group_of_equal_length_without_a_time_axis_is_named(tmp_path):
     assert "'Accel': 9 samples of 0 s from no time" in error
 
 
-def test_a_scale_beyond_the_stated_number_of_scales_is_named(tmp_path):
-    """npTDMS applies as many scales as the file counts: none of a count of 0."""
+def test_a_scale_beyond_the_stated_number_of_scales_is_an_error(tmp_path):
+    """npTDMS applies as many scales as the file states, and none if the number is 0."""
     facts = {"wf_increment": 1 / RATE, "NI_Number_Of_Scales": 0, "NI_Scale[0]_Scale_Type": "Linear"}
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
         channels = [nptdms.ChannelObject("g", name, np.arange(50.0) ** 2 % 7, facts) for name in ("force", "rail")]
@@ -475,7 +475,7 @@ def test_a_scale_beyond_the_stated_number_of_scales_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("columns", ["No", "One"])
-def test_the_unit_of_the_x_axis_of_lvm_is_used_and_another_axis_is_no_time(made, impacts, tmp_path, columns):
+def test_the_unit_of_the_x_axis_of_lvm_is_used_and_another_quantity_is_an_error(made, impacts, tmp_path, columns):
     name = "one_header.lvm" if columns == "No" else "one_header_x.lvm"
     text = (made("04_lvm_one_header") / name).read_text()
     head, _, body = text.partition("X_Value\t")
@@ -512,7 +512,9 @@ def test_the_unit_of_the_x_axis_of_lvm_is_used_and_another_axis_is_no_time(made,
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("is_in_file", [False, True])
-def test_a_channel_of_several_writes_begins_at_the_first_and_states_one_thing(tmp_path, changed, words, is_in_file):
+def test_a_channel_of_several_writes_starts_at_the_first_and_must_not_change_its_properties(
+    tmp_path, changed, words, is_in_file
+):
     """npTDMS returns the last value of a property, also for the samples before it."""
     scale = {"NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Linear", "NI_Scale[0]_Linear_Slope": 1.0}
     scale |= {"NI_Scale[0]_Linear_Y_Intercept": 0.0, "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF}

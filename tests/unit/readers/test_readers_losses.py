@@ -1,6 +1,6 @@
-"""Samples that a file lost without a sign: codes, gaps of a counter, unwritten chunks, masks, packed files.
+"""Samples that were lost without a mark: codes, gaps of a counter, unwritten chunks, masks, compressed files.
 
-Each case is read right, or rejected with its place; a measured value of the same form is read.
+Each case is read correctly or rejected with its place; a measured value of the same form is read.
 """
 
 import bz2
@@ -40,7 +40,7 @@ def rows_of(rail=RAIL):
 
 
 def reason_of(root, name, description=HAMMER):
-    """Reason and message of the only error; no recording is left."""
+    """Reason and message of the only error; no recording remains."""
     try:
         result = read(name, root, description)
     except ReadError as error:
@@ -52,7 +52,7 @@ def reason_of(root, name, description=HAMMER):
 
 @pytest.mark.parametrize("samples", [[700], [0], [N - 1], [700, 701, 702, 2000]])
 @pytest.mark.parametrize("code", [-9999.0, 999.0, -999.25, 99999.9, -32768.0, 9999.99, 1e20])
-def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_path):
+def test_a_code_for_a_missing_sample_is_not_read_as_a_measured_value(code, samples, tmp_path):
     rail = RAIL.copy()
     rail[samples] = code
     (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
@@ -63,12 +63,12 @@ def test_a_code_for_a_missing_sample_is_no_measured_value(code, samples, tmp_pat
     (problem,) = [error.problem for error in errors_without_layout(raw, source)]
     assert problem == ("1 sample is missing" if len(samples) == 1 else f"{len(samples)} samples are missing")
     passage = read("a.csv", tmp_path, PASSAGE)
-    assert [c.name for c in passage.recordings[0].channels] == ["force"]  # it costs its channel alone
+    assert [c.name for c in passage.recordings[0].channels] == ["force"]  # only this channel is lost
 
 
 @pytest.mark.parametrize("samples", [[700, 2000], [700, 701, 702, 2000]])
 @pytest.mark.parametrize("code", [-99.0, -99.9, -99.99, -99.999])
-def test_a_code_with_two_nines_before_the_decimal_point_is_no_measured_value(code, samples, tmp_path):
+def test_a_code_with_two_nines_before_the_decimal_point_is_not_read_as_a_measured_value(code, samples, tmp_path):
     rail = 0.25 * RAIL
     rail[samples] = code
     (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
@@ -77,7 +77,7 @@ def test_a_code_with_two_nines_before_the_decimal_point_is_no_measured_value(cod
 
 
 @pytest.mark.parametrize(("code", "is_missing"), [(-99.99, True), (-99.9, False), (-99.0, False), (99.99, False)])
-def test_a_single_value_with_few_nines_may_be_measured(code, is_missing, tmp_path):
+def test_a_single_value_with_few_nines_is_accepted(code, is_missing, tmp_path):
     rail = 0.25 * RAIL
     rail[700] = code
     (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
@@ -85,8 +85,8 @@ def test_a_single_value_with_few_nines_may_be_measured(code, is_missing, tmp_pat
 
 
 @pytest.mark.parametrize("flank", [-40.0, -1.0])
-def test_a_pulse_that_is_clipped_at_such_a_value_is_measured(flank, tmp_path):
-    """The samples beside the limit are lower than all others: the signal is on its way there."""
+def test_a_pulse_that_is_clipped_at_such_a_value_is_accepted(flank, tmp_path):
+    """The samples beside the limit are lower than all others: the signal approaches the limit."""
     rail = np.round(RAIL / np.abs(RAIL).max() / 2.0, 3)
     rail[700:704] = [flank, -99.99, -99.99, flank]
     (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
@@ -94,7 +94,7 @@ def test_a_pulse_that_is_clipped_at_such_a_value_is_measured(flank, tmp_path):
 
 
 @pytest.mark.parametrize("dtype", ["f4", "f8", "i4"])
-def test_a_code_is_found_in_any_type_and_in_a_record_that_stays_in_the_file(dtype, tmp_path):
+def test_a_code_is_found_in_any_type_and_in_a_record_that_is_read_in_parts(dtype, tmp_path):
     n = 300_000  # the code lies in the second block
     rail = np.round(np.random.default_rng(1).normal(0.0, 20.0, n)).astype(dtype)
     rail[262_144] = -9999
@@ -108,7 +108,7 @@ def test_a_code_is_found_in_any_type_and_in_a_record_that_stays_in_the_file(dtyp
     assert [c.name for c in result.long_recordings[0].channels] == ["force"]
 
 
-def test_a_measured_value_of_this_form_has_near_neighbours(tmp_path):
+def test_a_value_of_this_form_with_similar_neighbours_is_accepted(tmp_path):
     rail = RAIL.copy()
     rail[700:707] = [200.0, 600.0, 950.0, 999.0, 900.0, 500.0, 100.0]
     (tmp_path / "a.csv").write_text(text_of(rows_of(rail)))
@@ -117,7 +117,7 @@ def test_a_measured_value_of_this_form_has_near_neighbours(tmp_path):
 
 
 @pytest.mark.parametrize("gap", [400, 2000])
-def test_a_counter_that_jumps_lost_samples_and_one_that_begins_again_did_not(gap, tmp_path):
+def test_a_jump_of_a_counter_is_an_error_and_its_restart_is_accepted(gap, tmp_path):
     ignored = RawDescription((*CHANNELS, RawChannel("n", "n", "ignored")), rate=20000.0)
     count = np.arange(N)
     count[gap:] += 17
@@ -130,14 +130,14 @@ def test_a_counter_that_jumps_lost_samples_and_one_that_begins_again_did_not(gap
 
 
 @pytest.mark.parametrize("row", ["0.5;OVER", "0.5;(0.4)", "0.5;---.--", "0.5;#"])
-def test_the_first_row_is_not_lost_for_one_cell_that_is_no_number(row, tmp_path):
+def test_a_cell_without_a_number_in_the_first_row_is_an_error(row, tmp_path):
     (tmp_path / "a.csv").write_text(text_of([row, *rows_of()]))
     _, message = reason_of(tmp_path, "a.csv")
     assert f"line 2: {row.split(';')[1]!r} is no number, in the first row of samples" in message
 
 
 @pytest.mark.parametrize("line", ["Range;5000", "hammer;beside the rail", "N;m/s²"])
-def test_a_label_below_the_names_is_no_row_of_samples(line, tmp_path):
+def test_a_label_below_the_names_is_not_read_as_a_row_of_samples(line, tmp_path):
     (tmp_path / "a.csv").write_text(text_of([line, *rows_of()]))
     assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
 
@@ -146,13 +146,13 @@ def test_a_label_below_the_names_is_no_row_of_samples(line, tmp_path):
     ("line", "reason"),
     [("Units: kN, g", ("entry_unknown", "unit_unknown")), ("Sampling rate: 25.6 kHz", ("wrong_rate",))],
 )
-def test_what_is_stated_below_the_numbers_counts(line, reason, tmp_path):
+def test_statements_below_the_numbers_are_compared_with_the_layout(line, reason, tmp_path):
     (tmp_path / "a.csv").write_text(text_of([*rows_of(), line, "End of data"], "force;rail"))
     found, message = reason_of(tmp_path, "a.csv")
     assert found in reason and f"line {N + 2}" in message
 
 
-def test_empty_columns_without_a_name_are_no_channels_wherever_they_are(tmp_path):
+def test_empty_columns_without_a_name_are_not_read_as_channels(tmp_path):
     rows = [";" + row.replace(";", ";;") + ";" for row in rows_of()]
     (tmp_path / "a.csv").write_text(text_of(rows, ";force [N];;rail [m/s²];"))
     (recording,) = read("a.csv", tmp_path, HAMMER).recordings
@@ -168,20 +168,20 @@ def test_empty_columns_without_a_name_are_no_channels_wherever_they_are(tmp_path
         ("OVER", "Copy"),
     ],
 )
-def test_the_remedy_is_that_of_the_cell(cell, remedy, tmp_path):
+def test_the_remedy_depends_on_the_content_of_the_cell(cell, remedy, tmp_path):
     (tmp_path / "a.csv").write_text(text_of([*rows_of()[:50], f"0.5;{cell}", *rows_of()]), encoding="utf-8")
     _, message = reason_of(tmp_path, "a.csv")
     assert "line 52" in message and remedy in message
 
 
 @pytest.mark.parametrize("encoding", ["utf-32", "utf-16"])
-def test_wide_characters_are_read(encoding, tmp_path):
+def test_text_in_wide_characters_is_read(encoding, tmp_path):
     (tmp_path / "a.csv").write_text(text_of(rows_of()), encoding=encoding)
     assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
 
 
 @pytest.mark.parametrize("part", ["chunks", "whole"])
-def test_samples_of_hdf5_that_were_never_written_are_no_zeros(part, tmp_path):
+def test_unwritten_samples_of_hdf5_are_not_read_as_zeros(part, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.attrs["rate"] = 20000.0
         file["force"] = FORCE
@@ -198,7 +198,7 @@ def test_samples_of_hdf5_that_were_never_written_are_no_zeros(part, tmp_path):
 
 
 @pytest.mark.parametrize("format", ["npz", "h5", "parquet"])
-def test_a_mask_is_named_and_one_that_masks_nothing_is_not(format, tmp_path):
+def test_a_mask_of_samples_is_an_error_and_an_empty_mask_is_accepted(format, tmp_path):
     for is_masked in (True, False):
         mask = np.arange(N) == (500 if is_masked else -1)
         path = tmp_path / f"a.{format}"
@@ -240,7 +240,7 @@ def write_with_clock(format, path, clock):
 
 @pytest.mark.parametrize("format", ["npz", "h5", "parquet", "tdms"])
 @pytest.mark.parametrize("clock", CLOCKS, ids=CLOCKS.values())
-def test_a_column_of_clock_times_is_held_against_the_rate(clock, format, tmp_path):
+def test_a_column_of_clock_times_is_compared_with_the_rate(clock, format, tmp_path):
     path = tmp_path / f"a.{format}"
     for rate in (20000.0, 25600.0):
         write_with_clock(format, path, [clock.format(k / rate) for k in range(N)])
@@ -274,7 +274,7 @@ def value_of(number, decimal_mark="."):
         ("Spring campaign\nhammer test\nforce rail\nN m/s²", "{} {}"),
     ],
 )
-def test_bars_and_blanks_separate_columns(head, row, mark, tmp_path):
+def test_columns_between_bars_or_blanks_are_read(head, row, mark, tmp_path):
     rows = [row.format(value_of(a, mark), value_of(b, mark)) for a, b in zip(FORCE, RAIL)]
     (tmp_path / "a.txt").write_text(text_of(rows, head), encoding="utf-8")
     result = read("a.txt", tmp_path, HAMMER)
@@ -287,13 +287,13 @@ def test_bars_and_blanks_separate_columns(head, row, mark, tmp_path):
 
 
 @pytest.mark.parametrize("line", ["Sample rate 25600 Hz", "dt 3.90625e-05", "Units: kN"])
-def test_what_stands_above_columns_between_blanks_counts(line, tmp_path):
+def test_statements_above_columns_between_blanks_are_compared_with_the_layout(line, tmp_path):
     (tmp_path / "a.txt").write_text(text_of([row.replace(";", " ") for row in rows_of()], f"{line}\nforce rail"))
     assert reason_of(tmp_path, "a.txt")[0] in ("wrong_rate", "unit_unknown", "entry_unknown")
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
-def test_names_behind_a_hash_are_names(separator, tmp_path):
+def test_names_behind_a_hash_are_read(separator, tmp_path):
     rows = [row.replace(";", separator) for row in rows_of()]
     (tmp_path / "a.csv").write_text(text_of(rows, f"# rate: 20000\n# force{separator}rail"))
     assert read("a.csv", tmp_path, HAMMER).recordings[0].n_sample == N
@@ -343,14 +343,14 @@ def packed(program):
 
 @pytest.mark.parametrize("name", ["A7_1.csv", "A7_1.packed"])
 @pytest.mark.parametrize("program", ["gzip", "bzip2", "xz", "tar", "ZIP"])
-def test_a_packed_file_is_named_as_such(program, name, tmp_path):
+def test_a_compressed_file_is_identified(program, name, tmp_path):
     (tmp_path / name).write_bytes(packed(program))
     _, message = reason_of(tmp_path, name)
     assert program in message and "Unpack it" in message
 
 
-def test_a_code_of_single_precision_is_one_and_its_neighbours_are_measured_values():
-    """The highest code of a converter is clipping among whole numbers, and 1000 is no null of a well log."""
+def test_a_code_in_single_precision_is_found_and_similar_values_are_accepted():
+    """The highest code of a 16-bit converter means clipping, and 1000 is no code for a missing sample."""
     assert missing_code(float(np.float32(1e20))) == 1e20 and missing_code(-32768.0) == -32768.0
     assert [missing_code(value) for value in (32766.0, -32766.0, 1000.0, 1.0001e20)] == [None] * 4
     physical = np.array([0.5, 2.0, 32767.0, 1.0])

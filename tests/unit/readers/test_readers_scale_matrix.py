@@ -1,6 +1,6 @@
-"""Every format x each way to state scale, unit, offset, fill value and sensitivity x right, wrong, missing, overruled.
+"""Every format with scale, unit, offset, fill value and sensitivity: right, wrong, missing or overridden.
 
-Each file is read to within rounding or rejected by name; nothing is misread without a message.
+Each file is read to within rounding or rejected; nothing is misread without a message.
 """
 
 import json
@@ -42,7 +42,7 @@ SCALES = [
     ("Nullpunkt", 0.0, -3.0),
 ]
 LAYOUT = RawDescription(SENSORS, rate=TRUE)
-OVERRULED = RawDescription(tuple(replace(s, unit=f"{s.unit}!") for s in SENSORS), rate=TRUE)
+OVERRIDDEN = RawDescription(tuple(replace(s, unit=f"{s.unit}!") for s in SENSORS), rate=TRUE)
 SCALED = RawDescription(tuple(replace(s, unit=f"0.4 {s.unit}!") for s in SENSORS), rate=TRUE)
 
 
@@ -71,7 +71,7 @@ def is_read(found, expected=SAMPLES):
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_a_stated_scale_is_neutral_overruled_or_rejected_by_name(format, tmp_path):
+def test_a_stated_scale_is_neutral_overridden_or_rejected(format, tmp_path):
     for name, neutral, value in SCALES:
         if format == "uff" and not name.isascii():
             continue
@@ -81,9 +81,11 @@ def test_a_stated_scale_is_neutral_overruled_or_rejected_by_name(format, tmp_pat
         assert is_read(outcome(path, tmp_path, LAYOUT)), (name, neutral)
         path = written(format, tmp_path, [(name, value)])
         assert is_rejected(outcome(path, tmp_path, LAYOUT), "scale_unknown", word), (name, value)
-        assert is_read(outcome(path, tmp_path, OVERRULED)), (name, value)
+        assert is_read(outcome(path, tmp_path, OVERRIDDEN)), (name, value)
         assert is_read(outcome(path, tmp_path, SCALED), 0.4 * SAMPLES), (name, value)
-        path = written(format, tmp_path, [("tip", "steel"), (name, value)])  # in a nested place, where there is one
+        path = written(
+            format, tmp_path, [("tip", "steel"), (name, value)]
+        )  # in a nested entry, if the format has such entries
         found = outcome(path, tmp_path, LAYOUT)
         assert is_rejected(found, "scale_unknown", word) or (format == "hdf5" and name in CF), (name, value, "nested")
 
@@ -111,7 +113,7 @@ def test_samples_that_equal_a_stated_fill_value_are_missing(format, name, tmp_pa
 @pytest.mark.parametrize("format", FORMATS)
 def test_a_unit_of_the_file_that_differs_from_the_layout_is_rejected(format, tmp_path):
     if format in ("npz", "mat", "parquet", "hdf5"):
-        pytest.skip("these files of the matrix state no unit; the layout tells it")
+        pytest.skip("these files of the matrix state no unit; the layout states it")
     path = written(format, tmp_path, [])
     for unit in ("kN", "lbf", "V", "m/s²"):
         layout = RawDescription((RawChannel("force", "force", "force", unit=unit), SENSORS[1]), rate=TRUE)
@@ -135,7 +137,7 @@ def test_a_unit_in_the_name_that_contradicts_the_stated_unit_is_rejected(tmp_pat
 def test_a_sensitivity_of_the_file_is_compared_with_that_of_the_layout(format, name, tmp_path):
     force = RawChannel("force", "force", "force", unit="V", sensitivity=0.23, sensitivity_unit="mV/N")
     layout = RawDescription((force, RawChannel("rail", "rail", "ignored")), rate=TRUE)
-    if format in ("csv", "tdms", "wav", "lvm", "uff", "rcmdx"):  # these files say N
+    if format in ("csv", "tdms", "wav", "lvm", "uff", "rcmdx"):  # these files state N
         layout = replace(layout, channels=(replace(force, unit="V!"), layout.channels[1]))
         assert outcome(written(format, tmp_path, [(name, 1.1)]), tmp_path, layout)[0] is not None
         return
@@ -144,7 +146,7 @@ def test_a_sensitivity_of_the_file_is_compared_with_that_of_the_layout(format, n
         assert is_read(found, SAMPLES[:1] / 0.23e-3) if is_right else is_rejected(found, "scale_unknown", "0.23 mV/N")
 
 
-def test_a_sensitivity_in_the_head_of_text_in_volts_is_compared(tmp_path):
+def test_a_sensitivity_in_the_header_of_text_in_volts_is_compared(tmp_path):
     write_csv(tmp_path / "a.csv", [("Empfindlichkeit", "2,2 mV/N")])
     text = (tmp_path / "a.csv").read_text(encoding="utf-8").replace("force [N]", "force [V]")
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
@@ -168,7 +170,7 @@ NESTED = [  # metadata of a file, and the channels whose scale is undecided
 
 @pytest.mark.parametrize("format", ["hdf5", "parquet", "npz", "wav"])
 @pytest.mark.parametrize(("facts", "undecided"), NESTED)
-def test_each_nested_scale_counts_for_the_channel_that_its_place_names(format, facts, undecided, tmp_path):
+def test_each_nested_scale_is_used_for_the_channel_of_its_entry(format, facts, undecided, tmp_path):
     path = tmp_path / FORMATS[format][1]
     FORMATS[format][0](path, [(k, v if format == "wav" else json.dumps(v)) for k, v in facts.items()][:1])
     if len(facts) > 1:
@@ -186,7 +188,7 @@ def test_each_nested_scale_counts_for_the_channel_that_its_place_names(format, f
             assert is_read(found, SAMPLES[[SENSORS.index(sensor)]])
 
 
-def test_the_scale_of_a_group_overrules_that_of_its_parent(tmp_path):
+def test_the_scale_of_a_group_overrides_that_of_its_parent(tmp_path):
     for outer, inner in ((10.0, 1.0), (1.0, 10.0)):
         for nested in (False, True):
             with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -226,7 +228,7 @@ def test_a_stated_scale_that_is_not_understood_is_rejected_with_its_value(format
         ("Gain\t1\t1\tchecked 10", set()),
     ],
 )
-def test_a_scale_per_channel_in_the_header_of_a_segment_holds_whatever_follows_it(line, undecided, tmp_path):
+def test_a_scale_per_channel_in_the_header_of_a_segment_is_used_whatever_follows_it(line, undecided, tmp_path):
     write_lvm(tmp_path / "a.lvm", [])
     text = (tmp_path / "a.lvm").read_text(encoding="utf-8").replace("\nY_Unit_Label", f"\n{line}\nY_Unit_Label")
     assert line in text
@@ -242,7 +244,7 @@ HAMMER = RawChannel("force", "force", "force", unit="V", sensitivity=2.25, sensi
 SENSOR = RawChannel("rail", "rail", "acceleration", unit="V", sensitivity=100.0, sensitivity_unit="mV/g")
 
 
-def sensitivity_words(facts, tmp_path, channels=(HAMMER, SENSOR)):
+def result_with_sensitivity(facts, tmp_path, channels=(HAMMER, SENSOR)):
     """ "read", or the channel of the first error."""
     np.savez(tmp_path / "a.npz", **dict(zip(UNITS, SAMPLES)), info=np.array(json.dumps(facts)))
     samples, errors = outcome("a.npz", tmp_path, RawDescription(channels, rate=TRUE))
@@ -277,7 +279,7 @@ def sensitivity_words(facts, tmp_path, channels=(HAMMER, SENSOR)):
     ],
 )
 def test_a_stated_sensitivity_is_compared_with_the_channel_to_which_it_belongs(facts, found, tmp_path):
-    assert sensitivity_words(facts, tmp_path) == found
+    assert result_with_sensitivity(facts, tmp_path) == found
 
 
 def test_the_sensitivity_of_each_record_is_compared(tmp_path):
@@ -306,7 +308,7 @@ def test_a_fill_value_that_was_applied_before_unpacking_is_not_compared_with_the
     assert is_rejected(outcome("a.h5", tmp_path, LAYOUT), "not_finite", "channel 'rail': 1 of 2000")
 
 
-def test_a_fill_value_holds_for_the_channel_that_its_place_names(tmp_path):
+def test_a_fill_value_is_used_for_the_channel_of_its_entry(tmp_path):
     samples = SAMPLES.copy()
     samples[0, 7] = 0.0
     for facts, is_rejected_now in (
@@ -358,7 +360,7 @@ OTHER_SCALES = (  # of other things, or no numbers
 
 
 @pytest.mark.parametrize("format", ["csv", "tdms", "hdf5", "parquet", "npz"])
-def test_a_number_that_may_be_a_scale_is_rejected_by_name(format, tmp_path):
+def test_a_number_that_may_be_a_scale_is_rejected(format, tmp_path):
     for name in POSSIBLE_SCALES:
         words = ("0.25",) if format == "csv" else (name, "0.25")  # text is shown in plain letters
         assert is_rejected(
@@ -378,8 +380,8 @@ FACTORS = {
 
 
 @pytest.mark.parametrize("names", FACTORS, ids=" and ".join)
-def test_a_factor_in_the_name_of_a_channel_is_a_scale_of_which_nothing_says_whether_it_is_applied(names, tmp_path):
-    """Before, the numbers were read without a message, a hundred times too large or too small."""
+def test_a_factor_in_the_name_of_a_channel_is_a_scale_that_may_not_have_been_applied(names, tmp_path):
+    """Formerly, such numbers were read without a message, a hundred times too large or too small."""
     rows = "".join(f"{a};{b}\n" for a, b in np.random.default_rng(6).normal(size=(40, 2)).round(4))
     (tmp_path / "a.csv").write_text(f"{';'.join(names)}\n{rows}", encoding="utf-8")
     rejected = []
@@ -393,8 +395,8 @@ def test_a_factor_in_the_name_of_a_channel_is_a_scale_of_which_nothing_says_whet
     assert rejected == FACTORS[names]
 
 
-def test_a_scale_of_the_second_record_alone_is_no_part_of_the_first(tmp_path):
-    """The assignment of channels is computed once for records that state the same, and only for these."""
+def test_a_scale_of_the_second_record_is_not_used_for_the_first(tmp_path):
+    """The assignment of channels is computed once only for records with the same statements."""
     with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
         for group, properties in (("1", {}), ("2", {"gain": 10.0})):
             samples = np.random.default_rng(6).normal(size=40)
