@@ -259,5 +259,6 @@ CHANNEL_REASONS = frozenset(
         "clock_drift",
         "spikes",
         "sensor_lost",
+        "drop_out",
     )
 )

@@ -59,6 +59,7 @@ REASONS = {
     "channels_swapped": "channels arrive in the wrong order",
     "clock_drift": "the loggers' clocks drift apart",
     "sensor_lost": "a sensor stopped working during the recording",
+    "drop_out": "a channel repeats one value for many samples, while it moves before and behind them",
     "interference": "electrical pulses on all channels at the same moment; they were removed",
     "spikes": "single samples that stand out of a channel; they were replaced by the mean of their neighbours",
     "simulation_failed": "the simulation could not be completed",

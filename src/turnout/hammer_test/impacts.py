@@ -17,6 +17,7 @@ from turnout.hammer_test.impact_quality import is_repeated, judge_against_median
 from turnout.hammer_test.impact_window import NO_CONTACT
 from turnout.hammer_test.segmentation import cut_impacts
 from turnout.records import Impact, Recording, Rejection
+from turnout.signal.drop_outs import drop_outs
 
 if TYPE_CHECKING:
     from turnout.hammer_test.impact_window import Contact, Cut
@@ -100,6 +101,9 @@ def _measure(cut: Cut, settings: ReceptanceSettings) -> None:
         cut.acceleration, cut.zeros = cut.acceleration - zero, (cut.zeros[0], zero)
     if np.ptp(cut.acceleration) == 0.0:
         cut.rejections.append(Rejection("dead_channel", 0.0, None, f"{response} is constant", response))
+    if (stretches := drop_outs(cut.acceleration)).size:
+        n = int(np.sum(stretches[:, 1] - stretches[:, 0]))
+        cut.rejections.append(Rejection("drop_out", n, 0.0, f"{response} repeats one value for {n} samples", response))
     if cut.polarity < 0:
         cut.rejections.append(Rejection("sign_reversed", contact.peak, 0.0, (
             f"{force} reads {contact.peak:.4g} N at contact: a hammer can only push; "

@@ -1,6 +1,6 @@
 """Check each channel of a passage before axles are sought in it.
 
-Channels are reported that are clipped, constant or not finite, and sensors that are lost during the passage: they
+Channels are reported that are clipped, constant or not finite, or drop out, and sensors that are lost during the passage: they
 fell off, or their cable broke.
 """
 
@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from turnout.records import Recording, Rejection
 from turnout.signal.converter import converter_step
+from turnout.signal.drop_outs import drop_outs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -50,10 +51,23 @@ def channel_states(recording: Recording) -> tuple[ChannelState, ...]:
         One per acceleration channel.
     """
     rows = recording.of_quantity("acceleration")
-    return tuple(_channel_state(recording.channels[i], recording.samples[i], recording.rate) for i in rows)
+    limit = _common_limit([recording.samples[i] for i in rows])
+    return tuple(_channel_state(recording.channels[i], recording.samples[i], recording.rate, limit) for i in rows)
 
 
-def _channel_state(channel: Channel, samples: np.ndarray, rate: float) -> ChannelState:
+def _common_limit(signals: Sequence[np.ndarray]) -> float | None:
+    """The value at which at least two channels, and half of them, are clipped: a range that no file states. [m/s²]
+
+    One channel alone may have a fault of its own, which a comparison with the others shows better.
+    """
+    outcomes = [clipped_share(x, None) for x in signals if np.all(np.isfinite(x)) and np.ptp(x) > 0.0]
+    levels = [level for share, level in outcomes if share > 0.0]
+    if len(levels) < max(2, len(signals) / 2) or min(levels) < LIMIT_AGREEMENT * max(levels):
+        return None
+    return float(min(levels))
+
+
+def _channel_state(channel: Channel, samples: np.ndarray, rate: float, common_limit: float | None) -> ChannelState:
     if not np.all(np.isfinite(samples)):
         bad = np.flatnonzero(~np.isfinite(samples))
         first = float(bad[0] / rate)
@@ -65,6 +79,8 @@ def _channel_state(channel: Channel, samples: np.ndarray, rate: float) -> Channe
         finding = Rejection("dead_channel", 0.0, 0.0, channel.name, channel.name)
         return ChannelState(channel.name, False, False, (finding,))
     share, level = clipped_share(samples, channel.limit)
+    if share == 0.0 and common_limit is not None:
+        share, level = clipped_share(samples, common_limit)
     findings = []
     if share > 0:
         text = f"{channel.name}: {100 * share:.3f} % of the samples at ±{level:.4g} m/s²"
@@ -73,9 +89,14 @@ def _channel_state(channel: Channel, samples: np.ndarray, rate: float) -> Channe
     if lost_at is not None:
         text = f"{channel.name}: constant from {lost_at:.2f} s on"
         findings.append(Rejection("sensor_lost", lost_at, None, text, channel.name, time=lost_at))
+    if (stretches := drop_outs(samples)).size:
+        n, first = int(np.sum(stretches[:, 1] - stretches[:, 0])), float(stretches[0, 0] / rate)
+        text = f"{channel.name}: {n} samples, the first at {first:.3f} s"
+        findings.append(Rejection("drop_out", float(n), 0.0, text, channel.name, time=first))
     return ChannelState(channel.name, share < 0.2, not findings, tuple(findings), lost_at)
 
 
+LIMIT_AGREEMENT = 0.98  # least ratio of the limits of channels that share one: gains differ by a percent or two
 MIN_CLIPPED_RUN = 3  # equal extreme samples in a row that count as clipped
 MIN_CONSTANT_TIME = 0.05  # s, shortest constant end that counts, and length of the start that it is compared with
 

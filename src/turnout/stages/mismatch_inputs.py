@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 MID_SPAN_OFFSET = 0.3  # m: distance of a "mid-span" accelerometer from the sleeper of the impact
 MAX_CLIPPED_SHARE = 0.002  # share of clipped samples that leaves the band of the diagnosis unchanged
 MAX_SIMILAR_PASSAGES = 16  # similar passages per visit: twice the limit of a case
-UNUSABLE_REASONS = ("clipped", "dead_channel", "not_finite", "sensor_lost", "channels_swapped")
+UNUSABLE_REASONS = ("clipped", "dead_channel", "not_finite", "sensor_lost", "drop_out", "channels_swapped")
 
 
 @dataclass(frozen=True)

@@ -274,7 +274,7 @@ def _fit_rows(
     settings: PassageSettings,
 ) -> list[dict[str, Any]]:
     """One row per sensor that recorded the train; where its section has no model, with the peak alone."""
-    clipped = {f.channel for f in passage.findings if f.reason == "clipped"}
+    unfit = {f.channel for f in passage.findings if f.reason in ("clipped", "drop_out")}
     lost_from = {f.channel: f.time for f in passage.findings if f.reason == "sensor_lost"}
     rows = []
     latest = {label: model_at(models, identity["passed_at_utc"]) for label, models in context.models.items()}
@@ -286,9 +286,9 @@ def _fit_rows(
         lost_at = lost_from.get(sensor.name)
         if lost_at is not None:
             times = times[times + settings.score_window < lost_at]
-        is_clipped = sensor.name in clipped and lost_at is None
+        is_unfit = sensor.name in unfit and lost_at is None
         fit = None
-        if not is_clipped and len(times) >= 2:
+        if not is_unfit and len(times) >= 2:
             samples, model = recording.signal(sensor.name), section_model.model if section_model else None
             if model is None or not is_scored(identity["passed_at_utc"], settings.scored_share):
                 fit = find_peak(samples, recording.rate, times, model, settings)

@@ -27,6 +27,7 @@ REMEDIES = {
     "dead_channel": "Look at the sensor and its cable",
     "not_finite": "Export the file again without gaps",
     "sensor_lost": "Look at the sensor and its cable",
+    "drop_out": "Look at the radio link, or at the buffer of the logger",
     "interference": "Nothing: they were cut out. Where they come with many trains, look at shields and earthing",
     "spikes": "Nothing: they were replaced. Where they come with many trains, look at the converter or radio link",
     "channels_swapped": "Exchange the two channels in the layout, or at the logger",

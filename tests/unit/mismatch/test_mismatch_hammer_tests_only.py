@@ -153,6 +153,24 @@ def test_an_impact_is_not_compared_at_sensors_far_from_it():
     assert compared == {(20.4, s.name) for s in plan.sensors} | {(30.0, "S2"), (30.0, "S3"), (30.0, "S4")}
 
 
+def test_a_channel_whose_impacts_are_all_rejected_is_stated_once(plan):
+    campaign, tolerance = measured_campaign(plan), MismatchSettings().pair_tolerance
+    assert observe_tests(campaign, tolerance).notes == ()
+    name = campaign.sensors[1].name
+
+    def drop_out(recording):
+        samples, row = recording.samples.copy(), recording.index(name)
+        first = int(np.argmax(np.abs(samples[row]))) + 3
+        samples[row, first : first + 60] = samples[row, first]
+        return replace(recording, samples=samples)
+
+    tests = observe_tests(campaign.with_recordings("hammer tests", drop_out), tolerance)
+    n = len(campaign.hammer)
+    assert n > 1 and name not in {p.channel for p in tests.frf_pairs.values()}
+    (note,) = tests.notes
+    assert note.startswith(f"channel {name} is not used in {n} of {n} hammer tests (drop_out: ")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("limit", "most"), [(1000.0, 0.8), (4000.0, 0.45)])
 def test_dry_friction_slips_at_a_low_limit_and_sticks_at_a_high_one(plan, limit, most):

@@ -46,8 +46,23 @@ class HammerInput:
         list of Impact
             In the order of the recordings.
         """
+        return [i for i in self.impacts(response) if i.accepted]
+
+    def impacts(self, response: str) -> list[Impact]:
+        """All impacts of the recordings that have the channel ``response``, also rejected ones.
+
+        Parameters
+        ----------
+        response : str
+            Name of a channel of acceleration.
+
+        Returns
+        -------
+        list of Impact
+            In the order of the recordings.
+        """
         recordings = [r for r in self.recordings if response in [c.name for c in r.channels]]
-        return [i for i in find_impacts(recordings, self.force, response, self.impact_settings) if i.accepted]
+        return find_impacts(recordings, self.force, response, self.impact_settings)
 
 
 @dataclass(frozen=True)

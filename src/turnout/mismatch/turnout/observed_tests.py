@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit
 from turnout.mismatch.turnout.toe_position import with_toe
 from turnout.mismatch.turnout.track_parameters import track_with
+from turnout.reasons import REASONS
 from turnout.simulate.sensor import Sensor
 
 
@@ -51,7 +53,7 @@ def observe_tests(
     -------
     ObservedTests
     """
-    pairs, observations, notes = {}, [], []
+    pairs, observations, notes, rejected_channels = {}, [], [], []
     for test in campaign.hammer:
         sensors = [
             s
@@ -67,7 +69,19 @@ def observe_tests(
         for pair, observation in pairs_of_test:
             pairs[pair.name] = pair
             observations.append((test.name, observation))
+        unused = {s.name for s in sensors} - {pair.channel for pair, _ in pairs_of_test}
+        rejected_channels += [(c, r) for c in sorted(unused) if (r := _fault_of_channel(test, c))]
+    notes += [
+        f"channel {c} is not used in {n} of {len(campaign.hammer)} hammer tests ({r}: {REASONS[r]})"
+        for (c, r), n in Counter(rejected_channels).items()
+    ]
     return ObservedTests(pairs, tuple(observations), tuple(notes))
+
+
+def _fault_of_channel(test: HammerInput, channel: str) -> str | None:
+    """The reason of most rejections of the impacts of a test that concern this channel, None without any."""
+    reasons = Counter(r.reason for i in test.impacts(channel) for r in i.rejections if r.channel == channel)
+    return reasons.most_common(1)[0][0] if reasons else None
 
 
 def compare_channels(predictor: Predictor, tests: ObservedTests) -> list[Comparison]:
