@@ -14,6 +14,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.channel_identity import ChannelFaults, exchanged_channels
+from turnout.mismatch.turnout.deviating_tests import DeviatingTests, deviating_tests
 from turnout.mismatch.turnout.disturbances import Disturbance
 from turnout.mismatch.turnout.impact_positions import MisplacedTests, misplaced_tests
 from turnout.mismatch.turnout.observed_passages import observe_passages
@@ -25,7 +26,7 @@ from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
 
-LayoutFault = ChannelFaults | MisplacedTests | WrongScale
+LayoutFault = ChannelFaults | MisplacedTests | WrongScale | DeviatingTests
 
 
 @dataclass(frozen=True)
@@ -184,6 +185,7 @@ def case_data(
         misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
         exchanged_channels("hammer tests", comparisons),
         wrong_scale("hammer tests", comparisons),
+        deviating_tests(list(dict.fromkeys(p.test.name for p in tests.frf_pairs.values())), comparisons),
     ):
         if faults and faults.recording_type not in is_corrected:
             return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))

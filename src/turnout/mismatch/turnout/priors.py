@@ -307,6 +307,10 @@ class ChannelPriors:
         1.3, "-", "factor from which all channels of passages have a wrong scale", CHANNELS)
     min_impact_scale: float = prior(
         2.0, "-", "the same of hammer tests, whose level depends on the track as well", CHANNELS)
+    min_test_scale: float = prior(
+        3.0, "-", "the same of single hammer tests, over the median of all; right ones differ by 1.8", CHANNELS)
+    min_tests: int = prior(
+        3, "hammer tests", "at least, to compare their amplitudes with each other", CHANNELS)
     scale_spread: float = prior(
         2.0, "-", "within which the channels of a wrong scale share one factor", CHANNELS)
     unit_tolerance: float = prior(
