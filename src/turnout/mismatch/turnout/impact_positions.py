@@ -1,4 +1,4 @@
-"""Hammer tests that agree with impacts at another position than the one stated: their files are misnamed."""
+"""Hammer tests that agree with impacts at another position than the stated one: misnamed files, or a wrong mark."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from turnout.mismatch.turnout.campaign import CampaignInput
-from turnout.mismatch.turnout.observed_tests import ObservedTests, mean_correlation
+from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
+from turnout.mismatch.turnout.observed_tests import ObservedTests, correlations_at, mean_correlation
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 
@@ -36,7 +36,8 @@ class MisplacedTests:
             tests_of.setdefault(positions, []).append(name)
         return [
             f"Hammer tests {', '.join(names)} agree with impacts at {agreeing:.2f} m and not with impacts at "
-            f"{stated:.2f} m, as stated. The diagnosis takes them where they agree. Check the names of their files"
+            f"{stated:.2f} m, as stated. The diagnosis takes them where they agree. Check the names of their files, "
+            "and where the impacts were made"
             for (stated, agreeing), names in tests_of.items()
         ]
 
@@ -79,9 +80,35 @@ def misplaced_tests(predictor: Predictor, tests: ObservedTests, positions: Itera
     for test in {pair.test.name: pair.test for pair in tests.frf_pairs.values()}.values():
         stated_correlation = mean_correlation(predictor, tests, test, test.place)
         if stated_correlation >= CHANNELS_CHECK.same_sensor:
+            if (nearby := _position_nearby(predictor, tests, test)) is not None:
+                misplaced[test.name] = test.place, nearby
             continue
         trials = [(mean_correlation(predictor, tests, test, x), x) for x in stated_positions if x != test.place]
         best_correlation, best_position = max(trials, default=(-np.inf, test.place))
         if best_correlation >= max(CHANNELS_CHECK.same_sensor, stated_correlation + CHANNELS_CHECK.min_gain):
             misplaced[test.name] = test.place, best_position
     return MisplacedTests(misplaced)
+
+
+def _position_nearby(predictor: Predictor, tests: ObservedTests, test: HammerInput) -> float | None:
+    """Position beside the stated one where *every* channel of a test agrees better [m], None if there is none.
+
+    Sensors on both sides are needed. A track that is stiffer or softer than in its file, or a sensor elsewhere, moves
+    the best position of a channel towards its sensor or away from it, and that of one on the other side oppositely.
+    """
+    distances = [p.sensor.place - test.place for p in tests.frf_pairs.values() if p.test.name == test.name]
+    far = CHANNELS_CHECK.min_side_distance
+    if not min(distances) <= -far < far <= max(distances):
+        return None
+    stated = correlations_at(predictor, tests, test, test.place)
+    for side in (-1.0, 1.0):
+        position, best, step = None, stated, CHANNELS_CHECK.first_position_step
+        while step <= CHANNELS_CHECK.max_position_step:
+            trial = correlations_at(predictor, tests, test, test.place + side * step)
+            if np.any(trial <= stated) or trial.mean() <= best.mean():
+                break
+            position, best = test.place + side * step, trial
+            step += CHANNELS_CHECK.position_step
+        if position is not None and best.mean() - stated.mean() >= CHANNELS_CHECK.min_position_gain:
+            return round(position, 2)
+    return None

@@ -140,13 +140,34 @@ def mean_correlation(predictor: Predictor, tests: ObservedTests, test: HammerInp
     -------
     float
     """
+    return float(np.mean(correlations_at(predictor, tests, test, position)))
+
+
+def correlations_at(predictor: Predictor, tests: ObservedTests, test: HammerInput, position: float) -> np.ndarray:
+    """Correlation of each channel of a test with the simulation of impacts at a position, on the track as filed.
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Of the site as filed.
+    tests : ObservedTests
+        Hammer tests of the campaign.
+    test : HammerInput
+        One of them.
+    position : float
+        Of the impacts. [m]
+
+    Returns
+    -------
+    (n_channel,) array of float
+    """
     values = {n.name: n.mean for n in predictor.site.shared_nuisances()}
     moved = replace(test, place=position)
     pairs = {n: replace(p, test=moved) for n, p in tests.frf_pairs.items() if p.test.name == test.name}
     observations = [o for _, o in tests.observations if o.name in pairs]
     trials = predictor.with_recordings({**tests.frf_pairs, **pairs}, {})
     simulated = trials.predict(values, (), observations)
-    return float(np.mean([_correlation(pairs[o.name], o.data, row) for o, row in zip(observations, simulated)]))
+    return np.array([_correlation(pairs[o.name], o.data, row) for o, row in zip(observations, simulated)])
 
 
 def _correlation(pair: FrfPair, measured: np.ndarray, simulated: np.ndarray) -> float:

@@ -307,6 +307,14 @@ class ChannelPriors:
         1.3, "-", "factor from which all channels of passages have a wrong scale", CHANNELS)
     min_impact_scale: float = prior(
         2.0, "-", "the same of hammer tests, whose level depends on the track as well", CHANNELS)
+    min_side_distance: float = prior(
+        0.5, "m", "of sensors on both sides of an impact, at least, to find its position", CHANNELS)
+    first_position_step: float = prior(
+        0.15, "m", "of an impact from its stated position, at least: nearer ones change no answer", CHANNELS)
+    position_step: float = prior(0.05, "m", "of the further steps", "numerical")
+    max_position_step: float = prior(0.6, "m", "of an impact from its stated position, at most: a bay", CHANNELS)
+    min_position_gain: float = prior(
+        0.05, "-", "of the mean correlation at another position, while that of every channel rises", CHANNELS)
     min_test_scale: float = prior(
         3.0, "-", "the same of single hammer tests, over the median of all; right ones differ by 1.8", CHANNELS)
     min_tests: int = prior(
