@@ -1,7 +1,7 @@
 """Check each channel of a passage before axles are sought in it.
 
-Channels are reported that are clipped, constant or not finite, or drop out, and sensors that are lost during the passage: they
-fell off, or their cable broke.
+Channels are reported that are clipped, constant or not finite, or drop out, and sensors that are lost during the
+passage: they fell off, or their cable broke.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ def drop_outs(samples: np.ndarray) -> np.ndarray:
 
     A drop-out is a run of ``MIN_RUN`` equal samples or more. As many samples before it, and as many behind it, have no
     run longer than 1 / ``RUN_FACTOR`` of it: a quiet channel repeats its values everywhere. Both also vary by
-    ``MIN_STEPS`` steps of the converter or more, since a coarse channel stays at one step by chance. Runs at the largest or
-    smallest value are clipped, and those at the ends of a recording are a sensor that starts late or is lost.
+    ``MIN_STEPS`` steps of the converter or more, since a coarse channel stays at one step by chance. Runs at the top
+    or bottom of the channel are clipped, and those at the ends of a recording are a sensor that starts late or is lost.
 
     Parameters
     ----------
@@ -46,15 +46,15 @@ def drop_outs(samples: np.ndarray) -> np.ndarray:
     lengths, (low, high) = stops - starts, (samples.min(), samples.max())
     least = MIN_STEPS * converter_step(samples)
     is_candidate = (lengths >= MIN_RUN) & (samples[starts] > low) & (samples[starts] < high)
-    found = []
+    stretches = []
     for k in np.flatnonzero(is_candidate):
         start, stop, length = starts[k], stops[k], lengths[k]
         if start < length or samples.size - stop < length:
             continue
         windows = samples[start - length : start], samples[stop : stop + length]
         if max(map(_longest_run, windows)) * RUN_FACTOR <= length and min(map(np.std, windows)) >= least:
-            found.append((start, stop))
-    return np.array(found, dtype=int).reshape(-1, 2)
+            stretches.append((start, stop))
+    return np.array(stretches, dtype=int).reshape(-1, 2)
 
 
 def _longest_run(samples: np.ndarray) -> int:

@@ -28,7 +28,7 @@ from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
 from turnout.stages.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.stages.passage_context import known_patterns
-from turnout.stages.recording_notes import noted_rail_temperature, rail_temperature
+from turnout.stages.recording_notes import doubt_of_rail_temperature, noted_rail_temperature, rail_temperature
 from turnout.workflow.current_results import current_results
 from turnout.workflow.scan import unit_id
 
@@ -270,6 +270,8 @@ def _passage_input(
         return None
     has_diverging = any(s.track == "diverging" for s in turnout.sections)
     notes += [Note(doubt, name) for doubt in (*train.doubts, *(train.route_doubts if has_diverging else ()))]
+    if doubt := doubt_of_rail_temperature(recording.conditions):
+        notes.append(Note(doubt, name, fault=("condition_lost", "rail_temperature")))
     usable = _usable_channels(recording, turnout, train.route, unusable)
     if excluded := sorted(unusable & {c.name for c in recording.channels}):
         notes.append(Note(f"channels {', '.join(excluded)} not used{_reasons_text(quarantine)}", name))

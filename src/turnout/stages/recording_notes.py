@@ -63,6 +63,32 @@ def noted_rail_temperature(notes: Mapping[str, Any]) -> float | None:
     return value if value is not None and MIN_RAIL_TEMPERATURE <= value <= MAX_RAIL_TEMPERATURE else None
 
 
+def doubt_of_rail_temperature(notes: Mapping[str, Any]) -> str | None:
+    """Why a noted rail temperature is not used, in words; None where it is, or where none is noted.
+
+    Parameters
+    ----------
+    notes : mapping of str to any
+        Notes of a record by name.
+
+    Returns
+    -------
+    str or None
+
+    Examples
+    --------
+    >>> doubt_of_rail_temperature({"rail_temperature": 20.0}), doubt_of_rail_temperature({})
+    (None, None)
+    """
+    value = noted_number(notes, "rail_temperature")
+    if value is None or noted_rail_temperature(notes) is not None:
+        return None
+    return (
+        f"a rail temperature of {value:g} °C is noted, outside {MIN_RAIL_TEMPERATURE:g} to {MAX_RAIL_TEMPERATURE:g}: "
+        "not used. Is the thermometer broken, or the unit another one?"
+    )
+
+
 def rail_temperature(recordings: Iterable[Recording]) -> float | None:
     """Median of the rail temperatures noted in recordings. [°C]
 

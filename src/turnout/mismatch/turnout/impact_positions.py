@@ -102,13 +102,13 @@ def _position_nearby(predictor: Predictor, tests: ObservedTests, test: HammerInp
         return None
     stated = correlations_at(predictor, tests, test, test.place)
     for side in (-1.0, 1.0):
-        position, best, step = None, stated, CHANNELS_CHECK.first_position_step
+        position, agreeing, step = None, stated, CHANNELS_CHECK.first_position_step
         while step <= CHANNELS_CHECK.max_position_step:
             trial = correlations_at(predictor, tests, test, test.place + side * step)
-            if np.any(trial <= stated) or trial.mean() <= best.mean():
+            if np.any(trial <= stated) or trial.mean() <= agreeing.mean():
                 break
-            position, best = test.place + side * step, trial
+            position, agreeing = test.place + side * step, trial
             step += CHANNELS_CHECK.position_step
-        if position is not None and best.mean() - stated.mean() >= CHANNELS_CHECK.min_position_gain:
+        if position is not None and agreeing.mean() - stated.mean() >= CHANNELS_CHECK.min_position_gain:
             return round(position, 2)
     return None
