@@ -539,9 +539,7 @@ def test_spikes_in_recordings_are_replaced_and_stated_once_for_each_channel(fold
 def test_a_rail_temperature_that_no_rail_has_is_stated_once(folder):
     """29.5 °C are 85.1 degrees Fahrenheit; a broken thermometer notes 85."""
     hot = {"rail_temperature": 85.1}
-    small.write_passages(
-        folder, speeds=(100.0, 110.0), change=lambda r: replace(r, conditions={**r.conditions, **hot})
-    )
+    small.write_passages(folder, speeds=(100.0, 110.0), change=lambda r: replace(r, conditions={**r.conditions, **hot}))
     found = gathered(folder, "passage")
     assert len(found.passages) == 2 and not any("rail_temperature" in p.conditions for p in found.passages)
     (note,) = (n.text for n in found.notes if "rail temperature" in n.text)

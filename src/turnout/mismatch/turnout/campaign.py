@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -48,7 +48,7 @@ class HammerInput:
         """
         return [i for i in self.impacts(response) if i.accepted]
 
-    def impacts(self, response: str) -> list[Impact]:
+    def impacts(self, response: str) -> Sequence[Impact]:
         """All impacts of the recordings that have the channel ``response``, also rejected ones.
 
         Parameters
@@ -58,7 +58,7 @@ class HammerInput:
 
         Returns
         -------
-        list of Impact
+        sequence of Impact
             In the order of the recordings.
         """
         recordings = [r for r in self.recordings if response in [c.name for c in r.channels]]
