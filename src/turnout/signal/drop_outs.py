@@ -19,8 +19,10 @@ def drop_outs(samples: np.ndarray) -> np.ndarray:
 
     A drop-out is a run of ``MIN_RUN`` equal samples or more. As many samples before it, and as many behind it, have no
     run longer than 1 / ``RUN_FACTOR`` of it: a quiet channel repeats its values everywhere. Both also vary by
-    ``MIN_STEPS`` steps of the converter or more, since a coarse channel stays at one step by chance. Runs at the top
-    or bottom of the channel are clipped, and those at the ends of a recording are a sensor that starts late or is lost.
+    ``MIN_STEPS`` steps of the converter or more, since a coarse channel stays at one step by chance. The run begins
+    with a change of so many steps, or its value is so far from the median of the channel: a vibration that a coarse
+    converter resolves no more ends gradually, at the median. Runs at the top or bottom of the channel are
+    clipped, and those at the ends of a recording are a sensor that starts late or is lost.
 
     Parameters
     ----------
@@ -46,6 +48,8 @@ def drop_outs(samples: np.ndarray) -> np.ndarray:
     lengths, (low, high) = stops - starts, (samples.min(), samples.max())
     least = MIN_STEPS * converter_step(samples)
     is_candidate = (lengths >= MIN_RUN) & (samples[starts] > low) & (samples[starts] < high)
+    first_changes = np.abs(samples[starts] - samples[starts - 1])  # of no use in the first run, which is no candidate
+    is_candidate &= np.maximum(first_changes, np.abs(samples[starts] - np.median(samples))) >= least
     stretches = []
     for k in np.flatnonzero(is_candidate):
         start, stop, length = starts[k], stops[k], lengths[k]

@@ -49,6 +49,16 @@ def test_a_coarse_or_quiet_channel_has_none(step):
         assert drop_outs(step * np.round(noise(20_000, seed) / step)).size == 0
 
 
+@pytest.mark.parametrize("codes", [50, 100, 300])
+def test_quiet_between_wheels_that_a_coarse_converter_does_not_resolve_is_none(codes):
+    """The vibration of each wheel rises and decays; half the time it is below half a step of the converter."""
+    time_constant, samples = 25.0, np.arange(6000)
+    distance = 4.0 * time_constant * np.log(2.0 * codes)
+    from_wheel = (samples % distance) - distance / 2.0
+    rounded = np.round(np.exp(-np.abs(from_wheel) / time_constant) * np.sin(0.9 * samples) * codes) / codes
+    assert np.diff(np.flatnonzero(np.diff(rounded))).max() > 5 * MIN_RUN and drop_outs(rounded).size == 0
+
+
 def test_a_clipped_channel_has_none():
     slow = 3.0 * np.sin(0.01 * np.arange(4000)) + 0.1 * noise()
     assert drop_outs(np.clip(slow, -2.0, 2.0)).size == 0
