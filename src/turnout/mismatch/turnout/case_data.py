@@ -14,6 +14,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.channel_identity import ChannelFaults, exchanged_channels
+from turnout.mismatch.turnout.common_delay import CommonDelay, common_delay
 from turnout.mismatch.turnout.deviating_tests import DeviatingTests, deviating_tests
 from turnout.mismatch.turnout.disturbances import Disturbance
 from turnout.mismatch.turnout.impact_positions import MisplacedTests, misplaced_tests
@@ -26,7 +27,7 @@ from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
 
-LayoutFault = ChannelFaults | MisplacedTests | WrongScale | DeviatingTests
+LayoutFault = ChannelFaults | MisplacedTests | WrongScale | DeviatingTests | CommonDelay
 
 
 @dataclass(frozen=True)
@@ -182,6 +183,7 @@ def case_data(
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
     comparisons = compare_channels(predictor, tests)
     for faults in (
+        common_delay(predictor, tests),
         misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
         exchanged_channels("hammer tests", comparisons),
         wrong_scale("hammer tests", comparisons),

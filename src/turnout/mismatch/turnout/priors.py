@@ -319,6 +319,11 @@ class ChannelPriors:
         3.0, "-", "the same of single hammer tests, over the median of all; right ones differ by 1.8", CHANNELS)
     min_tests: int = prior(
         3, "hammer tests", "at least, to compare their amplitudes with each other", CHANNELS)
+    min_delay: float = prior(
+        2.5e-4, "s", "by which the accelerations of all channels lag behind the force, or lead it", CHANNELS)
+    delay_spread: float = prior(3e-4, "s", "within which channels and tests share one delay", CHANNELS)
+    max_delay: float = prior(5e-3, "s", "that is sought", "convention")
+    delay_step: float = prior(2e-5, "s", "between trial delays: 6 degrees at the highest line", "numerical")
     scale_spread: float = prior(
         2.0, "-", "within which the channels of a wrong scale share one factor", CHANNELS)
     unit_tolerance: float = prior(
