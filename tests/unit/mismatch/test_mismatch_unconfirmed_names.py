@@ -56,6 +56,29 @@ def named(family, grade, gain):
     return Verdict("named", (family,), grade, 0.97, dict(POSTERIOR, **{family: 0.8}), (score,))
 
 
+@pytest.mark.parametrize(
+    ("verdicts", "before", "after", "is_withdrawn"),
+    [
+        ((Verdict("named", ("sleeper_mode",), "A", 0.97),), -37.0, -17.0, True),
+        ((Verdict("named", ("sleeper_mode",), "B", 0.97), Verdict("unknown")), -37.0, -17.0, True),
+        ((Verdict("a_or_b", ("local_ballast", "hanging_sleeper")),), -37.0, -1.0, True),
+        ((Verdict("named", ("sensor_gain",), "A", 0.97),), -30.0, 5.0, False),  # the name is what was missing
+        ((Verdict("named", ("sensor_gain",), "A", 0.97),), float("nan"), None, False),  # nothing is held out
+        ((Verdict("none"),), -3.0, None, False),
+    ],
+)
+def test_no_name_stands_if_held_out_recordings_are_predicted_worse_than_by_zero(verdicts, before, after, is_withdrawn):
+    """Mirrored or shifted positions in the layout were named as sleepers that bend, grade B."""
+    verdicts = tuple(replace(v, posterior=dict(POSTERIOR)) for v in verdicts)
+    first, *further = confirm(verdicts, Verification(2, before, after), MismatchSettings())
+    assert (first.trail == ("reserved_worse_than_zero",)) is is_withdrawn
+    if is_withdrawn:
+        assert (first.answer, first.names, first.cause, further) == ("unknown", (), "all trains", [])
+        assert f"fit {after:.0f} %" in first.reason and "layout" in first.reason
+    else:
+        assert (first.answer, first.names) == (verdicts[0].answer, verdicts[0].names)
+
+
 @pytest.mark.parametrize("grade", ["A", "B"])
 @pytest.mark.parametrize(("after", "withdrawn"), [(57.8, True), (57.9, True), (58.1, False), (59.9, False)])
 def test_a_fall_of_two_standard_errors_withdraws_a_name_of_any_grade_if_its_evidence_contradicts(

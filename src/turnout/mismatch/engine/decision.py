@@ -162,6 +162,10 @@ UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
     Rule("panel_proven", _always, "", "", "decisions/switch-panels.md"),
 )
 RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
+    Rule("reserved_worse_than_zero", lambda e: e.predicts_nothing, "unknown",
+         "the simulation predicts held-out recordings worse than a signal of 0 would (fit {e.fit:.0f} %), also with "
+         "the effects that explain the most: a position in the layout, the track file or a vehicle file is wrong, or a "
+         "large fault is not known to this program", HOW, cause="all trains"),
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "with {e.words}, the residual is larger than in the intact state, and held-out recordings are predicted worse",
          ENDS),
@@ -294,13 +298,15 @@ def confirm(
     Returns
     -------
     tuple of Verdict
-        The first is "unknown" if reserved recordings contradict it, and has grade B if their fit falls for little.
+        The first is "unknown", and alone, if reserved recordings contradict it, and has grade B if their fit falls
+        for little.
     """
     evidence = ReservedEvidence(verdicts, verification, settings)
     rule = first_applicable(RESERVED_RULES, evidence)
     first, *further = verdicts
     if rule.answer == "unknown":
-        first = first.as_unknown(rule.reason_for(evidence), settings)
+        first, further = first.as_unknown(rule.reason_for(evidence), settings), []
+        first = replace(first, cause=rule.cause or first.cause)
     elif rule.answer == "B":
         reasons = (first.reason, rule.reason_for(evidence))
         first = replace(first, grade="B", reason="; ".join(r for r in reasons if r))

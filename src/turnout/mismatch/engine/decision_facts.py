@@ -315,6 +315,16 @@ class ReservedEvidence:
     settings: MismatchSettings
 
     @property
+    def predicts_nothing(self) -> bool:
+        """Whether a name stands, and the last fit predicts the reserved recordings worse than a signal of 0 would."""
+        return any(v.answer in ("named", "a_or_b") for v in self.verdicts) and self.fit < 0.0
+
+    @property
+    def fit(self) -> float:
+        """Of the reserved recordings by the last fit; nan without any. [%]"""
+        return self.verification.before if self.verification.after is None else self.verification.after
+
+    @property
     def has_fallen(self) -> bool:
         """Whether the fit falls by more than is allowed, and by two standard errors."""
         return self.verification.falls_by(self.settings.fall)
