@@ -101,13 +101,7 @@ def earlier(samples: np.ndarray, n: float) -> np.ndarray:
 
 
 def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
-    r"""The lag of all accelerations behind the force, if all channels and tests share one that is far from 0.
-
-    The lag of a channel in a test is the one at which it correlates best with the simulation on the track as filed,
-    both over the magnitude of the measured receptance:
-
-    .. math:: \hat\tau = \arg\max_\tau \operatorname{Re} \sum_f
-        \overline{H_s(f)}\, H_m(f)\, |H_m(f)|^{-2}\, e^{2 \pi i f \tau}
+    """The lag of all accelerations behind the force, if all channels and tests share one that is far from 0.
 
     Parameters
     ----------
@@ -121,6 +115,35 @@ def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
     CommonDelay
         False if there is none, channels or tests differ, or there are fewer than two channels.
     """
+    by_channel, by_test = typical_lags(predictor, tests)
+    lags = [*by_channel.values(), *by_test.values()]
+    if len(by_channel) < 2 or np.ptp(lags) > CHANNELS_CHECK.delay_spread:
+        return CommonDelay({}, len(by_test))
+    is_far = min(lags) >= CHANNELS_CHECK.min_delay or max(lags) <= -CHANNELS_CHECK.min_delay
+    return CommonDelay(by_channel if is_far else {}, len(by_test))
+
+
+def typical_lags(predictor: Predictor, tests: ObservedTests) -> tuple[dict[str, float], dict[str, float]]:
+    r"""Lags behind the force [s] by channel, medians over the tests, and by test, medians over the channels.
+
+    The lag of a channel in a test is the one at which it correlates best with the simulation on the track as filed,
+    both over the magnitude of the measured receptance. It counts if that correlation is 0.5 or more.
+
+    .. math:: \hat\tau = \arg\max_\tau \operatorname{Re} \sum_f
+        \overline{H_s(f)}\, H_m(f)\, |H_m(f)|^{-2}\, e^{2 \pi i f \tau}
+
+    Parameters
+    ----------
+    predictor : Predictor
+        Of the site as filed.
+    tests : ObservedTests
+        Hammer tests of the campaign.
+
+    Returns
+    -------
+    by_channel : dict of str to float
+    by_test : dict of str to float
+    """
     values = {n.name: n.mean for n in predictor.site.shared_nuisances()}
     observations = [o for _, o in tests.observations]
     n_lag = round(CHANNELS_CHECK.max_delay / CHANNELS_CHECK.delay_step)
@@ -132,17 +155,14 @@ def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
         measured, modelled = (_as_complex(x) * pair.size for x in (observation.data, simulated))
         sums = (np.exp(2j * np.pi * np.outer(lags, pair.frequency)) @ (modelled.conj() * measured)).real
         best = int(np.argmax(sums))
-        if sums[best] < CHANNELS_CHECK.same_sensor * np.linalg.norm(measured) * np.linalg.norm(modelled):
-            continue
-        by_channel.setdefault(pair.channel, []).append(float(lags[best]))
-        by_test.setdefault(pair.test.name, []).append(float(lags[best]))
-    medians = {channel: float(np.median(x)) for channel, x in by_channel.items()}
-    extremes = [*medians.values(), *(float(np.median(x)) for x in by_test.values())]
-    is_common = len(medians) > 1 and (
-        min(extremes) >= CHANNELS_CHECK.min_delay or max(extremes) <= -CHANNELS_CHECK.min_delay
-    )
-    is_common = is_common and np.ptp(extremes) <= CHANNELS_CHECK.delay_spread
-    return CommonDelay(medians if is_common else {}, len(by_test))
+        if sums[best] >= CHANNELS_CHECK.same_sensor * np.linalg.norm(measured) * np.linalg.norm(modelled):
+            by_channel.setdefault(pair.channel, []).append(float(lags[best]))
+            by_test.setdefault(pair.test.name, []).append(float(lags[best]))
+    return _medians(by_channel), _medians(by_test)
+
+
+def _medians(values: Mapping[str, list[float]]) -> dict[str, float]:
+    return {name: float(np.median(x)) for name, x in values.items()}
 
 
 def _as_complex(values: np.ndarray) -> np.ndarray:
