@@ -19,6 +19,7 @@ MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the 
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
 SUPPORT_SPACING = 0.6  # m between supports
 GENERAL_CHECK = "Inspect the track at this position; repeat the measurement after the work"
+FILES_CHECK = "Compare positions in the layout, the track file and the vehicle files with the site"
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 
@@ -107,6 +108,8 @@ def recommendation(diagnosis: Diagnosis) -> str:
     if verdict.answer == "a_or_b":
         tests = (effects[name].separating_test for name in verdict.names[:2] if name in effects)
         return f"Measure {next(filter(None, tests), GENERAL_TEST)}"
+    if verdict.cause == "all trains":
+        return FILES_CHECK
     return f"Measure {GENERAL_TEST}" if verdict.answer == "unknown" else ""
 
 

@@ -16,7 +16,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.mismatch.engine.verification import Verification, reserved_excess_ratio
-from turnout.stages.finding_row import sentence
+from turnout.stages.finding_row import recommendation, sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
 WORSE = Verification(1, 27.6, 26.0, error=0.9)
@@ -75,6 +75,8 @@ def test_no_name_stands_if_held_out_recordings_are_predicted_worse_than_by_zero(
     if is_withdrawn:
         assert (first.answer, first.names, first.cause, further) == ("unknown", (), "all trains", [])
         assert f"fit {after:.0f} %" in first.reason and "layout" in first.reason
+        answer = SimpleNamespace(verdict=first, verdicts=(first,))
+        assert sentence(answer) == f"T{first.reason[1:]}." and "vehicle files" in recommendation(answer)
     else:
         assert (first.answer, first.names) == (verdicts[0].answer, verdicts[0].names)
 
