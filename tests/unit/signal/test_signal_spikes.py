@@ -99,3 +99,13 @@ def test_a_recording_without_spikes_is_the_same_object(train):
 def test_channels_that_are_not_named_stay_unchanged(train):
     recording, _ = with_spikes(train, 3, 5.0)
     assert without_spikes(recording, {"OT", "SP", "CLP"})[1] == ()
+
+
+@pytest.mark.parametrize("impact", [(189.0, -441.0, 347.0), (-344.0, 462.0, -309.0), (224.0, -636.0, 387.0)])
+def test_an_impact_of_a_wheel_at_a_recorder_without_filter_is_no_spike(impact):
+    """Its neighbours leave the vibration too; a bit error changes one sample alone."""
+    samples = np.random.default_rng(5).normal(scale=8.0, size=4000)
+    samples[2000:2003] += impact
+    assert spikes_in(samples).size == 0
+    samples[2000], samples[2002] = 0.0, 0.0
+    np.testing.assert_array_equal(spikes_in(samples), [2001])
