@@ -148,7 +148,8 @@ def _campaign(
         return None
     if route != "main" and route in track.routes:
         track, passages = _with_main_route(track, route, passages)
-    return CampaignInput(track, sensors, tests, tuple(passages), reserved_names(passages, tests))
+    contradicted = tuple(note.contradicted_train for note in inputs.notes if note.contradicted_train)
+    return CampaignInput(track, sensors, tests, tuple(passages), reserved_names(passages, tests), contradicted)
 
 
 def _sensors(turnout: TurnoutConfig, labels: Sequence[str]) -> tuple[Sensor, ...]:

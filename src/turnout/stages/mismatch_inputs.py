@@ -49,11 +49,13 @@ class Note:
     """Why something was not used or is doubted: ``text``, and the name of the ``passage`` if it concerns one.
 
     ``fault`` is the reason code of a fault in a file and the channel, "" for all: records may share a fault.
+    ``contradicted_train`` is the train whose vehicle file the axles of the passage contradict, if any.
     """
 
     text: str
     passage: str | None = None
     fault: tuple[str, str] | None = None
+    contradicted_train: str = ""
 
     def __str__(self) -> str:
         return self.text if self.passage is None else f"passage {self.passage}: {self.text}"
@@ -266,7 +268,7 @@ def _passage_input(
     try:
         train = train_of(row, _train_notes(row, recording, turnout), Path(turnout.folder) / "vehicles")
     except TrainUnknownError as error:
-        notes.append(Note(str(error), name))
+        notes.append(Note(str(error), name, contradicted_train=error.train))
         return None
     has_diverging = any(s.track == "diverging" for s in turnout.sections)
     notes += [Note(doubt, name) for doubt in (*train.doubts, *(train.route_doubts if has_diverging else ()))]

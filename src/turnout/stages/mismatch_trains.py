@@ -44,7 +44,14 @@ class IdentifiedTrain:
 
 
 class TrainUnknownError(Exception):
-    """The train of a passage is not known, so it cannot be simulated; the message says why."""
+    """The train of a passage is not known, so it cannot be simulated; the message says why.
+
+    ``train`` is the type whose vehicle file the recorded axles contradict, "" for other reasons.
+    """
+
+    def __init__(self, message: str, train: str = "") -> None:
+        super().__init__(message)
+        self.train = train
 
 
 def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
@@ -174,7 +181,7 @@ def _loaded_vehicle(
             f"{n_axles} axles recorded, {n} in {name}.yaml: wrong vehicle file, another train, or other sensors",
         )
         if n_axles < min_axle_share * n * units:
-            raise TrainUnknownError(*axle_doubts)
+            raise TrainUnknownError(axle_doubts[0], name)
     elif n_axles:
         units = n_axles // n
     share, load_sd, doubts = _load_share(name, row, notes, folder, units)
@@ -266,7 +273,8 @@ def _speed_from_axles(name: str, vehicle: Vehicle, row: Mapping[str, Any], speed
     distance, fitted_speed = min(fits)
     if distance > MAX_AXLE_RMS:
         raise TrainUnknownError(
-            f"its axles lie {distance:.2f} m rms off those of {name}.yaml: wrong vehicle file, or sensors elsewhere"
+            f"its axles lie {distance:.2f} m rms off those of {name}.yaml: wrong vehicle file, or sensors elsewhere",
+            name,
         )
     return fitted_speed, fits[0][0] > MAX_AXLE_RMS
 

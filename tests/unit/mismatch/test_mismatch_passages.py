@@ -373,6 +373,14 @@ def test_a_train_that_differs_from_its_type_is_reported_and_localized(campaign):
     )  # a polygon that lifts its wheels shows at some speeds and not at others
 
 
+def test_passages_left_out_because_of_their_axles_count_as_unlike_the_vehicle_file(campaign):
+    """Impacts of a large flat are counted as axles: none of the three passages of a train could be compared."""
+    light = tuple(p for p in campaign.passages if p.train == "light")
+    for contradicted, expected in ((("heavy",) * 2, ("heavy",)), (("heavy",), ()), (("light",), ())):
+        case = TrackCase(replace(campaign, passages=light, contradicted_trains=contradicted))
+        assert case.aligned_passages and case.mismatched_trains == expected
+
+
 def test_without_any_train_like_its_simulation_the_answer_is_not_none(campaign):
     """A dip of a millimetre, or wrong files of all vehicles: hammer tests alone agree, and no train was compared."""
     light, heavy = (next(p.vehicle for p in campaign.passages if p.train == t) for t in ("light", "heavy"))

@@ -13,15 +13,16 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.cli.main import main
-from turnout.config import load_configuration
+from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.mismatch.turnout import TrackCase
-from turnout.stages import mismatch, mismatch_groups
+from turnout.stages import mismatch, mismatch_groups, mismatch_inputs
 from turnout.stages.accept_finding import accept
 from turnout.stages.budget import BudgetSpentError
 from turnout.stages.mismatch_inputs import Note
 from turnout.stages.mismatch_results import Results, diagnose_turnout
 from turnout.stages.track_files import track_of
+from turnout.workflow.scan import scan
 
 
 @pytest.fixture
@@ -255,6 +256,11 @@ def test_a_wrong_vehicle_file_is_reported_because_of_its_axles(soft):
     tables = diagnose_turnout("t1")
     assert "4 axles recorded, 8 in ic3.yaml: wrong vehicle file" in reported(tables)
     assert [f["n_passages"] for f in tables["mismatch_findings"]] == [0]
+    turnout = with_raw(load_configuration(soft / "config").turnout("t1"), soft / "raw")
+    track, _ = track_of(turnout)
+    inputs = mismatch_inputs.gather_inputs(scan(turnout, soft / "raw").units, turnout, soft / "raw", track, {})
+    (group,) = mismatch_groups.groups(turnout, track, inputs)
+    assert group.campaign.contradicted_trains == ("ic3",)
 
 
 def test_a_vehicle_without_a_file_is_reported(soft):

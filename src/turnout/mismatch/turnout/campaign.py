@@ -89,6 +89,7 @@ class CampaignInput:
     """``turnout`` is a TurnoutTrack; ``sensors`` have names, positions and mountings.
 
     ``reserved`` names the tests and passages that no fit reads. They may confirm a named effect or withdraw it.
+    ``contradicted_trains`` has the train of each passage that was left out, as its axles contradict the vehicle file.
     """
 
     turnout: TurnoutTrack
@@ -96,6 +97,7 @@ class CampaignInput:
     hammer: tuple[HammerInput, ...] = ()
     passages: tuple[PassageInput, ...] = ()
     reserved: tuple[str, ...] = ()
+    contradicted_trains: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.hammer and not self.passages:

@@ -82,7 +82,7 @@ class CaseData:
         Either another train came, or the trains of this type differ. Passages that were disturbed or could not be
         simulated do not count.
         """
-        unmatched = Counter(p.train for p in self.unmatched if p.train)
+        unmatched = Counter([*(p.train for p in self.unmatched if p.train), *self.campaign.contradicted_trains])
         matched = Counter(aligned.conditions["train"] for aligned in self.aligned_passages.values())
         disturbed_names = {d.name for d in self.disturbed}
         disturbed_trains = {p.train for p in self.campaign.passages if p.name in disturbed_names}
