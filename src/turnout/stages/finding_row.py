@@ -108,9 +108,9 @@ def recommendation(diagnosis: Diagnosis) -> str:
     if verdict.answer == "a_or_b":
         tests = (effects[name].separating_test for name in verdict.names[:2] if name in effects)
         return f"Measure {next(filter(None, tests), GENERAL_TEST)}"
-    if verdict.cause == "all trains":
-        return FILES_CHECK
-    return f"Measure {GENERAL_TEST}" if verdict.answer == "unknown" else ""
+    if verdict.answer == "unknown":
+        return FILES_CHECK if verdict.cause == "all trains" else f"Measure {GENERAL_TEST}"
+    return ""
 
 
 def finding_row(diagnosis: Diagnosis, identity: Mapping[str, Any]) -> dict[str, Any]:
