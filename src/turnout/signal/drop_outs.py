@@ -21,7 +21,7 @@ def drop_outs(samples: np.ndarray) -> np.ndarray:
     run longer than 1 / ``RUN_FACTOR`` of it: a quiet channel repeats its values everywhere. Both also vary by
     ``MIN_STEPS`` steps of the converter or more, since a coarse channel stays at one step by chance. The run begins
     with a change of so many steps, or its value is so far from the median of the channel: a vibration that a coarse
-    converter resolves no more ends gradually, at the median. Runs at the top or bottom of the channel are
+    converter no longer resolves ends gradually, at the median. Runs at the top or bottom of the channel are
     clipped, and those at the ends of a recording are a sensor that starts late or is lost.
 
     Parameters

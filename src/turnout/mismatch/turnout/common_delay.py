@@ -49,8 +49,8 @@ class CommonDelay:
         low, high = sorted(1e3 * abs(lag) for lag in (min(self.lags.values()), max(self.lags.values())))
         relation = "lag behind" if self.lag > 0.0 else "lead"
         return [
-            f"In the hammer tests the accelerations of all {len(self.lags)} channels {relation} the force by "
-            f"{1e3 * abs(self.lag):.2f} ms (by channel {low:.2f} to {high:.2f}, {self.n} tests). The diagnosis "
+            f"In the hammer tests the accelerations of all {len(self.lags)} comparable channels {relation} the force "
+            f"by {1e3 * abs(self.lag):.2f} ms (by channel {low:.2f} to {high:.2f}, {self.n} tests). The diagnosis "
             "corrects that. Record force and accelerations with one clock and the same filters"
         ]
 

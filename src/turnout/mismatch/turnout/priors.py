@@ -316,7 +316,8 @@ class ChannelPriors:
     min_position_gain: float = prior(
         0.05, "-", "of the mean correlation at another position, while that of every channel rises", CHANNELS)
     min_test_scale: float = prior(
-        3.0, "-", "the same of single hammer tests, over the median of all; right ones differ by 1.8", CHANNELS)
+        3.0, "-", "factor by which one hammer test deviates from the median of all; right ones by at most 1.8",
+        CHANNELS)
     min_tests: int = prior(
         3, "hammer tests", "at least, to compare their amplitudes with each other", CHANNELS)
     min_delay: float = prior(
