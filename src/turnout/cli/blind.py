@@ -5,7 +5,7 @@
   turnout blind reveal --out proof --truth proof-truth         opens the envelopes, verifies every hash
   turnout blind score --out proof                              every figure with its interval
 
-An interrupted make or diagnose continues where it stopped. --fast makes 40 cases instead of 235. --effects FOLDER adds
+An interrupted make or diagnose continues where it stopped. --fast makes 40 cases instead of 235. --effects-folder adds
 effects of your own, one file each. --panel crossing or switch puts all cases into such panels. --histories N makes N
 sites that are visited for two years; diagnose --histories uses the calibrated model, and score --histories its answers.
 make prints the hash of commit.json: publish it before the diagnosis.
@@ -17,7 +17,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import above_zero, at_least_one
-from turnout.cli.options import add_use
+from turnout.cli.options import add_cores, add_former, add_use
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -42,13 +42,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="seed of the set; 'tool': the hash of the tool's sources, which nobody can choose (default: random)",
     )  # fmt: skip
     make.add_argument("--fast", action="store_true", help="the fast tier of 40 cases")
-    make.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
+    make.add_argument("--effects-folder", action="append", default=[], help="folder with effects of your own")
     make.add_argument("--only", help="kinds of effects beside the controls, separated by commas, such as void,dip")
     make.add_argument("--limit", type=at_least_one, help="the first so many cases of the shuffled set")
     make.add_argument(
         "--panel", choices=("plain", "crossing", "switch"), default="plain", help="panel of all cases (default: plain)"
     )
-    make.add_argument("--workers", type=at_least_one, default=1, help="processes (default 1)")
+    add_cores(make, "processes (%(default)s)", default=1)
+    add_former(make, "--workers", "--cores", type=at_least_one)
     make.add_argument("--histories", type=at_least_one, metavar="N", help="N sites with a history of two years")
     make.add_argument(
         "--passages", type=at_least_one, default=1, help="passages at each visit of a history (default 1)"
@@ -63,7 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     diagnose.add_argument("--cpu", type=above_zero, default=900.0, help="CPU time per case [s] (default 900)")
     diagnose.add_argument("--again", action="store_true", help="also cases that failed or exceeded their budget")
     diagnose.add_argument("--ablation", metavar="NAME", help="store the findings as those of a reduced tool")
-    diagnose.add_argument("--workers", type=at_least_one, default=1, help="cases at a time (default 1)")
+    add_cores(diagnose, "processes, each with one case at a time (%(default)s)", default=1)
+    add_former(diagnose, "--workers", "--cores", type=at_least_one)
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
     score = steps.add_parser("score", help="print every figure with its interval")
     score.add_argument("--histories", action="store_true", help="the set has histories")
@@ -71,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     score.add_argument("--report", help="file to write the report to, as Markdown")
     score.add_argument("--page", help="page with marks for report, pictures and stories, as docs/blind_figures.md")
     score.add_argument("--stories", help="cases described on the page, separated by commas (default: three)")
-    score.add_argument("--effects", action="append", default=[], help="folder with effects of your own")
+    score.add_argument("--effects-folder", action="append", default=[], help="folder with effects of your own")
     keep = steps.add_parser("keep", help="store a revealed set without recordings: seals, truths, findings")
     keep.add_argument("--folder", required=True, help="folder to write")
     for sub in (make, diagnose, reveal, score, keep):
@@ -111,13 +113,15 @@ def _make(args: argparse.Namespace) -> None:
     from turnout_blind.make import make_set
     from turnout_blind.seal import BlindError
 
-    for folder in args.effects:
+    for folder in args.effects_folder:
         if not any(path for path in Path(folder).glob("*.py") if not path.name.startswith("_")):
-            raise BlindError(folder, "--effects", "no file of an effect", "Name a folder with one file .py per effect")
+            raise BlindError(
+                folder, "--effects-folder", "no file of an effect", "Name a folder with one file .py per effect"
+            )
     only = args.only.split(",") if args.only else None
     histories = (args.histories, args.passages) if args.histories else None
     sha = make_set(
-        args.out, _truth(args), args.seed, not args.fast, args.effects, only, args.limit, args.panel, args.workers,
+        args.out, _truth(args), args.seed, not args.fast, args.effects_folder, only, args.limit, args.panel, args.cores,
         _bar, histories,
     )  # fmt: skip
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
@@ -135,7 +139,7 @@ def _diagnose(args: argparse.Namespace) -> None:
     command = args.tool or (HISTORY_COMMAND if args.histories else COMMAND)
     only = args.cases.split(",") if args.cases else None
     record = diagnose_set(
-        args.out, _truth(args), command, only, args.timeout, args.workers, cpu=args.cpu,
+        args.out, _truth(args), command, only, args.timeout, args.cores, cpu=args.cpu,
         again=args.again, progress=_bar, label=args.ablation,
     )  # fmt: skip
     failed = sum(run["status"] != "answered" for run in record["cases"].values())
@@ -172,7 +176,9 @@ def _score(args: argparse.Namespace) -> None:
     if args.page:
         from turnout_blind.score.page import write_page
 
-        write_page(args.page, args.out[0], names, args.effects, args.stories.split(",") if args.stories else None)
+        write_page(
+            args.page, args.out[0], names, args.effects_folder, args.stories.split(",") if args.stories else None
+        )
     if args.report:
         write_text(args.report, text)
     print(text)

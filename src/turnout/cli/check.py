@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_turnout
 from turnout.counts import count_of, first_texts
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_raw(parser, help=f"{RAW_HELP} (raw, where it is there)", default=None)
     parser.add_argument("--read", action="store_true", help="read one file per section and compare it with the layout")
-    parser.add_argument("--turnout", help="only this one")
+    add_turnout(parser, "only this one", required=False)
     parser.add_argument("--formats", action="store_true", help="list the raw formats")
 
 

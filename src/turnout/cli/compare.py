@@ -1,7 +1,7 @@
 """Compare a recorded passage with its simulation, sensor by sensor, in 0-40 and 40-1000 Hz.
 
   turnout compare raw/tommerup_s2/passages/20260724T091500Z.h5 --turnout tommerup_s2 --sensors A7 A8
-  turnout compare FILE --turnout ID --out comparison.html --csv comparison.csv
+  turnout compare FILE --turnout ID --figure comparison.html --csv comparison.csv
 
 Train type, speed, direction and track are those found in the recording. The sections of the sensors are first fitted
 to their latest hammer tests before the passage; --no-calibration takes the track file as it is. The figure shows the
@@ -14,7 +14,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import finite_number, whole_number
-from turnout.cli.options import add_configuration, add_raw, add_track, add_turnout
+from turnout.cli.options import add_configuration, add_figure, add_former, add_raw, add_track, add_turnout
 
 if TYPE_CHECKING:
     from turnout.stages.compare import PassageComparison
@@ -38,7 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--load", type=finite_number, default=0.5, help="share of the payload, 0 to 1.5 (%(default)s)")
     parser.add_argument("--no-calibration", action="store_true", help="take the track file as it is")
     parser.add_argument("--seed", type=whole_number, default=0, help="seed of the rail's roughness (%(default)s)")
-    parser.add_argument("--out", metavar="FILE", help="figure as HTML")
+    add_figure(parser, "draw time series and spectra into this HTML file")
+    add_former(parser, "--out", "--figure")
     parser.add_argument("--csv", metavar="FILE", help="spectra as CSV: sensor, band, frequency, recorded, simulated")
     add_track(parser, help="track file; default: that of the turnout")
     add_configuration(parser)
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.report.comparison_page import comparison_page, spectra_csv
     from turnout.stages.compare import compare_passage
 
-    for option in ("out", "csv"):
+    for option in ("figure", "csv"):
         if (name := getattr(args, option)) and Path(name).is_dir():
             raise ConfigError(name, f"--{option}", "it is a folder", "Write the name of a file")
     comparison = compare_passage(
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
         args.seed,
     )
     print("\n".join(comparison_lines(comparison)))
-    for path, content in ((args.out, comparison_page), (args.csv, spectra_csv)):
+    for path, content in ((args.figure, comparison_page), (args.csv, spectra_csv)):
         if path:
             write_text(path, content(comparison))
     return 0

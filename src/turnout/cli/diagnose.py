@@ -1,11 +1,11 @@
 """Find what the simulation of a turnout lacks, from its hammer tests and passages.
 
   turnout diagnose --turnout tommerup_s1
-  turnout diagnose --turnout tommerup_s1 --sections A7 A8 --budget 10
+  turnout diagnose --turnout tommerup_s1 --sections A7 A8 --limit-minutes 10
   turnout diagnose --turnout tommerup_s1 --accept
 
 The newest visit is diagnosed, neighbouring sections together as one group, and a page is written. An interrupted
-diagnosis, or one whose --budget is used up, continues where it stopped; groups that are done have their findings.
+diagnosis, or one that reaches its --limit-minutes, continues where it stopped; groups that are done have findings.
 --accept writes the named effect into the track file of the turnout and diagnoses nothing. From then on the simulation
 contains the effect.
 """
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 from turnout.cli.option_types import zero_or_more
 from turnout.cli.options import (
     add_configuration,
+    add_former,
     add_pages,
     add_raw,
     add_registry,
@@ -62,9 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_work(parser, "folder of fits and results (%(default)s)")
     add_registry(parser, help="folder of the registry, for --accept (%(default)s)")
     add_pages(parser, "folder of the page (%(default)s)")
-    parser.add_argument(
-        "--budget", type=zero_or_more, metavar="MINUTES", help="stop after so many minutes; a next run continues"
-    )
+    parser.add_argument("--limit-minutes", type=zero_or_more, help="stop after so many minutes; a next run continues")
+    add_former(parser, "--budget", "--limit-minutes", type=zero_or_more)
     parser.add_argument("--accept", action="store_true", help="write the named effect into the turnout's track file")
     parser.add_argument(
         "--finding",
@@ -131,7 +131,7 @@ def _diagnose(args: argparse.Namespace) -> dict[str, list[dict]]:
     with DiagnoseBar() as bar:
         return diagnose_turnout(
             args.turnout, args.configuration, args.raw, args.work, args.visit, args.track, tuple(args.sections),
-            None if args.budget is None else 60.0 * args.budget, bar,
+            None if args.limit_minutes is None else 60.0 * args.limit_minutes, bar,
         )  # fmt: skip
 
 

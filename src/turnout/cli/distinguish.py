@@ -1,7 +1,7 @@
 """Show which effects a planned campaign can distinguish, and which further measurement would add most.
 
-turnout distinguish --track tommerup --sensors 23.4 26.4 --impacts 24.6 --temperatures 5 25
-turnout distinguish --track tommerup --sensors 23.4 26.4 --trains ic3 --speeds 160 100
+turnout distinguish --track tommerup --sensor-positions 23.4 26.4 --impact-positions 24.6 --temperatures 5 25
+turnout distinguish --track tommerup --sensor-positions 23.4 26.4 --vehicles ic3 --speeds 160 100
 
 A figure is the evidence [nats] that is lost if the effect of the row is explained by that of the column, with the best
 size of the latter and all nuisance parameters free. The columns have the numbers of the rows; "none" is the base model.
@@ -29,16 +29,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_track(parser, help="file in config/tracks (%(default)s)", default="tommerup")
     add_configuration(parser)
     parser.add_argument(
-        "--sensors", nargs="+", type=finite_number, required=True, metavar="M", help="positions of sensors [m]"
+        "--sensor-positions", nargs="+", type=finite_number, required=True, metavar="M", help="positions of sensors [m]"
     )
     parser.add_argument(
-        "--impacts", nargs="*", type=finite_number, default=(), metavar="M", help="positions of impacts [m]"
+        "--impact-positions", nargs="+", type=finite_number, default=(), metavar="M", help="positions of impacts [m]"
     )
-    add_former(parser, "--blows", "--impacts", nargs="*", type=finite_number)
+    for former, present in (
+        ("--sensors", "--sensor-positions"),
+        ("--impacts", "--impact-positions"),
+        ("--blows", "--impact-positions"),
+    ):
+        add_former(parser, former, present, nargs="+", type=finite_number)
     parser.add_argument(
         "--temperatures", nargs="+", type=RAIL_TEMPERATURE, default=(15.0,), metavar="C", help="of the rail [°C]"
     )
-    parser.add_argument("--trains", nargs="*", default=(), help="files in config/vehicles")
+    parser.add_argument("--vehicles", nargs="+", default=(), metavar="NAME", help="files in config/vehicles")
+    add_former(parser, "--trains", "--vehicles", nargs="+")
     parser.add_argument("--speeds", nargs="+", type=SPEED, default=(160.0,), metavar="KMH", help="[km/h]")
     parser.add_argument("--effects", nargs="+", metavar="EFFECT", help="only these effects")
     add_former(parser, "--families", "--effects", nargs="+")
@@ -63,10 +69,10 @@ def run(args: argparse.Namespace) -> int:
 
     matrix, advice = planned_matrix(
         args.track,
-        args.sensors,
-        args.impacts,
+        args.sensor_positions,
+        args.impact_positions,
         args.temperatures,
-        args.trains,
+        args.vehicles,
         args.speeds,
         args.effects,
         args.configuration,

@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_turnout
+from turnout.cli.options import add_configuration, add_figure, add_raw, add_turnout
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,9 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_turnout(parser, "id of the turnout, for its sections and channels")
     parser.add_argument("--section", help="label of the section, if the file name does not state it")
     parser.add_argument("--campaign", help="day of the campaign, YYYY-MM-DD, if neither name nor file states it")
-    parser.add_argument(
-        "--figure", metavar="OUT.svg", help="draw receptance, coherence, decay and impacts into this file"
-    )
+    add_figure(parser, "draw receptance, coherence, decay and impacts into this SVG file")
     add_configuration(parser)
     add_raw(parser, help="raw root, with the campaigns.csv of the turnout (raw)", default=None)
 

@@ -160,7 +160,8 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
     args, unknown = parser.parse_known_args(words)
     if unknown:
         # without the dashes, which are alike in all: --out is not similar to --quiet
-        known = [option[2:] for action in args.parser._actions for option in action.option_strings if len(option) > 2]
+        shown = [action for action in args.parser._actions if action.help != argparse.SUPPRESS]
+        known = [option[2:] for action in shown for option in action.option_strings if len(option) > 2]
         similar = get_close_matches(unknown[0].partition("=")[0][2:], known, n=1) if unknown[0].startswith("--") else []
         hint = f" Did you mean --{similar[0]}?" if similar else ""
         args.parser.error(f"unknown: {' '.join(unknown)}.{hint} '{args.parser.prog} --help' lists the options")

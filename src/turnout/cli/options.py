@@ -106,6 +106,32 @@ def add_turnout(parser: argparse.ArgumentParser, help: str, required: bool = Tru
     parser.add_argument("--turnout", required=required, help=help)
 
 
+def add_turnouts(parser: argparse.ArgumentParser, help: str) -> None:
+    """Add ``--turnouts``, the ids of some turnouts; all where it is not given.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    help : str
+        What the command does with them alone.
+    """
+    parser.add_argument("--turnouts", nargs="+", action="extend", metavar="ID", help=help)
+
+
+def add_figure(parser: argparse.ArgumentParser, help: str) -> None:
+    """Add ``--figure``, the file of a drawing of the result.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Parser of the command.
+    help : str
+        What is drawn, and in which format.
+    """
+    parser.add_argument("--figure", metavar="FILE", help=help)
+
+
 def add_track(parser: argparse.ArgumentParser, help: str = TRACK_HELP, default: str | None = None) -> None:
     """Add ``--track``, the track file.
 
@@ -154,6 +180,7 @@ class _FormerOption(argparse.Action):
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
     ) -> None:
         print(f"{parser.prog}: {option} is called {self.const} now; the former name goes away.", file=sys.stderr)
+        parser._option_string_actions[str(self.const)].required = False  # this option stands for it
         setattr(namespace, self.dest, values)
 
 

@@ -3,7 +3,7 @@
   turnout paper tommerup_s1                              the newest campaign
   turnout paper tommerup_s1 --campaign 2024-09-14
   turnout paper tommerup_s1 --format latex
-  turnout paper tommerup_s2 --table 4 --bars bars.html   fits to trains, and charts by type, speed and axle load
+  turnout paper tommerup_s2 --table 4 --figure bars.html fits to trains, and charts by type, speed and axle load
 
 Table 1: matrices of the ballast resonance. Table 2: of the railpad resonance. Table 3: poles, frequencies and damping
 ratios. Table 4: fit of the model to hammer tests and to trains. ± is the standard error of the campaign value, in
@@ -17,8 +17,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.option_types import above_zero, whole_number
-from turnout.cli.options import add_registry
+from turnout.cli.option_types import SPEED, whole_number
+from turnout.cli.options import add_figure, add_former, add_registry
 
 if TYPE_CHECKING:
     from typing import Any
@@ -46,11 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--train-type", default=PAPER_TRAIN, help="trains of Table 4 (%(default)s)")
     parser.add_argument(
-        "--speed", type=above_zero, default=160.0, help="their speed on the main track in km/h (%(default)g)"
+        "--speed", type=SPEED, default=160.0, help="their speed on the main track in km/h (%(default)g)"
     )
-    parser.add_argument(
-        "--bars", metavar="FILE", help="write bar charts of the fit by type, speed and axle load as HTML"
-    )
+    add_figure(parser, "draw bar charts of the fit by type, speed and axle load into this HTML file")
+    add_former(parser, "--bars", "--figure")
     add_registry(parser)
 
 
@@ -77,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
         bars = class_rows(connection, args.turnout)
         if args.table is not None:
             tables = [table for table in (*tables, class_table(bars)) if table.number == args.table]
-        if args.bars:
-            _write_bars(args.bars, connection, args.turnout, bars)
+        if args.figure:
+            _write_bars(args.figure, connection, args.turnout, bars)
     print(render(tables, args.format), end="")
     return 0
 
@@ -91,7 +90,7 @@ def _write_bars(path: str, connection: duckdb.DuckDBPyConnection, turnout: str, 
 
     if not rows:
         remedy = "Record passages, or raise passage.scored_share"
-        raise ConfigError("--bars", "passages", f"no scored passage of {turnout}", remedy)
+        raise ConfigError("--figure", "passages", f"no scored passage of {turnout}", remedy)
     cursor = connection.execute("select * from sections where turnout_id = ? order by position_m, label", [turnout])
     sections = [dict(zip((d[0] for d in cursor.description), row)) for row in cursor.fetchall()]
     write_text(path, bars_page(turnout, rows, sections))

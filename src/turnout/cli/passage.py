@@ -1,6 +1,6 @@
 """Analyse one passage file: axles, speed, type of the train, and what the model of each section predicts.
 
-Nothing is written without --out, the name of a page. For each sensor the page shows the passage as measured and as
+Nothing is written without --figure, the name of a page. For each sensor the page shows the passage as measured and as
 predicted, whole and for two wheelsets, and its spectrogram with the axles. The models are those that the last run
 identified (--work). Without them, or with --no-fit, only the train is described.
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_turnout, add_work
+from turnout.cli.options import add_configuration, add_figure, add_former, add_turnout, add_work
 from turnout.constants import KMH, Z95
 
 if TYPE_CHECKING:
@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     add_work(parser, "folder of the last run (%(default)s)")
     parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
-    parser.add_argument("--out", metavar="FILE", help="write a page with panels of the first train as HTML")
+    add_figure(parser, "draw panels of the first train into this HTML file")
+    add_former(parser, "--out", "--figure")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -89,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
     for record in records:
         for recording, offset, name in trains_in(record, settings):
-            out = None if has_train else args.out
+            out = None if has_train else args.figure
             has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit, out)
     return 0 if has_train else 1
 

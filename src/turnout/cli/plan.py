@@ -12,7 +12,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import at_least_one
-from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_use, add_work
+from turnout.cli.options import RAW_HELP, add_configuration, add_raw, add_result, add_turnouts, add_use, add_work
 from turnout.counts import count_of
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shards", type=at_least_one, help="number of shards of those runs, instead of that in config.yaml"
     )
-    parser.add_argument("--turnout", action="append", help="only this turnout; may be given again")
+    add_turnouts(parser, "only these turnouts")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,12 +85,12 @@ def run(args: argparse.Namespace) -> int:
     counts = dict.fromkeys(("all", "new", "changed"), 0)
     earlier = _EarlierResults(Path(args.work), shards)
     n_left_out = 0
-    for turnout in map(configuration.turnout, args.turnout or configuration.ids):
+    for turnout in map(configuration.turnout, args.turnouts or configuration.ids):
         n_left_out += _print_changes(turnout, Path(args.raw or "raw"), earlier, counts)
     add_result(args, counts)
     add_use(args, counts["all"], n_left_out)
     print(f"{count_of(counts['all'], 'unit')}, {counts['new']} never computed, {counts['changed']} changed since.")
-    _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnout)
+    _print_gone(configuration, Path(args.raw or "raw"), Path(args.work) / "plan", shards, args.turnouts)
     return 0
 
 

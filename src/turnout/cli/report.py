@@ -7,7 +7,7 @@ turnout report --turnouts tommerup_s1 tommerup_s2
 
 import argparse
 
-from turnout.cli.options import add_cores, add_pages, add_registry
+from turnout.cli.options import add_cores, add_pages, add_registry, add_turnouts
 from turnout.counts import count_of
 
 GROUP = "Run"
@@ -24,9 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     add_registry(parser)
     add_pages(parser, "where the pages go (%(default)s)")
-    parser.add_argument(
-        "--turnouts", "--turnout", nargs="+", metavar="ID", help="only these turnouts' pages, and the fleet's"
-    )
+    add_turnouts(parser, "only these turnouts' pages, and the fleet's")
     parser.add_argument("--day", metavar="DATE", help="list and states of that day, YYYY-MM-DD, instead of today")
     add_cores(parser, "processes that draw pages (%(default)s)", default=1)
 

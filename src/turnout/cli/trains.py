@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_registry, add_use
+from turnout.cli.options import add_configuration, add_raw, add_registry, add_turnouts, add_use
 from turnout.constants import KMH
 from turnout.counts import count_of
 
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("--turnout", nargs="*", help="only the loads of these turnouts")
+    add_turnouts(parser, "only the loads of these turnouts")
     add_configuration(parser)
     add_raw(parser)
     add_registry(parser)
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     if not Path(args.raw).is_dir():
         raise ConfigError("--raw", "folder of the recordings", f"there is no folder {args.raw}", "Name the one that is")
     configuration = load_configuration(args.configuration)
-    names = args.turnout or list(configuration.rows)
+    names = args.turnouts or list(configuration.rows)
     settings = configuration.settings["passage"]
     has_result = []  # of each turnout, then of the clusters
     for name in names:

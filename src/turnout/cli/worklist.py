@@ -1,7 +1,7 @@
 """Show the worklist: what to inspect, what to plan, and where the data allow no answer.
 
 turnout worklist                      the list of today
-turnout worklist --asof 2026-03-01    the list of that day, from what was measured and entered by then
+turnout worklist --as-of 2026-03-01   the list of that day, from what was measured and entered by then
 turnout worklist --all                every row, also beyond the limit of the list
 turnout worklist --csv list.csv
 """
@@ -12,7 +12,7 @@ import argparse
 import csv
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_csv, add_registry, add_result
+from turnout.cli.options import add_csv, add_former, add_registry, add_result
 from turnout.cli.query import open_output
 from turnout.counts import count_of
 from turnout.registry.spreadsheet import without_formula
@@ -38,7 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         Parser of the command.
     """
     add_registry(parser)
-    parser.add_argument("--asof", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
+    parser.add_argument("--as-of", metavar="DATE", help="as it was then: YYYY-MM-DD, UTC")
+    add_former(parser, "--asof", "--as-of")
     parser.add_argument("--all", action="store_true", help="every row; open alarms are never left out anyway")
     add_csv(parser)
 
@@ -60,9 +61,9 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.database import open_registry
 
     with open_registry(args.registry) as con:
-        day = [_day(args.asof, con)] if args.asof else []
+        day = [_day(args.as_of, con)] if args.as_of else []
         today = list_day(con)
-        asof = "?::timestamp" if args.asof else today
+        asof = "?::timestamp" if args.as_of else today
         rows_of = whole_list(asof) if args.all else f"worklist({asof})"
         question = f"select * from {rows_of} order by rank"
         cursor = con.execute(question, day)
@@ -127,7 +128,7 @@ def as_text(
     if n_unmeasured:
         from turnout.registry.as_of import past_day_hint
 
-        text.append(past_day_hint(newest, "turnout worklist --asof", "list"))
+        text.append(past_day_hint(newest, "turnout worklist --as-of", "list"))
     return "\n".join(text)
 
 
@@ -153,17 +154,17 @@ def _write(stream: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) 
 
 
 def _day(text: str, con: duckdb.DuckDBPyConnection) -> datetime:
-    """The time of ``--asof``; ConfigError if it is invalid or before the first measurement."""
+    """The time of ``--as-of``; ConfigError if it is invalid or before the first measurement."""
     from datetime import datetime
 
     from turnout.config.events import time_problem
     from turnout.errors import ConfigError
 
     if fault := time_problem(text):
-        raise ConfigError("--asof", "date", f"{text!r}{fault[0]}", fault[1])
+        raise ConfigError("--as-of", "date", f"{text!r}{fault[0]}", fault[1])
     day = datetime.fromisoformat(text.removesuffix("Z"))
     ((first,),) = con.execute(FIRST_MEASUREMENT_QUERY).fetchall()
     if first is not None and day < first:
         observation = f"{text!r}: nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M} UTC"
-        raise ConfigError("--asof", "date", observation, "Ask for a later day")
+        raise ConfigError("--as-of", "date", observation, "Ask for a later day")
     return day

@@ -60,7 +60,7 @@ def planned_matrix(
         Nothing is planned, a position is outside the track, or one of ``effects`` is no candidate in such a plan.
     """
     if not impact_positions and not trains:
-        raise SimulationError("nothing is planned: give --impacts, --trains or both.")
+        raise SimulationError("nothing is planned: give --impact-positions, --vehicles or both.")
     track_folder, vehicle_folder = (_folder(config, subfolder) for subfolder in ("tracks", "vehicles"))
     turnout = load_track(track, folder=track_folder)
     first, last = turnout.track.start, turnout.track.end

@@ -40,7 +40,7 @@ TABLES = ("mismatch_findings", "mismatch_parameters", "mismatch_curves", "twin_s
 REMEDY = (
     "A diagnosis needs a track file, and hammer tests or passages of the visit: correct what is named, or measure it"
 )
-BUDGET_REMEDY = "Run the same command again, with a larger --budget if need be"
+BUDGET_REMEDY = "Run the same command again, with a larger --limit-minutes if need be"
 BUDGET_SPENT = "the budget was used up with {} of {} groups done; the same command continues"
 SEVERITY_ORDER = ("named", "a_or_b", "unknown", "numerics", "none")
 

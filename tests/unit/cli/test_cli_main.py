@@ -1,9 +1,11 @@
 """Rules of all commands: groups, JSON, quiet, exit codes, messages, completion, former options."""
 
+import argparse
 import json
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from importlib import import_module
 
 import pytest
@@ -17,6 +19,20 @@ from turnout.errors import ConfigError
 from turnout.workflow.launch import launch
 
 PARSER = build_parser()
+SEVERAL_KINDS = {  # options whose values differ between commands, and why
+    "--only": "what is shown or made: a word, names of tables, kinds of effects",
+    "--out": "blind score pools several sets",
+    "--seed": "blind make also accepts 'tool'",
+    "--histories": "their number when they are made, afterwards whether the set has them",
+    "--passages": "the demonstration checks their number itself",
+}
+NO_PLURALS = {  # options that differ by an s, with another meaning
+    ("--name", "--names"),  # of a layout or turnout; file of names that are right
+    ("--campaign", "--campaigns"),  # day of a campaign; number of campaigns
+    ("--effect", "--effects"),  # what maintenance did; causes that a diagnosis can name
+    ("--format", "--formats"),  # of the output; list of them
+    ("--page", "--pages"),  # a page of the documentation; folder of the pages
+}
 
 
 @pytest.fixture
@@ -113,16 +129,63 @@ def test_a_wrong_id_gives_the_message_that_the_workflow_gives(project, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "option", "expected"),
+    ("line", "former", "present", "expected"),
     [
-        (["simulate", "hammer", "--section", "A7", "--blows", "3"], "--impacts", 3),
-        (["distinguish", "--sensors", "1", "--blows", "3", "4"], "--impacts", [3.0, 4.0]),
+        ("simulate hammer --section A7 --blows 3", "--blows", "--impacts", 3),
+        ("distinguish --sensor-positions 1 --blows 3 4", "--blows", "--impact-positions", [3.0, 4.0]),
+        ("distinguish --sensors 1", "--sensors", "--sensor-positions", [1.0]),  # stands for a required option
+        ("distinguish --sensor-positions 1 --trains ic3", "--trains", "--vehicles", ["ic3"]),
+        ("worklist --asof 2026-03-01", "--asof", "--as-of", "2026-03-01"),
+        ("compare a.h5 --turnout t1 --out a.html", "--out", "--figure", "a.html"),
+        ("passage a.h5 --turnout t1 --out a.html", "--out", "--figure", "a.html"),
+        ("paper t1 --bars a.html", "--bars", "--figure", "a.html"),
+        ("diagnose --turnout t1 --budget 10", "--budget", "--limit-minutes", 10.0),
+        ("blind make --out a --workers 2", "--workers", "--cores", 2),
     ],
 )
-def test_a_former_option_works_with_a_warning(capsys, words, option, expected):
-    assert PARSER.parse_args(words).impacts == expected
-    assert f"--blows is called {option} now" in capsys.readouterr().err
-    assert "--blows" not in " ".join(" ".join(w) for w in words_by_path(PARSER).values())
+def test_a_former_option_works_with_a_warning(capsys, line, former, present, expected):
+    assert getattr(build_parser().parse_args(line.split()), present[2:].replace("-", "_")) == expected
+    assert f"{former} is called {present} now" in capsys.readouterr().err
+    paths = [path for path in words_by_path(PARSER) if f" {line} ".startswith(f"{path} ")]
+    words = words_by_path(PARSER)[max(paths, key=len)]
+    assert former not in words and present in words
+
+
+def options_of_commands():
+    """(option, command, its definition) of every option that the help shows."""
+    return [
+        (option, leaf.prog, action)
+        for leaf in leaf_parsers(PARSER)
+        for action in leaf._actions
+        if action.help != argparse.SUPPRESS
+        for option in action.option_strings
+        if option.startswith("--")
+    ]
+
+
+def takes(action):
+    """Kind of the values of an option: none, one or several, and their type."""
+    several = action.nargs in ("*", "+") or isinstance(action, argparse._AppendAction | argparse._ExtendAction)
+    return ("none" if action.nargs == 0 else "several" if several else "one", action.type)
+
+
+def test_an_option_has_one_spelling_and_takes_the_same_values_in_every_command():
+    spellings, kinds = defaultdict(set), defaultdict(lambda: defaultdict(set))
+    for option, command, action in options_of_commands():
+        spellings[option.replace("-", "")].add(option)
+        kinds[option][takes(action)].add(command)
+    assert not [names for names in spellings.values() if len(names) > 1]
+    different = {option: dict(found) for option, found in kinds.items() if len(found) > 1}
+    assert different.keys() == SEVERAL_KINDS.keys(), different
+
+
+def test_an_option_of_several_values_is_a_plural_and_one_of_a_single_value_is_not():
+    """``--turnout`` names one turnout, ``--turnouts`` several."""
+    options = {option: takes(action)[0] for option, _, action in options_of_commands()}
+    pairs = [(option, f"{option}s") for option in options if f"{option}s" in options]
+    assert ("--turnout", "--turnouts") in pairs and ("--section", "--sections") in pairs
+    wrong = [pair for pair in pairs if options[pair[0]] != "one" or options[pair[1]] != "several"]
+    assert not [pair for pair in wrong if pair not in NO_PLURALS]
 
 
 @pytest.mark.parametrize(

@@ -62,8 +62,8 @@ WRONG = {
     "calibrate --section A7 --track tommerup --modes ballast=nan/0.1": "Write a frequency above 0 Hz",
     "calibrate --section A7 --track tommerup --modes ballast=100/1.5": "damping ratio between 0 and 1",
     "calibrate --section A7 --track tommerup --modes ballast=1e300/0.1": "above 0 Hz, up to 5000 Hz",
-    "distinguish --track tommerup --sensors 1e9 --impacts 24.6": "the position 1e+09 m of a sensor or impact",
-    "distinguish --track tommerup --sensors 24.6 --impacts -900": "Write positions from",
+    "distinguish --track tommerup --sensor-positions 1e9 --impact-positions 24.6": "the position 1e+09 m of a sensor",
+    "distinguish --track tommerup --sensor-positions 24.6 --impact-positions -900": "Write positions from",
     "plan --shards 1000000000000": "Write the number of shards of the runs, 1 to 4096",
     "calibrate --section A7 --track tommerup --modes ballast=600/.1 railpad=150/.1": "the ballast resonance lies below",
     "calibrate --section A7 --track tommerup --modes balast=100/.1": "no resonance 'balast'. Write ballast or railpad",
@@ -71,7 +71,7 @@ WRONG = {
     "calibrate raw/W1/hammer/A7_1.csv --turnout W1 --section A8": "is 'A8', and the file's name says 'A7'",
     "diagnose --turnout W1 --finding x": "--finding, option: it acts with --accept only",
     "diagnose --turnout W1 --anyway": "--anyway, option: it acts with --accept only",
-    "compare raw/W1/hammer/A7_1.csv --turnout W1 --out config": "config, --out: it is a folder",
+    "compare raw/W1/hammer/A7_1.csv --turnout W1 --figure config": "config, --figure: it is a folder",
     "simulate hammer --section A7 --impacts 100000000": "--impacts: 100000000. Write a whole number from 1 to 1000",
     "simulate passage --units 100000": "--units: 100000. Write a whole number from 1 to 50",
     "nightly W1": "'W1' is no option. Options of Snakemake stand behind --, as in 'turnout nightly -- --config turn",
@@ -115,7 +115,7 @@ def test_the_error_of_a_layout_without_passages_names_the_layout(project, capsys
         ("hamer", "no command 'hamer'. Did you mean 'hammer'?"),
         ("--verison", "turnout: '--verison' before the command. Write options behind it: turnout COMMAND --verison"),
         ("--json worklist", "turnout: '--json' before the command. Write options behind it: turnout COMMAND --json"),
-        ("worklist --as-of 2026-05-14", "unknown: --as-of 2026-05-14. Did you mean --asof? 'turnout worklist --help'"),
+        ("worklist --asoff 2026-05-14", "unknown: --asoff 2026-05-14. Did you mean --as-of? 'turnout worklist --help'"),
         ("worklist --quite", "unknown: --quite. Did you mean --quiet? 'turnout worklist --help'"),
         ("worklist --out x", "unknown: --out x. 'turnout worklist --help'"),
         ("worklist --turnout W1", "turnout worklist: error: unknown: --turnout W1. 'turnout worklist --help'"),
@@ -125,11 +125,14 @@ def test_the_error_of_a_layout_without_passages_names_the_layout(project, capsys
         ),
         ("simulate passage --speed 1e9", "argument --speed: '1e9' is not a number from 1 to 500 km/h"),
         ("simulate hammer --section A7 --temperature 1e30", "--temperature: '1e30' is not a number from -50 to 80 °C"),
-        ("distinguish --sensors 24 --trains ic3 --speeds 1e-9", "--speeds: '1e-9' is not a number from 1 to 500 km/h"),
-        ("diagnose --turnout W1 --budget nan", "argument --budget: 'nan' is not a number"),
-        ("diagnose --turnout W1 --budget -1", "argument --budget: '-1' is not 0 or more"),
-        ("paper W1 --speed -5", "argument --speed: '-5' is not a number above 0"),
-        ("distinguish --sensors nan", "argument --sensors: 'nan' is not a number"),
+        (
+            "distinguish --sensor-positions 24 --vehicles ic3 --speeds 1e-9",
+            "--speeds: '1e-9' is not a number from 1 to 500 km/h",
+        ),
+        ("diagnose --turnout W1 --limit-minutes nan", "argument --limit-minutes: 'nan' is not a number"),
+        ("diagnose --turnout W1 --limit-minutes -1", "argument --limit-minutes: '-1' is not 0 or more"),
+        ("paper W1 --speed -5", "argument --speed: '-5' is not a number from 1 to 500 km/h"),
+        ("distinguish --sensor-positions nan", "argument --sensor-positions: 'nan' is not a number"),
     ],
 )
 def test_a_wrong_command_line_has_exit_code_2(capsys, line, message):
@@ -139,8 +142,8 @@ def test_a_wrong_command_line_has_exit_code_2(capsys, line, message):
 
 
 def test_the_error_of_a_folder_without_effects_for_the_blind_proof_names_it(capsys):
-    assert main(["blind", "make", "--out", "proof", "--effects", "nowhere", "--limit", "1"]) == 2
-    assert "nowhere, --effects: no file of an effect. Name a folder with" in capsys.readouterr().err
+    assert main(["blind", "make", "--out", "proof", "--effects-folder", "nowhere", "--limit", "1"]) == 2
+    assert "nowhere, --effects-folder: no file of an effect. Name a folder with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", ["inspect ''", "hammer '' --turnout W1", "report --pages ''", "query ''", "init ''"])

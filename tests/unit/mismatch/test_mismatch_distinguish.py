@@ -47,7 +47,7 @@ def test_the_command_states_once_what_cannot_be_seen(capsys, monkeypatch):
     loss = np.array([[0.0, 2.0, 30.0], [3.0, 0.0, 4.0], [30.0, 28.0, 0.0]])
     matrix = Distinguishability(("local_pad", "sensor_gain", "hum"), loss, np.array([13.0, 4.0, 31.0]))
     monkeypatch.setattr(distinguish, "planned_matrix", lambda *_: (matrix, "No single addition."))
-    assert main(["distinguish", "--sensors", "23.4", "--impacts", "24.6"]) == 0
+    assert main(["distinguish", "--sensor-positions", "23.4", "--impact-positions", "24.6"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "evidence [nats]     none        1        2        3",
         " 1 local_pad          13        0        2       30",
@@ -80,13 +80,13 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ([], "nothing is planned: give --impacts, --trains or both."),
+        ([], "nothing is planned: give --impact-positions, --vehicles or both."),
         (
-            ["--impacts", "24.6", "--effects", "hanging_slepper"],
+            ["--impact-positions", "24.6", "--effects", "hanging_slepper"],
             "no effect 'hanging_slepper' in such a campaign",
         ),
     ],
 )
 def test_a_plan_that_can_show_no_effect_is_rejected_with_a_message(more, said, capsys):
-    assert main(["distinguish", "--sensors", "23.4", *more]) == 2
+    assert main(["distinguish", "--sensor-positions", "23.4", *more]) == 2
     assert said in capsys.readouterr().err

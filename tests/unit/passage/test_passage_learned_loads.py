@@ -174,7 +174,7 @@ def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypa
     monkeypatch.setattr(
         "turnout.registry.database.open_registry", lambda path: connection_of(np.random.default_rng(1), 60)
     )
-    assert main(["trains", "--turnout", "tommerup_s1", "--raw", str(raw)]) == 0
+    assert main(["trains", "--turnouts", "tommerup_s1", "--raw", str(raw)]) == 0
     said = capsys.readouterr().out
     assert "tommerup_s1: 6 trains of known weight, 10.0 to 19.0 t per axle" in said
     assert re.search(r" load of one train ± [\d.]+ % \(sd\), amplitude with speed to the power", said)

@@ -9,5 +9,5 @@ from turnout.registry.job import register
 @pytest.mark.parametrize("asof", ["2026-03-01T09:00+02:00", "2026-03-01T09:00+00:00"])
 def test_the_worklist_rejects_a_date_with_a_time_zone(tmp_path, capsys, asof):
     register([], tmp_path / "registry", read=iter)
-    assert main(["worklist", "--registry", str(tmp_path / "registry"), "--asof", asof]) == 2
-    assert f"--asof, date: {asof!r}, with a time zone. Write the time in UTC" in capsys.readouterr().err
+    assert main(["worklist", "--registry", str(tmp_path / "registry"), "--as-of", asof]) == 2
+    assert f"--as-of, date: {asof!r}, with a time zone. Write the time in UTC" in capsys.readouterr().err

@@ -102,7 +102,7 @@ def test_table_4_has_the_trains_of_the_paper_beside_random_models(registry_with_
 
 def test_the_page_of_bars_has_the_values_of_table_5(registry_with_trains, tmp_path, capsys):
     page = tmp_path / "bars.html"
-    assert main(["paper", "t1", "--registry", registry_with_trains, "--table", "5", "--bars", str(page)]) == 0
+    assert main(["paper", "t1", "--registry", registry_with_trains, "--table", "5", "--figure", str(page)]) == 0
     text = capsys.readouterr().out
     assert text.startswith("Table 5:") and "train type" in text and "160-180 km/h" in text
     assert "10.0-12.5 t 36 ± 21 5 41 5" in " ".join(text.split())  # means of all five scores and of their null models
@@ -111,7 +111,7 @@ def test_the_page_of_bars_has_the_values_of_table_5(registry_with_trains, tmp_pa
 
 
 def test_bars_without_a_passage_are_an_error(registry, tmp_path, capsys):
-    assert main(["paper", "t1", "--registry", registry, "--bars", str(tmp_path / "bars.html")]) == 2
+    assert main(["paper", "t1", "--registry", registry, "--figure", str(tmp_path / "bars.html")]) == 2
     assert "no scored passage of t1" in capsys.readouterr().err
 
 

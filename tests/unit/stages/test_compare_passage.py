@@ -76,7 +76,7 @@ def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
 def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, repository, tmp_path, capsys):
     page, spectra = tmp_path / "c.html", tmp_path / "c.csv"
     arguments = ["compare", str(passage), "--turnout", "tommerup_s2", "--configuration", str(repository / "config")]
-    arguments += ["--raw", str(passage.parent), "--sensors", "A7", "--out", str(page), "--csv", str(spectra)]
+    arguments += ["--raw", str(passage.parent), "--sensors", "A7", "--figure", str(page), "--csv", str(spectra)]
     assert main(arguments) == 0
     text = capsys.readouterr().out
     assert "A7: no hammer test before the passage" in text and text.count("\nA7 ") == 2

@@ -187,10 +187,10 @@ def test_results_are_kept_when_the_budget_is_used_up(soft):
 def test_finished_groups_are_shown_when_the_budget_is_used_up(soft, monkeypatch, capsys):
     """There are two groups; the first was finished before."""
     monkeypatch.setattr(mismatch_groups, "MAX_SECTION_GAP", 0.1)
-    assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
+    assert main(["diagnose", "--turnout", "t1", "--limit-minutes", "0"]) == 2
     assert "0 of 2 groups done" in capsys.readouterr().err and not (soft / "results").exists()
     (first,) = diagnose_turnout("t1", sections=("A",))["mismatch_findings"]
-    assert main(["diagnose", "--turnout", "t1", "--budget", "0"]) == 2
+    assert main(["diagnose", "--turnout", "t1", "--limit-minutes", "0"]) == 2
     printed = capsys.readouterr()
     assert first["sentence"] in printed.out and "no answer for sections B: the budget was used up" in printed.out
     assert "1 of 2 groups done; the same command continues" in printed.err

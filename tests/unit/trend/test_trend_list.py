@@ -266,8 +266,8 @@ def test_the_printed_list_states_its_newest_data_and_the_unmeasured_charts(tmp_p
     assert [(e["state"], bool(e["look_at"])) for e in worklist_entries(tmp_path)] == [("inspect this week", True)]
     then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
     assert f"The last data are of {newest:%Y-%m-%d}: " in told
-    assert told.endswith(f"turnout worklist --asof {then} shows the list of that day.\n")
-    assert main(["worklist", "--registry", str(tmp_path), "--asof", then]) == 0
+    assert told.endswith(f"turnout worklist --as-of {then} shows the list of that day.\n")
+    assert main(["worklist", "--registry", str(tmp_path), "--as-of", then]) == 0
     assert "26 not measured" not in capsys.readouterr().out
     pages = ["report", "--registry", str(tmp_path), "--pages", str(tmp_path / "pages")]
     assert main(pages) == 0
@@ -285,7 +285,7 @@ def test_the_printed_list_states_its_newest_data_and_the_unmeasured_charts(tmp_p
     assert "INSPECT THIS WEEK: T00001" in told
     # eight sections and the turnout's median, three times; T00002 is silent
     assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in told
-    assert main(["worklist", "--registry", str(tmp_path), "--asof", f"{newest:%Y-%m-%d}"]) == 0
+    assert main(["worklist", "--registry", str(tmp_path), "--as-of", f"{newest:%Y-%m-%d}"]) == 0
     assert "INSPECT THIS WEEK" in (then := capsys.readouterr().out) and "Of 27 charts" not in then
 
 

@@ -120,7 +120,7 @@ def test_the_printed_list_states_position_cause_and_certainty(registry, capsys, 
     assert main(["worklist", "--registry", str(root), "--csv", str(tmp_path / "list.csv")]) == 0
     table = pd.read_csv(tmp_path / "list.csv")
     assert table.loc[0, "section_id"] == "T00001/S4" and len(table) <= 20
-    assert main(["worklist", "--registry", str(root), "--asof", "yesterday"]) == 2
+    assert main(["worklist", "--registry", str(root), "--as-of", "yesterday"]) == 2
     assert "YYYY-MM-DD" in capsys.readouterr().err
 
 
@@ -130,14 +130,14 @@ def test_a_list_of_a_day_before_the_first_measurement_states_that(registry, rows
     root, _ = registry
     first = rows["measured_at_utc"].min()
     for more in ([], ["--all"], ["--csv", str(tmp_path / "list.csv")]):
-        assert main(["worklist", "--registry", str(root), "--asof", "1999-12-31", *more]) == 2
+        assert main(["worklist", "--registry", str(root), "--as-of", "1999-12-31", *more]) == 2
         said = capsys.readouterr()
         assert (
             f"'1999-12-31': nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M}"
             in said.err
         )
         assert said.out == "" and not (tmp_path / "list.csv").exists()
-    assert main(["worklist", "--registry", str(root), "--asof", f"{first:%Y-%m-%dT%H:%M:%S}"]) == 0
+    assert main(["worklist", "--registry", str(root), "--as-of", f"{first:%Y-%m-%dT%H:%M:%S}"]) == 0
 
 
 def test_the_export_writes_tables_in_common_formats(registry, tmp_path, capsys):
