@@ -57,7 +57,7 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
         If the disk fails or is full, or the file may not be written; ``filename`` is ``path``.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     with _unfinished_file(path, temporary_path(path)) as temporary, open(temporary, "wb") as stream:
         if path.exists():
             os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
@@ -73,7 +73,7 @@ def whole_file(path: os.PathLike | str) -> Iterator[Path]:
     Parameters
     ----------
     path : path-like
-        File to write; its folder must exist. A device or a pipe, such as /dev/stdout, is written directly.
+        File to write; its folder is created. A device or a pipe, such as /dev/stdout, is written directly.
 
     Yields
     ------
@@ -95,10 +95,63 @@ def whole_file(path: os.PathLike | str) -> Iterator[Path]:
         yield path  # a new file would not be that which other programs have open
         return
     path = path.resolve() if path.is_symlink() else path
+    make_folder(path.parent)
     with _unfinished_file(path, path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")) as temporary:
         yield temporary
         if path.exists():
             os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
+
+
+def make_folder(folder: os.PathLike | str) -> None:
+    """Make a folder for output, and the folders above it, where they do not exist.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made; NotADirectoryError if it, or a folder above it, is a file. ``filename`` names that file.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        file = next((p for p in (folder, *folder.parents) if p.exists() and not p.is_dir()), folder)
+        raise NotADirectoryError(errno.ENOTDIR, "it is a file, not a folder", str(file)) from None
+
+
+def output_problem(path: os.PathLike | str) -> tuple[str, str] | None:
+    """Why a file cannot be written, as far as that can be said before its content is computed.
+
+    Parameters
+    ----------
+    path : path-like
+        File to write. Missing folders are no problem, because they are made.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        The problem and what to do; None without one.
+
+    Examples
+    --------
+    >>> output_problem("/")
+    ('it is a folder', 'Write the name of a file')
+    """
+    path = Path(path)
+    if path.is_dir():
+        return "it is a folder", "Write the name of a file"
+    if path.exists() and special_kind(path.stat().st_mode):  # such as /dev/stdout
+        return None
+    above = next(p for p in path.absolute().parents if os.path.lexists(p))
+    if not above.is_dir():
+        return f"{above} is a file, not a folder", "Write the name of a file in a folder"
+    if not os.access(above, os.W_OK | os.X_OK):
+        return f"no permission to write in {above}", "Correct its permissions, or write a file in another folder"
+    return None
 
 
 @contextmanager

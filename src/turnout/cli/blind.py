@@ -17,7 +17,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import above_zero, at_least_one
-from turnout.cli.options import add_cores, add_former, add_use
+from turnout.cli.options import add_cores, add_former, add_use, check_output_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -163,6 +163,7 @@ def _score(args: argparse.Namespace) -> None:
     from turnout_blind.score.report import report_text
     from turnout_blind.seal import BlindError
 
+    check_output_files(args, "--report", "--page")
     if args.page and (args.histories or len(args.out) > 1):
         raise BlindError(args.page, "--page", "a page shows one set of single visits", "Give one --out, no --histories")
     if args.histories:

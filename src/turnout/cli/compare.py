@@ -14,7 +14,15 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import finite_number, whole_number
-from turnout.cli.options import add_configuration, add_figure, add_former, add_raw, add_track, add_turnout
+from turnout.cli.options import (
+    add_configuration,
+    add_figure,
+    add_former,
+    add_raw,
+    add_track,
+    add_turnout,
+    check_output_files,
+)
 
 if TYPE_CHECKING:
     from turnout.stages.compare import PassageComparison
@@ -62,18 +70,13 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     ConfigError
-        The name of an output is that of a folder.
+        An output cannot be written.
     """
-    from pathlib import Path
-
-    from turnout.errors import ConfigError
     from turnout.files import write_text
     from turnout.report.comparison_page import comparison_page, spectra_csv
     from turnout.stages.compare import compare_passage
 
-    for option in ("figure", "csv"):
-        if (name := getattr(args, option)) and Path(name).is_dir():
-            raise ConfigError(name, f"--{option}", "it is a folder", "Write the name of a file")
+    check_output_files(args, "--figure", "--csv")
     comparison = compare_passage(
         args.file,
         args.turnout,

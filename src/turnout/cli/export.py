@@ -61,15 +61,16 @@ def run(args: argparse.Namespace) -> int:
     import duckdb
 
     from turnout.errors import RegistryError
+    from turnout.files import make_folder
     from turnout.registry.database import open_registry
 
     folder, names = Path(args.folder), args.only or DEFAULT_TABLES
     with open_registry(args.registry) as con:
         _require_tables(con, names)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
         except OSError as error:
-            raise RegistryError(f"{folder} cannot be made: {error.strerror}. Name another folder.") from None
+            raise RegistryError(f"{error.filename or folder}: {error.strerror}. Name another folder.") from None
         for name in names:
             try:
                 path, n = _write(con, name, folder, args.format)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_figure, add_raw, add_turnout
+from turnout.cli.options import add_configuration, add_figure, add_raw, add_turnout, check_output_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.report.hammer_text import hammer_words, is_usable
     from turnout.stages.requested_units import requested_units
 
+    check_output_files(args, "--figure")
     if args.raw and not Path(args.raw).is_dir():
         raise ConfigError(
             args.raw, "--raw", "no such folder", "Write the folder that holds the folders of the turnouts"
@@ -103,10 +104,6 @@ def _check_figure(path: Path, tests: Sequence[RequestedUnit]) -> None:
     if path.suffix.lower() != ".svg":
         remedy = "Write a name that ends in .svg; every browser shows and prints it"
         raise ConfigError(path, "--figure", f"{path.suffix!r} is not a supported figure format", remedy)
-    if path.is_dir():
-        raise ConfigError(path, "--figure", "it is a folder", "Write the name of a file")
-    if not path.parent.is_dir():
-        raise ConfigError(path, "--figure", f"no folder {path.parent}", "Make it, or write another one")
     if len(tests) > 1:
         labels = ", ".join(test.unit.label for test in tests)
         raise ConfigError(path, "--figure", f"one figure for {labels}", "Name the files of one section and campaign")

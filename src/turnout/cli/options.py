@@ -132,6 +132,32 @@ def add_figure(parser: argparse.ArgumentParser, help: str) -> None:
     parser.add_argument("--figure", metavar="FILE", help=help)
 
 
+def check_output_files(args: argparse.Namespace, *options: str) -> None:
+    """Check the files that a command is to write, before it computes anything.
+
+    Every command with such options calls it first. Missing folders are made when a file is written.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+    *options : str
+        Names of the options with their dashes. One that was not given, or is '-' for standard output, is no file.
+
+    Raises
+    ------
+    ConfigError
+        A file cannot be written: it is a folder, lies below a file, or the permission is missing.
+    """
+    from turnout.errors import ConfigError
+    from turnout.files import output_problem
+
+    for option in options:
+        path = getattr(args, option.lstrip("-").replace("-", "_"), None)
+        if path and path != "-" and (problem := output_problem(path)):
+            raise ConfigError(path, option, *problem)
+
+
 def add_track(parser: argparse.ArgumentParser, help: str = TRACK_HELP, default: str | None = None) -> None:
     """Add ``--track``, the track file.
 

@@ -18,7 +18,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import SPEED, whole_number
-from turnout.cli.options import add_figure, add_former, add_registry
+from turnout.cli.options import add_figure, add_former, add_registry, check_output_files
 
 if TYPE_CHECKING:
     from typing import Any
@@ -69,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.database import open_registry
     from turnout.report.paper_tables import class_rows, class_table, paper_tables, render
 
+    check_output_files(args, "--figure")
     with open_registry(args.registry) as connection:
         _check_train_type(connection, args.turnout, args.train_type)
         campaign = _campaign(connection, args.turnout, args.campaign)

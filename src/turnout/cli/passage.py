@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_figure, add_former, add_turnout, add_work
+from turnout.cli.options import add_configuration, add_figure, add_former, add_turnout, add_work, check_output_files
 from turnout.constants import KMH, Z95
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.passage_context import passage_context
     from turnout.stages.raw_files import require_file
 
+    check_output_files(args, "--figure")
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     description = turnout.require_passages().description
     path = require_file(args.file).resolve()  # a link may lead anywhere

@@ -24,7 +24,7 @@ from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import at_least_one
-from turnout.cli.options import add_csv, add_registry, add_result
+from turnout.cli.options import add_csv, add_registry, add_result, check_output_files
 from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.confinement import open_confined, require_reading
     from turnout.registry.documentation import listing
 
+    check_output_files(args, "--csv")
     if args.list or not args.sql:
         print(listing())
         return 0

@@ -12,7 +12,7 @@ and force of each impact, or the forces of the wheels.
 import argparse
 
 from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number, whole_number
-from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout
+from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout, check_output_files
 
 GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"
@@ -89,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     from turnout.stages.simulate import write_hammer, write_passage
 
+    check_output_files(args, "--out")
     write = write_hammer if args.kind == "hammer" else write_passage
     for path, note in write(vars(args)):
         print(f"{path}: {note}")

@@ -12,7 +12,7 @@ import argparse
 import csv
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_csv, add_former, add_registry, add_result
+from turnout.cli.options import add_csv, add_former, add_registry, add_result, check_output_files
 from turnout.cli.query import open_output
 from turnout.counts import count_of
 from turnout.registry.spreadsheet import without_formula
@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.registry.as_of import counts_of, list_day, whole_list
     from turnout.registry.database import open_registry
 
+    check_output_files(args, "--csv")
     with open_registry(args.registry) as con:
         day = [_day(args.as_of, con)] if args.as_of else []
         today = list_day(con)

@@ -105,7 +105,6 @@ def _write(
     templates = files("turnout.report") / "templates"
     shared = shared_by_pages(generation) | {"finding_css": (templates / "finding.css").read_text()}
     path = Path(folder) / "findings" / f"{about['turnout_id']}.html"
-    path.parent.mkdir(parents=True, exist_ok=True)
     replace_page(path, finding_page(about, rows, environment.get_template("finding.html"), shared))
     return path
 

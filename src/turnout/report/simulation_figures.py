@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import GRAVITY, KMH
+from turnout.files import make_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,7 +44,7 @@ def draw_all(folder: str | Path) -> Iterator[Path]:
     matplotlib.use("svg")
     matplotlib.rcParams.update({"svg.hashsalt": "turnout", "font.size": 9, "axes.grid": True, "grid.alpha": 0.3})
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     recording, truth = _passage()
     yield _save(_receptances(), folder / "simulation_receptance.svg")
     yield _save(_passage_forces(recording, truth), folder / "simulation_passage.svg")

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from turnout import __version__
 from turnout.counts import count_of
-from turnout.files import write_text
+from turnout.files import make_folder, write_text
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.pages.glossary import glossary_page
 from turnout.report.pages.turnout import turnout_page
@@ -65,7 +65,7 @@ def write_pages(
         Number of pages written, without the glossary.
     """
     folder = Path(folder)
-    (folder / "turnouts").mkdir(parents=True, exist_ok=True)
+    make_folder(folder / "turnouts")
     environment, shared = page_environment(), shared_by_pages(generation)
     source = FleetSource(connection, day)
     replace_page(folder / "index.html", fleet_page(source, environment.get_template("fleet.html"), shared))

@@ -274,8 +274,6 @@ def _write(
     path = Path(request["out"]) if request.get("out") else folder / name
     if turnout is not None and not request.get("out") and path.exists():
         raise SimulationError(f"{path} is there already and may be a measurement: give another --at, or --out.")
-    if path.parent != Path():
-        path.parent.mkdir(parents=True, exist_ok=True)
     try:
         return write([replace(r, source="") for r in recordings], path, request["format"], description)
     except ValueError as error:

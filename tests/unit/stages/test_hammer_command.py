@@ -321,10 +321,15 @@ def test_the_figure_of_a_rejected_test_shows_its_impacts_and_no_resonance(tmp_pa
 def test_an_invalid_figure_path_is_rejected_before_the_computation(tmp_path, capsys):
     (path,) = write_filed(tmp_path)
     (tmp_path / "folder.svg").mkdir()
-    for name in ("a7.png", "none/a7.svg", "folder.svg"):
+    for name in ("a7.png", "folder.svg"):
         code, text, error = run_hammer(capsys, tmp_path, path, more=["--figure", str(tmp_path / name)])
         assert code == 2 and text == "" and name in error
-    assert not (tmp_path / "none").exists()
+
+
+def test_the_folder_of_a_figure_is_made(tmp_path, capsys):
+    (path,) = write_filed(tmp_path)
+    figure = tmp_path / "new" / "folder" / "a7.svg"
+    assert run_hammer(capsys, tmp_path, path, more=["--figure", str(figure)])[0] == 0 and figure.is_file()
 
 
 def test_a_time_that_contradicts_the_campaign_is_reported_and_the_file_is_used(tmp_path, capsys):

@@ -46,7 +46,7 @@ def write(
     recordings : sequence of Recording
         In SI. A WAV file holds only one.
     path : path-like
-        Overwritten if it exists; its folder must exist.
+        Overwritten if it exists; its folder is created.
     format : str
         A key of ``WRITERS``.
     description : RawDescription or None
