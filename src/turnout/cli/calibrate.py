@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_track, add_turnout
+from turnout.cli.options import add_configuration, add_track, add_turnout, add_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -65,11 +65,14 @@ def run(args: argparse.Namespace) -> int:
     """
     from turnout.errors import SimulationError
     from turnout.stages.calibrate import calibrate_to_files, calibrate_to_modes, resolve_track
+    from turnout.stages.parameter_ranges import improbable_in_files
+    from turnout.stages.track_files import files_of_track
 
     if bool(args.files) == bool(args.modes):
         raise SimulationError("give either hammer tests or --modes.")
     targets = _target_modes(args.modes or ())
     track = resolve_track(args.track, args.turnout, args.configuration)
+    add_warnings(args, improbable_in_files(files_of_track(track)))
     print(f"track: {track}" + ("" if args.track or args.turnout else " (no turnout and no track was named)"))
     if args.modes:
         fit = calibrate_to_modes(track, args.section, targets)

@@ -21,6 +21,7 @@ from turnout.cli.options import (
     add_raw,
     add_track,
     add_turnout,
+    add_warnings,
     check_output_files,
 )
 
@@ -89,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
         not args.no_calibration,
         args.seed,
     )
+    add_warnings(args, comparison.warnings)
     print("\n".join(comparison_lines(comparison)))
     for path, content in ((args.figure, comparison_page), (args.csv, spectra_csv)):
         if path:

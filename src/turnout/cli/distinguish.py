@@ -12,7 +12,7 @@ Each effect has the size from which a diagnosis begins to fit it, in the middle 
 import argparse
 
 from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number
-from turnout.cli.options import add_configuration, add_former, add_track
+from turnout.cli.options import add_configuration, add_former, add_track, add_warnings
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"
@@ -65,8 +65,10 @@ def run(args: argparse.Namespace) -> int:
     """
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.thresholds import THRESHOLDS
-    from turnout.stages.distinguish import planned_matrix
+    from turnout.stages.distinguish import planned_files, planned_matrix
+    from turnout.stages.parameter_ranges import improbable_in_files
 
+    add_warnings(args, improbable_in_files(planned_files(args.track, args.vehicles, args.configuration)))
     matrix, advice = planned_matrix(
         args.track,
         args.sensor_positions,

@@ -41,7 +41,14 @@ exit codes:
   124  nightly: ended at the limit of time
   130  interrupted"""
 COLLECTION_THRESHOLD = 50_000  # new containers between searches for cycles; Python's 700 cost 1 % of a diagnosis
-COMMON_DEFAULTS = {"json": False, "quiet": False, "verbose": False, "result": None, "nothing_used": False}
+COMMON_DEFAULTS = {
+    "json": False,
+    "quiet": False,
+    "verbose": False,
+    "result": None,
+    "warnings": None,
+    "nothing_used": False,
+}
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -267,6 +274,7 @@ def _run_for_json(args: argparse.Namespace) -> tuple[int, str]:
         "exit_code": code,
         "text": text.getvalue().splitlines(),
         "result": args.result,
+        "warnings": args.warnings or [],
         "error": message or None,
     }
     is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"

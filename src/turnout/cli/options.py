@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from turnout.cli.option_types import at_least_one
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
     from typing import Any
 
 RAW_HELP = "raw root, the folder of all recordings"
@@ -240,7 +240,7 @@ def add_common(parser: argparse.ArgumentParser, default: object = argparse.SUPPR
         Value without the options; those of a command leave what was given before it.
     """
     common = (
-        (("--json",), "print one JSON object: command, exit_code, text, result, error"),
+        (("--json",), "print one JSON object: command, exit_code, text, result, warnings, error"),
         (("-q", "--quiet"), "no progress and no warnings"),
         (("-v", "--verbose"), "show what is done, and where in the program an error arose"),
     )
@@ -294,6 +294,22 @@ def add_use(args: argparse.Namespace, n_used: int, n_left_out: int) -> None:
     True
     """
     args.nothing_used = n_left_out > 0 and n_used == 0
+
+
+def add_warnings(args: argparse.Namespace, warnings: Iterable[str]) -> None:
+    """State what is doubtful though the command goes on: on standard error, or with ``--json`` in its object.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+    warnings : iterable of str
+        Sentences. Those that were stated before are left out.
+    """
+    new = [text for text in dict.fromkeys(warnings) if text not in (args.warnings or ())]
+    args.warnings = [*(args.warnings or ()), *new]
+    for text in () if args.quiet or args.json else new:
+        print(f"turnout {args.command}: {text}", file=sys.stderr)
 
 
 def add_result(args: argparse.Namespace, result: object) -> None:

@@ -12,7 +12,15 @@ and force of each impact, or the forces of the wheels.
 import argparse
 
 from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number, whole_number
-from turnout.cli.options import add_configuration, add_former, add_raw, add_track, add_turnout, check_output_files
+from turnout.cli.options import (
+    add_configuration,
+    add_former,
+    add_raw,
+    add_track,
+    add_turnout,
+    add_warnings,
+    check_output_files,
+)
 
 GROUP = "Simulate and diagnose"
 HELP = "simulate a hammer test or a train passage"
@@ -87,9 +95,11 @@ def run(args: argparse.Namespace) -> int:
         for path in draw_all(args.out):
             print(path)
         return 0
-    from turnout.stages.simulate import write_hammer, write_passage
+    from turnout.stages.parameter_ranges import improbable_in_files
+    from turnout.stages.simulate import model_files, write_hammer, write_passage
 
     check_output_files(args, "--out")
+    add_warnings(args, improbable_in_files(model_files(vars(args))))
     write = write_hammer if args.kind == "hammer" else write_passage
     for path, note in write(vars(args)):
         print(f"{path}: {note}")

@@ -13,7 +13,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_work
+from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_warnings, add_work
 from turnout.counts import count_of
 from turnout.number_text import evidence_in_words
 
@@ -58,8 +58,12 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from turnout.config import load_configuration
     from turnout.stages.calibrated_model import answer_rows, calibrate_turnout
+    from turnout.stages.track_files import improbable_entries
 
+    turnout = load_configuration(args.configuration).turnout(args.turnout)
+    add_warnings(args, improbable_entries(turnout, args.track))
     model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)
     add_result(args, answer_rows(model))
     print("\n".join(model_text(args.turnout, model, args.all)))

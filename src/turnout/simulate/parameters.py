@@ -73,6 +73,29 @@ def track_path(name: str | Path, folder: str | Path | None = None) -> Path:
     return _find_file(name, folder, "tracks")
 
 
+def vehicle_path(name: str | Path, folder: str | Path | None = None) -> Path:
+    """File of the vehicle called ``name``, or ``name`` where that is a file's path.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of the vehicle, or path of its file.
+    folder : str, Path or None
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
+
+    Returns
+    -------
+    Path
+        Path of the file; one that was given as a path is not looked up.
+
+    Raises
+    ------
+    SimulationError
+        If no file has that name.
+    """
+    return _find_file(name, folder, "vehicles")
+
+
 def track_parameters(path: Path, folder: str | Path | None, visited: tuple[Path, ...] = ()) -> ParameterSet:
     """Parameters of a track file; keys that it does not have come from the file that it extends.
 
@@ -154,7 +177,7 @@ def load_vehicle(name: str | Path, load: float = 0.5, folder: str | Path | None 
     ConfigError
         If the file is not valid.
     """
-    path = _find_file(name, folder, "vehicles")
+    path = vehicle_path(name, folder)
     parameters = read_unchanged_parameters(path)
     if "compose" not in parameters:
         return train(parameters, load, units)

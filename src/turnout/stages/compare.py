@@ -22,9 +22,11 @@ from turnout.simulate.parameters import load_track, load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.stages.calibrate import calibrate_to_files, resolve_track
+from turnout.stages.parameter_ranges import improbable_in_files
 from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
 from turnout.stages.raw_files import require_file
+from turnout.stages.track_files import files_of_track, files_of_vehicle
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -74,11 +76,15 @@ class BandComparison:
 
 @dataclass(frozen=True)
 class PassageComparison:
-    """A recorded passage beside its simulation: ``train`` and ``notes`` in words, ``bands`` per sensor and band."""
+    """A recorded passage beside its simulation: ``train`` and ``notes`` in words, ``bands`` per sensor and band.
+
+    ``warnings`` are improbable values of the track and vehicle files.
+    """
 
     train: str
     notes: tuple[str, ...]
     bands: tuple[BandComparison, ...]
+    warnings: tuple[str, ...] = ()
 
 
 def compare_passage(
@@ -129,6 +135,7 @@ def compare_passage(
     turnout = with_raw(load_configuration(configuration).turnout(turnout_id), Path(raw))
     recording, passage = _recorded_train(require_file(file), turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
+    vehicle = vehicle or _vehicle_of_type(passage, file)
     train = _vehicle(vehicle, load, passage, file)
     path = resolve_track(track, turnout_id, configuration)
     model = load_track(str(path), seed, path.parent)
@@ -139,7 +146,8 @@ def compare_passage(
     bands = tuple(band for sensor in chosen for band in _compare_sensor(sensor, recording, passage, *simulated))
     speed = KMH * passage.train_motion.speed
     words = f"{train.name}, {passage.n_axle} axles, {speed:.1f} km/h, {passage.direction}, track {passage.track}"
-    return PassageComparison(words, tuple(notes), bands)
+    warnings = improbable_in_files([*files_of_track(path), *files_of_vehicle(vehicle)])
+    return PassageComparison(words, tuple(notes), bands, tuple(warnings))
 
 
 def _recorded_train(path: Path, turnout: TurnoutConfig) -> tuple[Recording, Passage]:
@@ -168,12 +176,15 @@ def _chosen_sensors(
     return [by_name[name] for name in names or by_name]
 
 
-def _vehicle(name: str | None, load: float, passage: Passage, file: str | Path) -> Vehicle:
-    """The vehicle of the train's type, in as many units as its axles say."""
-    type_ = UNKNOWN if passage.type is None else passage.type.type
-    if name is None and type_ == UNKNOWN:
+def _vehicle_of_type(passage: Passage, file: str | Path) -> str:
+    """Name of the vehicle file of the train's type."""
+    if passage.type is None or passage.type.type == UNKNOWN:
         raise ConfigError(str(file), "train", "its type is unknown", "Name a vehicle file with --vehicle")
-    name = name or type_.lower()
+    return passage.type.type.lower()
+
+
+def _vehicle(name: str, load: float, passage: Passage, file: str | Path) -> Vehicle:
+    """The vehicle in as many units as the axles of the train say."""
     one = load_vehicle(name, load)
     units, rest = divmod(passage.n_axle, len(one.wheels))
     if rest or not units:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 from turnout.constants import KMH
@@ -13,6 +14,8 @@ from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.planned_case import Plan, PlannedCase, Train
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.simulate import Sensor, load_track, load_vehicle
+from turnout.simulate.parameters import track_path
+from turnout.stages.track_files import files_of_track, files_of_vehicle
 
 # Effort of one addition, in hours of two people on site.
 EFFORT_HOURS = {"a second rail temperature": 8.0, "hammer tests at the sensors": 4.0, "a second speed": 1.0}
@@ -80,6 +83,32 @@ def planned_matrix(
     if resolved:
         advice = f"Most would be added by {name}: {resolved} more pairs distinguished."
     return matrix, " ".join(filter(None, [advice, reservation(turnout)]))
+
+
+def planned_files(track: str, vehicles: Sequence[str], config: str | Path | None = None) -> list[Path]:
+    """Track and vehicle files of a plan, with those that they extend or are composed of.
+
+    Parameters
+    ----------
+    track : str
+        Name of the track, or path of its file.
+    vehicles : sequence of str
+        Names of the vehicles, or paths of their files.
+    config : str, Path or None
+        Folder of the configuration; None: "config".
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    SimulationError
+        There is no such file.
+    """
+    track_folder, vehicle_folder = (_folder(config, subfolder) for subfolder in ("tracks", "vehicles"))
+    files = (files_of_vehicle(vehicle, vehicle_folder) for vehicle in vehicles)
+    return [*files_of_track(track_path(track, track_folder)), *chain.from_iterable(files)]
 
 
 def _folder(config: str | Path | None, subfolder: str) -> Path | None:

@@ -7,14 +7,13 @@ from pathlib import Path
 
 from turnout.config import Configuration
 from turnout.config.document import Branch
-from turnout.config.parameter_files import read_unchanged_parameters
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError, TurnoutError
 from turnout.simulate import load_track, load_vehicle
 from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
-from turnout.stages.parameter_ranges import improbable_values
+from turnout.stages.parameter_ranges import improbable_in_files
 
 MAX_TURNOUT_LENGTH = 500.0  # m between two sections: no turnout is so long
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
@@ -65,7 +64,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
     for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
         try:
             tracks[path] = load_track(str(path), folder=path.parent)
-            yield from (f"improbable: {error}" for error in improbable_values(read_unchanged_parameters(path)))
+            yield from improbable_in_files([path])
             yield from (f"not on the track: {error}" for error in off_track_errors(path))
             _check_entries(tracks[path])
         except ConfigError as error:
@@ -105,7 +104,7 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
                 known_patterns(str(path))
                 continue
             load_vehicle(str(path), folder=path.parent)
-            yield from (f"improbable: {error}" for error in improbable_values(read_unchanged_parameters(path)))
+            yield from improbable_in_files([path])
         except ConfigError as error:
             yield f"no train: {error}"
         except TurnoutError as error:

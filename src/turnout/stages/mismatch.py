@@ -139,7 +139,7 @@ def diagnose_visit(
     track, accepted = track_of(turnout, options.track)
     units = members_of(unit, scan(turnout, Path(raw_root)).units)
     inputs = gather_inputs(units, turnout, raw_root, track, passage_tables)
-    inputs.notes += [Note(f"improbable: {entry}") for entry in improbable_entries(turnout, options.track)]
+    inputs.notes += [Note(entry) for entry in improbable_entries(turnout, options.track)]
     contents = [[path, _content_hash(Path(raw_root) / path)] for path, *_ in unit.files]
     identity = digest(
         [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
+from turnout.config.parameter_files import read_unchanged_parameters
 from turnout.config.parameters import Number, ParameterSet
-from turnout.errors import ConfigError
+from turnout.errors import ConfigError, TurnoutError
 
 # (name, unit) -> smallest and largest value; each range is some ten times wider than what tracks and vehicles have.
 RANGES = {
@@ -34,6 +36,28 @@ RANGES = {
     ("base", "m"): (0.5, 10.0),
 }
 MAX_PRIOR = 5.0  # relative standard deviation: a larger one is in percent
+
+
+def improbable_in_files(paths: Iterable[Path]) -> list[str]:
+    """What every command states about improbable values of the track and vehicle files that it computes with.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Track and vehicle files. One that cannot be read is left out, because its reader reports it.
+
+    Returns
+    -------
+    list of str
+        A sentence per value, each once, with file, line and entry.
+    """
+    sentences: dict[str, None] = {}
+    for path in dict.fromkeys(paths):
+        try:
+            sentences |= {f"improbable: {e}": None for e in improbable_values(read_unchanged_parameters(path))}
+        except (TurnoutError, OSError):
+            continue
+    return [*sentences]
 
 
 def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:

@@ -24,6 +24,7 @@ from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import ImpactTruth, hammer_sensors, resolve_location
+from turnout.simulate.parameters import track_path
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
 from turnout.stages.accepted_effects import effects_of, terms_on
@@ -34,7 +35,7 @@ from turnout.stages.simulate_request import (
     time_of,
     with_format,
 )
-from turnout.stages.track_files import track_file
+from turnout.stages.track_files import files_of_track, files_of_vehicle, track_file
 
 
 def section_channels(turnout: TurnoutConfig, section: float | str) -> RawDescription:
@@ -205,6 +206,32 @@ def _track(request: Mapping[str, Any], turnout: TurnoutConfig | None) -> Turnout
         path = track_file(turnout)
         return load_track(str(path), request["seed"], path.parent)
     return load_track(request["track"] or "tommerup", request["seed"])
+
+
+def model_files(request: Mapping[str, Any]) -> list[Path]:
+    """Track and vehicle files of a request, with those that they extend or are composed of.
+
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of `turnout simulate hammer` or `turnout simulate passage`.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    SimulationError
+        There is no such file.
+    ConfigError
+        The configuration of the turnout is not valid.
+    """
+    if request["track"] is None and request.get("turnout"):
+        track = track_file(load_configuration(request["config"]).turnout(request["turnout"]))
+    else:
+        track = track_path(request["track"] or "tommerup")
+    return [*files_of_track(track), *(files_of_vehicle(request["vehicle"]) if "vehicle" in request else ())]
 
 
 def _label_or_position(section: str) -> float | str:

@@ -7,14 +7,14 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.config.parameter_files import read_parameters
+from turnout.config.parameter_files import read_parameters, read_unchanged_parameters
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
 from turnout.errors import SimulationError, TurnoutError
 from turnout.simulate import load_track
-from turnout.simulate.parameters import base_track_file
+from turnout.simulate.parameters import base_track_file, vehicle_path
 from turnout.stages.accepted_effects import effects_of
-from turnout.stages.parameter_ranges import improbable_values
+from turnout.stages.parameter_ranges import improbable_in_files
 
 if TYPE_CHECKING:
     from turnout.simulate import TurnoutTrack
@@ -95,7 +95,7 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
         own_file = track_file(turnout, name)
     except SimulationError:
         return ""
-    paths = [*_extended_files(own_file), *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml"))]
+    paths = [*files_of_track(own_file), *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml"))]
     paths += sorted((folder / "vehicles").glob("*"))
     paths += sorted(own_file.parent.glob("*.y*ml")) if name else []
     digests = [[path.name, sha256_of(path)] for path in dict.fromkeys(paths) if path.is_file()]
@@ -115,26 +115,56 @@ def improbable_entries(turnout: TurnoutConfig, name: str | None = None) -> list[
     Returns
     -------
     list of str
-        One sentence per number, with file, line and entry.
+        One sentence per number, with file, line and entry. Axle patterns are no parameters.
 
     Raises
     ------
     SimulationError
         There is no track file.
     """
-    sentences: list[str] = []
-    for path in (*_extended_files(track_file(turnout, name)), *(Path(turnout.folder) / "vehicles").glob("*.yaml")):
-        try:
-            sentences += map(str, improbable_values(read_parameters(path)))
-        except (TurnoutError, OSError):
-            continue  # whoever uses the file reports it; axle patterns are no parameters
-    return sorted(sentences)
+    vehicles = sorted((Path(turnout.folder) / "vehicles").glob("*.yaml"))
+    return improbable_in_files([*files_of_track(track_file(turnout, name)), *vehicles])
 
 
-def _extended_files(path: Path) -> list[Path]:
+def files_of_vehicle(name: str, folder: str | Path | None = None) -> list[Path]:
+    """A vehicle's file and those of the vehicles that it is composed of, as far as they can be read.
+
+    Parameters
+    ----------
+    name : str
+        Name of the vehicle, or path of its file.
+    folder : str, Path or None
+        Folder of the files; None: ``config`` in the working folder, then that of the program.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    SimulationError
+        There is no such file.
+    """
+    paths = [vehicle_path(name, folder)]
+    try:
+        for entry in read_unchanged_parameters(paths[0]).get("compose", ()):
+            paths.append(vehicle_path(str(entry["vehicle"]), folder or paths[0].parent))
+    except (TurnoutError, OSError, KeyError, TypeError):
+        pass  # whoever loads the vehicle reports it
+    return paths
+
+
+def files_of_track(path: Path) -> list[Path]:
     """A track's file and the files that it extends, as far as they can be read.
 
-    Errors in them are reported by the diagnosis.
+    Parameters
+    ----------
+    path : Path
+        The track file. Whoever loads it reports errors in it.
+
+    Returns
+    -------
+    list of Path
     """
     paths = [path]
     try:

@@ -1,6 +1,7 @@
 """A recorded passage beside its simulation: the same train agrees, and a scaled recording differs by its factor."""
 
 import csv
+import shutil
 from dataclasses import replace
 from datetime import datetime
 
@@ -71,6 +72,16 @@ def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
     assert power == pytest.approx(
         np.mean(low.recorded**2), rel=0.25
     )  # Parseval's theorem, without the power that the filter passes above 40 Hz
+
+
+def test_the_command_states_an_improbable_value_of_the_track_file(passage, repository, tmp_path, capsys):
+    shutil.copytree(repository / "config", tmp_path / "config")
+    track = tmp_path / "config/tracks/tommerup.yaml"
+    track.write_text(track.read_text().replace("{value: 466.3, unit: MN/m", "{value: 466300, unit: MN/m", 1))
+    command = ["compare", str(passage), "--turnout", "tommerup_s2", "--configuration", str(tmp_path / "config")]
+    assert main([*command, "--raw", str(passage.parent), "--sensors", "ASM", "--no-calibration"]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "improbable: " in line and "sections[0].pad_stiffness: 4.663e+11 N/m is outside" in line
 
 
 def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, repository, tmp_path, capsys):
