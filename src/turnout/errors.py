@@ -175,6 +175,27 @@ def remedy_of_access(error: OSError, otherwise: str) -> str:
     return "Check the disk or the network that holds it" if is_infrastructure(error) else otherwise
 
 
+def reason_of_access(error: OSError) -> str:
+    """Code of the reason for a file or folder that cannot be opened.
+
+    Parameters
+    ----------
+    error : OSError
+        The exception of the attempt.
+
+    Returns
+    -------
+    str
+        "no_access" if the machine or a permission is the cause, "unreadable" if the name itself is.
+
+    Examples
+    --------
+    >>> reason_of_access(PermissionError(errno.EACCES, "")), reason_of_access(IsADirectoryError(errno.EISDIR, ""))
+    ('no_access', 'unreadable')
+    """
+    return "no_access" if is_infrastructure(error) else "unreadable"
+
+
 # Packages whose name for pip differs from the name that is imported.
 PIP_NAMES = {"nptdms": "npTDMS", "sklearn": "scikit-learn", "ruamel": "ruamel.yaml", "_soundfile_data": "soundfile"}
 

@@ -11,6 +11,7 @@ REASONS = {
     "claims_too_much": "the file claims more samples or channels than a file of its size can hold",
     "too_large": "the memory of the machine was too small for it in two runs",
     "read_fault": "the disk or the network failed when it was read, in two runs; every run tries it again",
+    "no_access": "the file or folder is there and cannot be opened, as without permission; its earlier results stay",
     "truncated": "fewer samples or records than configured or declared",
     "wrong_length": "more samples or records than configured",
     "vanished": "the file was there when planned and is gone",

@@ -170,7 +170,7 @@ def _read_rows(
     except (FileNotFoundError, NotADirectoryError):
         return []
     except TableError as fault:
-        return [_error(fault.place, fault.problem, fault.remedy)]
+        return [_error(fault.place, fault.problem, fault.remedy, fault.reason)]
     errors = [_error(fault.place, fault.problem, fault.remedy) for fault in table.faults]
     for line, cells in table.rows:
         try:
@@ -183,8 +183,8 @@ def _read_rows(
     return errors
 
 
-def _error(place: Place, problem: str, remedy: str) -> ReadError:
-    return ReadError(place.path, str(place), problem, remedy, reason="unreadable")
+def _error(place: Place, problem: str, remedy: str, reason: str = "unreadable") -> ReadError:
+    return ReadError(place.path, str(place), problem, remedy, reason)
 
 
 def _campaign(cells: Mapping) -> Campaign:

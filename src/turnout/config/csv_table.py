@@ -9,7 +9,7 @@ from pathlib import Path
 
 from turnout.config.document import Place
 from turnout.config.schema import suggestion
-from turnout.errors import remedy_of_access
+from turnout.errors import reason_of_access, remedy_of_access
 from turnout.files import read_regular
 
 EXTRA_CELLS = "cells beyond the header"
@@ -30,11 +30,13 @@ class TableError(Exception):
         What is wrong there.
     remedy : str
         What to write instead.
+    reason : str
+        Code of the reason: "no_access" for a table that is there and cannot be opened.
     """
 
-    def __init__(self, place: Place, problem: str, remedy: str) -> None:
+    def __init__(self, place: Place, problem: str, remedy: str, reason: str = "unreadable") -> None:
         super().__init__(problem)
-        self.place, self.problem, self.remedy = place, problem, remedy
+        self.place, self.problem, self.remedy, self.reason = place, problem, remedy, reason
         self.error = place.error(problem, remedy)
 
 
@@ -183,7 +185,7 @@ def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
         if isinstance(error, (FileNotFoundError, NotADirectoryError)) and not os.path.lexists(path):
             raise
         remedy = remedy_of_access(error, "Put a readable file there")
-        raise TableError(Place(name, 1, 1), str(error.strerror), remedy) from None
+        raise TableError(Place(name, 1, 1), str(error.strerror), remedy, reason_of_access(error)) from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

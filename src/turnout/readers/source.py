@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.content import sha256_of
-from turnout.errors import ReadError, TurnoutError, installation_error, is_infrastructure
+from turnout.errors import ReadError, TurnoutError, installation_error, is_infrastructure, reason_of_access
 from turnout.files import sparse_size, special_kind
 from turnout.records import EMPTY_MAPPING
 
@@ -325,7 +325,8 @@ def load(path: PathLike | str, root: PathLike | str) -> Source:
         if is_infrastructure(error) and not isinstance(error, PermissionError):
             raise
         problem = f"the file cannot be opened ({error.strerror})"
-        raise ReadError(name, "the path", problem, "Correct its permissions or copy it again") from error
+        remedy = "Correct its permissions or copy it again"
+        raise ReadError(name, "the path", problem, remedy, reason_of_access(error)) from error
     if not size:
         raise ReadError(name, "byte 0", "the file has no bytes", COPY_AGAIN, reason="empty")
     return Source(resolved, name, size, head)

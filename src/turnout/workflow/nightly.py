@@ -15,13 +15,13 @@ from types import FrameType
 
 from filelock import FileLock, Timeout
 
-from turnout.counts import first_texts
+from turnout.counts import count_of, first_texts
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.installation import shipped_path
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
-from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unused_turnouts
+from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unread_files, unused_turnouts
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import VANISHED, load_state, states_below
 
@@ -30,7 +30,7 @@ EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeo
 SIGNAL_BASE = 128  # exit code of a process that a signal ended, less the number of the signal, as of a shell
 PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
 MAX_TURNOUTS_SHOWN = 3  # turnouts named in the report
-MAX_EXCLUDED_SHOWN = 1  # entries of no unit quoted in the report
+MAX_EXCLUDED_SHOWN = 1  # entries of no unit, and unread files, quoted in the report
 QUERY_HINT = 'turnout query "from quarantine_open" and "from rejected"'
 GENERATION = Path("results/registry/_generation.json")
 WORKLIST = Path("results/worklist.csv")
@@ -43,7 +43,8 @@ class NightReport:
 
     ``vanished`` is the number of units gone since the last run. ``worst`` are the turnouts with most unused units, and
     their numbers. ``unused`` are the turnouts without any usable unit so far; ``nothing_usable`` is True if that holds
-    for the whole fleet. ``excluded`` are files and rows in quarantine that belong to no unit.
+    for the whole fleet. ``excluded`` are files and rows in quarantine that belong to no unit. ``unread`` are files that
+    are there and could not be read; they leave the code as it is.
     """
 
     code: int
@@ -57,10 +58,15 @@ class NightReport:
     unused: tuple[str, ...] = ()
     nothing_usable: bool = False
     excluded: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
     reason: str = ""
 
     def __str__(self) -> str:
-        well = "every job ran, but nothing could be used" if self.nothing_usable else "ok"
+        well = "ok"
+        if self.nothing_usable:
+            well = "every job ran, but nothing could be used"
+        elif self.unread:
+            well = f"every job ran, but {count_of(len(self.unread), 'file')} could not be read"
         outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
             self.code, f"failed with exit code {self.code}"
         )
@@ -71,8 +77,9 @@ class NightReport:
             + f"{self.vanished} vanished"
             + (f"; nothing could be used yet of {first_texts(self.unused, MAX_TURNOUTS_SHOWN)}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
+            + (f"; not read: {first_texts(self.unread, MAX_EXCLUDED_SHOWN)}" if self.unread else "")
             + (f"; in no unit: {first_texts(self.excluded, MAX_EXCLUDED_SHOWN)}" if self.excluded else "")
-            + (f", see {QUERY_HINT}" if self.worst or self.unused or self.excluded else "")
+            + (f", see {QUERY_HINT}" if self.worst or self.unused or self.excluded or self.unread else "")
             + ("" if self.published else "; the registry was not published")
             + (f"; why: {self.reason}" if self.reason else "")
         )
@@ -277,7 +284,7 @@ def _report(code: int, before: set, planned_before: set[str], reason: str, work:
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
     worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:MAX_TURNOUTS_SHOWN]
     counts = len(units), len(processed), len(quarantined), len(missing & units)
-    excluded = tuple(excluded_entries(GENERATION.parent, unused))
+    excluded, unread = tuple(excluded_entries(GENERATION.parent, unused)), tuple(unread_files(GENERATION.parent))
     return NightReport(
-        code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, excluded, reason
+        code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, excluded, unread, reason
     )

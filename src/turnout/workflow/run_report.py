@@ -83,11 +83,31 @@ select turnout_id, not exists (select 1 from used u where in_service(u.turnout_i
 from unusable() where used_at_utc is null and turnout_id not in (select turnout_id from used)
 group by turnout_id order by turnout_id"""
 
+UNREAD_SQL = """
+select path || ': ' || found from quarantine_open where reason_code in ('no_access', 'read_fault') order by path"""
+
 # Entries of the raw root that belong to no unit: tables beside the recordings, which many recordings need, come first.
 EXCLUDED_SQL = """
 select path || coalesce(', ' || place, '') || ': ' || found from quarantine_open
-where kind = 'configuration' and not is_remark and not coalesce(list_contains(?, turnout_id), false)
+where kind = 'configuration' and reason_code <> 'no_access' and not is_remark
+    and not coalesce(list_contains(?, turnout_id), false)
 order by path not like '%.csv' or reason_code = 'name_unknown', path, place"""
+
+
+def unread_files(registry: Path) -> list[str]:
+    """Files and folders that are there and could not be read, whether or not they belong to a unit.
+
+    Parameters
+    ----------
+    registry : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    list of str
+        Path and what was found; none without a registry.
+    """
+    return [text for (text,) in _query(registry, UNREAD_SQL, [])]
 
 
 def excluded_entries(registry: Path, unused: Collection[str] = ()) -> list[str]:
@@ -103,7 +123,8 @@ def excluded_entries(registry: Path, unused: Collection[str] = ()) -> list[str]:
     Returns
     -------
     list of str
-        Path, place and what was found, tables beside the recordings first; none without a registry.
+        Path, place and what was found, tables beside the recordings first; none without a registry. Those of
+        ``unread_files`` are left out.
     """
     return [text for (text,) in _query(registry, EXCLUDED_SQL, [list(unused)])]
 

@@ -16,7 +16,7 @@ from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import NOTE_FILES
 from turnout.config.events import MAX_LEAD_TIME, now
 from turnout.config.filename_pattern import compile_pattern, wrong_field
-from turnout.errors import ReadError, remedy_of_access
+from turnout.errors import ReadError, reason_of_access, remedy_of_access
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
 from turnout.records import Unit
 
@@ -87,7 +87,7 @@ class RawFolder:
             return None
         # allowing to read it changes neither size nor time, so until then the file is not part of a unit
         if mode & READABLE != READABLE and not os.access(entry.path, os.R_OK):
-            self._leave_out(inside, "file", "may not be read", "Correct its permissions")
+            self._leave_out(inside, "file", "may not be read", "Correct its permissions", "no_access")
             return None
         return self._below + inside, size, status.st_mtime_ns
 
@@ -135,7 +135,7 @@ class RawFolder:
 
     def _note_unreadable(self, inside: str, where: str, error: OSError) -> None:
         remedy = remedy_of_access(error, "Remove it, or put the file itself there")
-        self._leave_out(inside, where, str(error.strerror or error), remedy)
+        self._leave_out(inside, where, str(error.strerror or error), remedy, reason_of_access(error))
 
     def _leave_out(self, inside: str, where: str, finding: str, remedy: str, reason: str = "unreadable") -> None:
         path = os.fsencode(f"{self.raw}/{inside}".rstrip("/")).decode(errors="backslashreplace")

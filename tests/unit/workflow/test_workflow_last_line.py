@@ -109,6 +109,40 @@ def test_an_unreadable_table_is_reported_before_a_file_with_an_unknown_name(fold
     assert "nothing could be used yet of t2;" in line and "t2/campaigns.csv" not in line
 
 
+def damaged_disk(turnout, label, name):
+    """A quarantine row of a file of a unit that the disk did not give in two runs."""
+    row = excluded(turnout, name, "read_fault", "the file", "OSError: [Errno 5] Input/output error")
+    return row | {"kind": "hammer", "section_id": f"{turnout}/{label}", "stage": "hammer"}
+
+
+@pytest.mark.parametrize(
+    ("row", "quoted"),
+    [
+        (excluded("t1", "hammer/A_1.uff", "no_access", "file", "may not be read"), "t1/hammer/A_1.uff: may not be"),
+        (excluded("t1", "hammer", "no_access", "folder", "Permission denied"), "t1/hammer: Permission denied"),
+        (excluded("t1", "campaigns.csv", "no_access", "line 1", "Permission denied"), "t1/campaigns.csv: Permission"),
+        (damaged_disk("t1", "A", "hammer/A_1.uff"), "t1/hammer/A_1.uff: OSError: [Errno 5]"),
+    ],
+    ids=["file", "folder", "table", "disk"],
+)
+def test_a_night_that_could_not_read_a_file_is_not_ok_and_its_exit_code_is_0(folder, row, quoted):
+    registry(folder, (row,), t1="accepted")
+    known = dict.fromkeys(units("t1"), "ok")
+    (folder / "snakemake.py").write_text(STATE.format(known=known, plan=plan(*known), more=""))
+    night = nightly([], "profiles/default")
+    assert night.code == 0
+    assert str(night).startswith("every job ran, but 1 file could not be read: 1 units known")
+    assert f"; not read: {quoted}" in str(night) and "in no unit" not in str(night)
+
+
+def test_several_unread_files_are_counted_and_the_first_is_quoted(folder):
+    files = [excluded("t1", name, "no_access", "file", "may not be read") for name in ("a.uff", "b.uff", "c.uff")]
+    registry(folder, files, t1="accepted")
+    line = run_night(folder, dict.fromkeys(units("t1"), "ok"), units("t1"))
+    assert line.startswith("every job ran, but 3 files could not be read: ")
+    assert "; not read: t1/a.uff: may not be read and 2 more, see" in line
+
+
 @pytest.mark.parametrize("turnout", [None, "t9"])
 def test_an_unused_row_of_the_configuration_is_reported(folder, turnout):
     found = f"turnout {turnout!r} has no row in turnouts.tsv"

@@ -6,6 +6,9 @@ import os
 import pytest
 
 from turnout.config import load_configuration
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawDescription
 from turnout.workflow.plan import read_plan, read_problems, write_plans
 from turnout.workflow.scan import RawFolder
 
@@ -93,6 +96,10 @@ def test_a_name_that_is_not_utf8_is_a_problem_with_an_escaped_path(fleet):
     ]  # fmt: skip
 
 
+def closed(*_, **__):
+    raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
 def test_a_file_whose_status_cannot_be_read_is_a_problem(fleet):
     class Closed:
         """An entry of a folder that can be listed but not entered, as root can enter every folder."""
@@ -102,8 +109,8 @@ def test_a_file_whose_status_cannot_be_read_is_a_problem(fleet):
 
     folder = RawFolder(fleet / "raw", "t1")
     assert folder.stat("hammer/A_1.uff", Closed()) is None
-    assert [(p.path, p.problem, p.remedy) for p in folder.problems] == [
-        ("t1/hammer/A_1.uff", "Permission denied", "Correct its permissions"),
+    assert [(p.path, p.problem, p.remedy, p.reason) for p in folder.problems] == [
+        ("t1/hammer/A_1.uff", "Permission denied", "Correct its permissions", "no_access"),
     ]  # fmt: skip
 
 
@@ -116,8 +123,25 @@ def test_a_file_without_read_permission_is_planned_after_it_gets_the_permission(
     )  # as root can read every file
     turnouts, problems = planned(fleet)
     assert turnouts == ["t2"] and problems == [(f"t1/{DAY}/A_1.uff", "file", "may not be read")]
+    assert [p["reason"] for _, p in read_problems(fleet / "plan/00of01.json")] == ["no_access"]
     path.chmod(0o644)
     assert planned(fleet) == (["t1", "t2"], [])
+
+
+def test_notes_without_read_permission_are_stated_as_such(fleet, monkeypatch):
+    (fleet / "raw/t1/campaigns.csv").write_text("campaign\n")
+    monkeypatch.setattr("turnout.config.csv_table.read_regular", closed)  # root can read every file
+    planned(fleet)
+    problems = {p["path"]: p["reason"] for _, p in read_problems(fleet / "plan/00of01.json")}
+    assert problems["t1/campaigns.csv"] == "no_access"
+
+
+def test_a_recording_without_read_permission_is_stated_as_such(tmp_path, monkeypatch):
+    (tmp_path / "a.uff").write_bytes(b"x")
+    monkeypatch.setattr("pathlib.Path.open", closed)
+    with pytest.raises(ReadError, match="Correct its permissions") as caught:
+        read("a.uff", tmp_path, RawDescription(channels=()))
+    assert caught.value.reason == "no_access"
 
 
 def test_notes_that_cannot_be_read_are_a_problem(fleet):
