@@ -18,7 +18,7 @@ READER = '''"""Reader of a format with one channel: the rate in the first line, 
 import numpy as np
 
 from turnout.readers.source import RawFile, RawRecord, Source
-from turnout.readers.statements import Entry
+from turnout.readers.rate_statements import Entry
 
 
 def read_raw(source: Source) -> RawFile:

@@ -130,7 +130,7 @@ def misspelt_names(connection: duckdb.DuckDBPyConnection, sql: str) -> list[str]
     names = {str(name) for (name,) in connection.execute(NAMES_SQL).fetchall()}
     unknown = [text for text in re.findall(r"'([^']+)'", sql) if text not in names]
     similar = {text: get_close_matches(text, names, n=1) for text in unknown}
-    return [f"The registry has no {text!r}. Did you mean {found[0]!r}?" for text, found in similar.items() if found]
+    return [f"The registry has no {text!r}. Did you mean {close[0]!r}?" for text, close in similar.items() if close]
 
 
 def _text_of_query(word: str) -> str:

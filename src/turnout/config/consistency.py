@@ -83,8 +83,10 @@ def _hammer_errors(tree: Branch, to_si: ToSi | None, min_peak_force: float) -> I
         elif (other := roles.setdefault(leaf.value, role)) != role:
             yield leaf.place.error(f"{role} is {leaf.value!r}, as {other} is", "Name another channel, or null")
         elif role == "force" and (limit := _value(channels[leaf.value], "limit")) and limit <= min_peak_force:
-            detail = f"limit is {limit} N for the hammer's force, and receptance.softest_blow is {min_peak_force} N"
-            remedy = "Write the limit in N, or a lower softest_blow where the hammer is a small one"
+            detail = (
+                f"limit is {limit} N for the hammer's force, and receptance.minimum_peak_force is {min_peak_force} N"
+            )
+            remedy = "Write the limit in N, or a lower minimum_peak_force where the hammer is a small one"
             yield channels[leaf.value]["limit"].place.error(f"{detail}: no impact could count", remedy)
     yield from _channel_errors(tree, to_si)
 
@@ -157,9 +159,9 @@ def _value(channel: Branch, key: str) -> Any:
 
 
 def _min_peak_force(tree: Branch) -> float:
-    """The setting receptance.softest_blow, else its default [N]."""
-    written = tree.get("settings", {}).get("receptance", {}).get("softest_blow")
-    return written.value if written else settings_keys()["receptance"].spec["softest_blow"].default
+    """The setting receptance.minimum_peak_force, else its default [N]."""
+    written = tree.get("settings", {}).get("receptance", {}).get("minimum_peak_force")
+    return written.value if written else settings_keys()["receptance"].spec["minimum_peak_force"].default
 
 
 def _unit_errors(name: str, channel: Branch, to_si: ToSi) -> Iterator[ConfigError]:

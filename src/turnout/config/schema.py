@@ -1,7 +1,7 @@
 """Types of configuration keys, and the check of a tree of YAML against them."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -80,6 +80,16 @@ class FleetWideKey:
 
 
 Rule = Key | NamedEntries | Group | FleetWideKey
+
+
+# Keys that were renamed, with their present name.
+FORMER_KEYS = {"softest_blow": "minimum_peak_force", "weakest_blow": "minimum_peak_share"}
+
+
+def _remedy_of_unknown_key(name: str, allowed: Collection[str]) -> str:
+    """The present name of a key that was renamed, else the most similar one."""
+    present = FORMER_KEYS.get(name, "")
+    return f"It is called {present!r} now" if present in allowed else suggestion(name, allowed)
 
 
 def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to choose from") -> str:
@@ -290,13 +300,14 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
     ConfigError
         Every error, at the name or value to correct.
     """
-    misspelt = set()
+    misspelt: set[str] = set()
     for name, value in tree.items():
         rule = spec.get(name)
         if rule is None:
-            misspelt.update(get_close_matches(name, spec, n=1))
+            present = FORMER_KEYS.get(name, "")
+            misspelt.update([present] if present in spec else get_close_matches(name, spec, n=1))
             allowed = [allowed_name for allowed_name, rule in spec.items() if not isinstance(rule, FleetWideKey)]
-            remedy = DECIMAL_POINT if name.isdecimal() else suggestion(name, allowed)
+            remedy = DECIMAL_POINT if name.isdecimal() else _remedy_of_unknown_key(name, allowed)
             yield tree.key_places[name].error(f"unknown key {name!r}", remedy)
         elif isinstance(rule, FleetWideKey):
             message = f"{name!r} holds for the whole fleet and would be ignored here"

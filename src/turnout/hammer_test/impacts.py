@@ -72,7 +72,7 @@ def find_impacts(
     judge_repeats(candidates)
     for cut in candidates:
         _measure(cut, settings)
-    _judge_scale(candidates, settings.softest_blow)
+    _judge_scale(candidates, settings.minimum_peak_force)
     pulses = [c.force[c.contact.onset : c.contact.end + 1] for c in candidates]
     for cut, edge in zip(candidates, _band_edges(candidates, pulses)):
         cut.band_edge = edge
@@ -131,7 +131,7 @@ def _judge_scale(cuts: Sequence[Cut], min_median_peak: float) -> None:
     for cut, peak in zip(cuts, peaks):
         cut.rejections.insert(0, Rejection("out_of_scale", peak, min_median_peak, (
             f"{peak:.4g} N, the test's median is {median:.4g} N: no hammer is so soft on a track, its unit or scale "
-            "is wrong (kN read as N?); for a small hammer set receptance.softest_blow")))  # fmt: skip
+            "is wrong (kN read as N?); for a small hammer set receptance.minimum_peak_force")))  # fmt: skip
 
 
 def _judge_start(cut: Cut, settings: ReceptanceSettings) -> None:

@@ -55,7 +55,7 @@ def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impa
     lines = phase_lines(accepted) if len(accepted) >= MIN_IMPACTS else None
     if lines is None or len(lines.frequency) < MIN_LINES or not is_velocity(lines):
         return tuple(impacts)
-    share = even_share(lines)
+    share = even_order_share(lines)
     detail = (
         f"{response} has the phase of a velocity: as an acceleration beside the hammer it would feed energy into the "
         f"hammer at {100.0 * share:.0f} % of {len(lines.frequency)} frequencies, which no track can; set the "
@@ -114,10 +114,10 @@ def is_velocity(lines: PhaseLines) -> bool:
         False also where no order explains the phase, as far from the hammer.
     """
     odd_share = min(active_share(lines, 1), active_share(lines, 3))
-    return even_share(lines) >= REFUTED and odd_share <= SUPPORTED
+    return even_order_share(lines) >= REFUTED and odd_share <= SUPPORTED
 
 
-def even_share(lines: PhaseLines) -> float:
+def even_order_share(lines: PhaseLines) -> float:
     """The smaller ``active_share`` of a displacement and an acceleration, whose phases differ by the sign.
 
     Parameters

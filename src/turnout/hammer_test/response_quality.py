@@ -36,7 +36,7 @@ def find_track_impacts(
     force, response : str
         Names of the hammer's and the accelerometer's channel.
     settings : ReceptanceSettings
-        Limits of the quality; a ``softest_blow`` of 0 says that the structure is no track.
+        Limits of the quality; a ``minimum_peak_force`` of 0 says that the structure is no track.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def find_track_impacts(
     impacts = judge_causality(impacts, response)
     impacts = judge_saturation(impacts, response)
     impacts = judge_limited_impacts(impacts, response)
-    if settings.softest_blow > 0.0:
+    if settings.minimum_peak_force > 0.0:
         impacts = judge_response_order(impacts, response)
         impacts = judge_response_scale(impacts, response)
     return select_best(impacts, settings)  # among those that no other test has rejected

@@ -137,4 +137,6 @@ def find_triggers(
     groups = np.split(above, breaks)
     peaks = np.array([size[g].max() for g in groups])
     typical_peak = np.quantile(peaks, 0.75)
-    return [(int(g[0]), int(g[-1])) for g, p in zip(groups, peaks) if p >= settings.weakest_blow * typical_peak], level
+    return [
+        (int(g[0]), int(g[-1])) for g, p in zip(groups, peaks) if p >= settings.minimum_peak_share * typical_peak
+    ], level

@@ -155,7 +155,7 @@ def _refine_noise(
             break
 
 
-def polish(explanation: Explanation, decays: np.ndarray, rate: float) -> Explanation:
+def fit_to_convergence(explanation: Explanation, decays: np.ndarray, rate: float) -> Explanation:
     """The same explanation with its fit iterated to convergence.
 
     Parameters

@@ -17,8 +17,8 @@ from turnout.modal.explanation import (
     Explanation,
     akaike_criterion,
     explain,
+    fit_to_convergence,
     leaves_common,
-    polish,
     usable_explanations,
 )
 from turnout.modal.least_squares import linearise
@@ -131,7 +131,7 @@ def select_modes(decays: np.ndarray, rate: float, settings: IdentifySettings) ->
         largest_background,
     )
     explanation, rival_modes = _choose(explanation, table, decays, rate, settings)
-    explanation = polish(explanation, decays, rate)
+    explanation = fit_to_convergence(explanation, decays, rate)
     result = Selection(table, rejected + explanation.rejected, rival_modes=rival_modes)
     if explanation.fit is not None:
         fit = result.fit = explanation.fit

@@ -24,7 +24,7 @@ from turnout.readers.sample_variables import (
     underscored_name,
     vectors,
 )
-from turnout.readers.scale_words import is_scale_name
+from turnout.readers.scale_vocabulary import is_scale_name
 from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.texts import decode_text

@@ -8,7 +8,7 @@ from itertools import combinations
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
 from turnout.readers.rate_units import words_of
-from turnout.readers.scale_words import plain_word
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_quantities import MAX_TEXT, quantity_of_text, texts_of_value
 from turnout.records import RawChannel

@@ -10,7 +10,7 @@ from turnout.errors import ReadError
 from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.metadata_names import ATTRIBUTES_MARK, TIME_NAMES
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
-from turnout.readers.scale_words import is_scale_name
+from turnout.readers.scale_vocabulary import is_scale_name
 from turnout.readers.stated_scales import scale_text
 from turnout.readers.unit_names import is_unit_name
 

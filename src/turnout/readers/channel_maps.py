@@ -11,7 +11,7 @@ from turnout.readers.channel_descriptions import describing_entries, exchanged_c
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_units import rate_unit
-from turnout.readers.rate_words import is_rate_name
+from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_quantities import quantity_entries
 from turnout.readers.stated_sensitivities import sensitivity_entries

@@ -9,10 +9,10 @@ from typing import Any
 
 from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import CONDITION_QUANTITIES, TEMPERATURES
+from turnout.readers.rate_statements import PLACEHOLDERS
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import number_and_unit
 from turnout.readers.stated_units import known_unit
-from turnout.readers.statements import PLACEHOLDERS
 from turnout.readers.texts import decode_text
 from turnout.readers.unit_names import conditions_of_unit
 

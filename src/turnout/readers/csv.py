@@ -3,7 +3,7 @@
 What is recognised:
 
 * separators: comma, semicolon, tab, ``|`` or blanks; a decimal comma where the separator is not a comma;
-* head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_words`` recognises, ``started_at``,
+* head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_vocabulary`` recognises, ``started_at``,
   ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
 * units in brackets after the names ("force [N]", "force (N)"), behind a slash, a comma or "in" where most names have
   one ("F/N", "Force, N", "Kraft in N"), or in a line of their own;
@@ -11,8 +11,8 @@ What is recognised:
   records;
 * the start, where the head states none, in the first row: a date with a time of day, or a time column since 1970.
 
-Without names channels are called "0", "1" ... All lines of the head are entries in which ``turnout.readers.statements``
-finds the sampling rate.
+Without names channels are called "0", "1" ... All lines of the head are entries in which
+``turnout.readers.rate_statements`` finds the sampling rate.
 
 The text is UTF-8, UTF-16, or UTF-32 with a byte order mark. Head lines that are neither are read as Windows-1252.
 A last line without line break may end in a truncated number: it is left out and reported, unless its last number has as

@@ -10,11 +10,11 @@ from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
 from turnout.readers.entries import COLON, FREE_TEXT, Entry, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
-from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
 from turnout.readers.rate_units import rate_unit
-from turnout.readers.rate_words import is_rate_name
-from turnout.readers.scale_words import is_of_drawing, is_scale_name
+from turnout.readers.rate_vocabulary import is_rate_name
+from turnout.readers.scale_vocabulary import is_of_drawing, is_scale_name
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_sensitivities import is_sensitivity_name

@@ -29,8 +29,8 @@ from turnout.readers.metadata_names import (
     START_NAMES,
     TEMPERATURES,
 )
-from turnout.readers.rate_words import is_rate_name
-from turnout.readers.scale_words import is_scale_name, scale_meaning, value_of_word
+from turnout.readers.rate_vocabulary import is_rate_name
+from turnout.readers.scale_vocabulary import is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
 
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
-from turnout.readers.scale_words import plain_word
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.texts import decode_text
 from turnout.records import RawChannel

@@ -11,7 +11,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.precision import NUMBER
 from turnout.readers.rate_units import rate_unit
-from turnout.readers.scale_words import is_of_drawing, scale_meaning, value_of_word
+from turnout.readers.scale_vocabulary import is_of_drawing, scale_meaning, value_of_word
 from turnout.readers.texts import decode_text
 
 MAX_ENTRIES = 64  # numbers of a list: longer ones are samples

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
+from turnout.readers.metadata_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
-from turnout.readers.other_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.precision import Interval, readings
+from turnout.readers.rate_statements import USUAL_RATES, statements_of_value
 from turnout.readers.rate_units import CYRILLIC, SECONDS, RateUnit, rate_unit, words_of
-from turnout.readers.rate_words import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
-from turnout.readers.scale_words import (
+from turnout.readers.rate_vocabulary import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
+from turnout.readers.scale_vocabulary import (
     LEVELS,
     is_fill_name,
     is_ratio_of_drawing,
@@ -29,7 +30,6 @@ from turnout.readers.scale_words import (
 from turnout.readers.source import CONDITIONS, SIMULATED_CONDITIONS
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import known_unit
-from turnout.readers.statements import USUAL_RATES, statements_of_value
 from turnout.readers.time_texts import looks_dated
 from turnout.readers.unit_names import UNIT_WORD, is_unit_of_other
 from turnout.units import Conversion

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
 
-from turnout.readers.claims import check_claims
 from turnout.readers.condition_units import with_converted_conditions
+from turnout.readers.declared_sizes import check_declared_sizes
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 from turnout.readers.start_columns import with_axis_start
@@ -48,7 +48,7 @@ class Format:
         ReadError
             If the file as a whole cannot be read, claims more than it can hold, or has its samples in another file.
         """
-        check_claims(self.module, source)
+        check_declared_sizes(self.module, source)
         raw = import_module(f"turnout.readers.{self.module}").read_raw(source)
         records = tuple(
             with_stated_units(with_named_sensitivities(with_named_factors(r))) if isinstance(r, RawRecord) else r

@@ -17,13 +17,13 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Alphabetical
 from turnout.readers.channel_groups import STATED_SCALES
-from turnout.readers.claims import Hdf5Claims, open_hdf5
+from turnout.readers.declared_sizes import Hdf5SizeCheck, open_hdf5
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.metadata_names import ATTRIBUTES_MARK, CHANNEL_NAMES, TIME_NAMES
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.packing import apply_packing, unstated_fills
 from turnout.readers.sample_variables import Attributes, matrices
-from turnout.readers.scale_words import is_fill_name, is_scale_name
+from turnout.readers.scale_vocabulary import is_fill_name, is_scale_name
 from turnout.readers.source import COPY_AGAIN, RawFile, Source
 from turnout.readers.stated_scales import scale_text, scales_in_text
 from turnout.readers.texts import decode_text
@@ -50,11 +50,11 @@ def read_raw(source: Source) -> RawFile:
         If the file cannot be opened, or its groups are no records.
     """
     with source.parsed_by("HDF5"), open_hdf5(source) as file:
-        variables = _variables(file, "", source, Hdf5Claims(source))
+        variables = _variables(file, "", source, Hdf5SizeCheck(source))
     return raw_file(variables, source)
 
 
-def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims) -> dict[str, Any]:
+def _variables(group: h5py.Group, path: str, source: Source, size_check: Hdf5SizeCheck) -> dict[str, Any]:
     """Members and attributes of a group in one dictionary; a ReadError for a dataset that cannot be read."""
     creation = group[group.name].id.get_create_plist()  # the id of a File does not have it
     is_order_tracked = creation.get_link_creation_order() & h5py.h5p.CRT_ORDER_TRACKED
@@ -66,16 +66,16 @@ def _variables(group: h5py.Group, path: str, source: Source, claims: Hdf5Claims)
     stated: dict[str, dict] = {}
     members = h5py.h5g.open(group.id, b"/") if isinstance(group, h5py.File) else group.id
     for name in group:
-        claims.check_link(members, name.encode("utf-8", "surrogateescape"), f"{path}/{name}")
+        size_check.check_link(members, name.encode("utf-8", "surrogateescape"), f"{path}/{name}")
         try:
             member = group[name]
         except KeyError:  # a link to nothing
             member = None
         if isinstance(member, h5py.Group):
-            variables[name] = _variables(member, f"{path}/{name}", source, claims)
+            variables[name] = _variables(member, f"{path}/{name}", source, size_check)
             continue
         if isinstance(member, h5py.Dataset):
-            claims.check_dataset(member.id, f"{path}/{name}")
+            size_check.check_dataset(member.id, f"{path}/{name}")
         try:
             with source.parsed_by("HDF5", f"dataset {name!r} in {path or '/'!r}"):
                 attributes = {k: _attribute(v) for k, v in member.attrs.items()}

@@ -21,7 +21,7 @@ from turnout.readers.lost_entries import is_single, lost_entry_errors
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
-from turnout.readers.rate_words import CERTAIN
+from turnout.readers.rate_vocabulary import CERTAIN
 from turnout.readers.repeated_blocks import repeated_block
 from turnout.readers.simultaneous_records import add_shared, shared_channels, simultaneous_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source

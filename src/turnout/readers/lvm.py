@@ -20,7 +20,7 @@ from turnout.readers.csv_cells import DECIMAL, INVALID_VALUE
 from turnout.readers.entries import Entry, entries_of, step_entry
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.rate_units import rate_unit
-from turnout.readers.rate_words import is_time_name
+from turnout.readers.rate_vocabulary import is_time_name
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings

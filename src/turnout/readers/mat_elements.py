@@ -9,7 +9,7 @@ import math
 import struct
 import zlib
 
-from turnout.readers.claims import check_size
+from turnout.readers.declared_sizes import check_size
 from turnout.readers.source import COPY_AGAIN, Source
 
 HEADER_SIZE = 128  # bytes: text, version and byte order

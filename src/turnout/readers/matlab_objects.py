@@ -21,9 +21,9 @@ from turnout.readers.metadata_names import (
     TIME_NAMES,
     UNIT_NAMES,
 )
-from turnout.readers.rate_words import is_rate_name
+from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.sample_variables import holds_samples, plain_name
-from turnout.readers.scale_words import is_scale_name
+from turnout.readers.scale_vocabulary import is_scale_name
 from turnout.readers.source import Source
 
 REFERENCE = 0xDD000000  # first of the numbers by which MATLAB refers to an object

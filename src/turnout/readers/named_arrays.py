@@ -2,7 +2,8 @@
 
 What is recognised (names in any case, except ``t``):
 
-* sampling rate or step: every name that ``rate_words`` recognises, also in nested groups, and a vector ``time``, ``t``;
+* sampling rate or step: every name that ``rate_vocabulary`` recognises, also in nested groups, and a vector ``time``
+  or ``t``;
 * ``channels`` (or ``channel_names``, ``names``, ``labels``) and ``units``, one per channel;
 * ``started_at`` (or ``start_time`` ...): ISO 8601 text, or a number that ``time_numbers`` recognises, one per file or
   per record;
@@ -47,7 +48,7 @@ from turnout.readers.metadata_names import (
     TIME_NAMES,
     UNIT_NAMES,
 )
-from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.recording_versions import check_groups
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.signal_structures import with_signal_structures

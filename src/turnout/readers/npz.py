@@ -3,7 +3,7 @@
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.claims import read_array
+from turnout.readers.declared_sizes import read_array
 from turnout.readers.named_arrays import raw_file
 from turnout.readers.source import RawFile, Source
 

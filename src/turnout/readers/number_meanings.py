@@ -4,7 +4,7 @@ import re
 from fractions import Fraction
 
 from turnout.readers.precision import Interval, readings
-from turnout.readers.statements import USUAL_RATES
+from turnout.readers.rate_statements import USUAL_RATES
 from turnout.readers.time_numbers import EPOCHS
 
 MAX_FACTOR = 10_000  # a larger whole number is a code, unless people choose it as a rate or a converter has it

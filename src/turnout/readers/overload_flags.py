@@ -7,9 +7,9 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import CHANNEL
+from turnout.readers.rate_statements import PLACEHOLDERS
 from turnout.readers.rate_units import words_of
-from turnout.readers.scale_words import plain_word
-from turnout.readers.statements import PLACEHOLDERS
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.texts import decode_text
 
 OVERLOAD = re.compile(

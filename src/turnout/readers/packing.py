@@ -9,7 +9,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
 from turnout.readers.lazy import LazyMatrix, Numbers, lazy_array
 from turnout.readers.missing_codes import count_alone, missing_code
-from turnout.readers.scale_words import is_fill_name
+from turnout.readers.scale_vocabulary import is_fill_name
 from turnout.readers.source import BLOCK_SIZE, MIN_SAMPLES
 from turnout.readers.stated_numbers import finite_numbers
 

@@ -17,8 +17,8 @@ import pyarrow.parquet as pq
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.channel_maps import kind_of
-from turnout.readers.claims import check_parquet
 from turnout.readers.clock_texts import with_durations
+from turnout.readers.declared_sizes import check_parquet
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES

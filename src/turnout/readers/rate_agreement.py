@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from turnout.errors import ReadError
 from turnout.readers.precision import EXACT_PRECISION, Interval, around
-from turnout.readers.rate_words import CERTAIN, POSSIBLY
+from turnout.readers.rate_statements import MAX_CLOCK_DRIFT, USUAL_RATES, Statement
+from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY
 from turnout.readers.source import Source
-from turnout.readers.statements import MAX_CLOCK_DRIFT, USUAL_RATES, Statement
 
 MAX_WIDTH = 1e-3  # relative: a statement of fewer digits does not tell the rate; the layout or another one must
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata, single_value
-from turnout.readers.claims import check_hdf5, open_hdf5
+from turnout.readers.declared_sizes import check_hdf5, open_hdf5
 from turnout.readers.entries import entries_of, rate_entry
 from turnout.readers.lazy import is_large, lazy_array
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source

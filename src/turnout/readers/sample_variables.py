@@ -16,7 +16,7 @@ from turnout.readers.metadata_names import (
     TIME_NAMES,
     UNIT_NAMES,
 )
-from turnout.readers.rate_words import is_rate_name
+from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.source import CONDITIONS
 
 

@@ -223,17 +223,17 @@ class RawRecord:
     """One record of simultaneous samples, as it is in the file.
 
     ``samples`` holds one (n_sample,) array or ``LazyColumn`` per name, in ``units`` ("" if not stated).
-    ``entries`` are all metadata of the record with their places: ``turnout.readers.statements`` finds the sampling rate
-    in them. ``started_at`` has a time zone only if the format states one; ``unread_start`` is a start time that cannot
-    be read, as it is written, ``unread_zone`` a time zone of it. ``time`` is the time column of the file, in seconds
-    unless ``is_time_in_seconds`` is False: then its unit is not stated; ``time_label`` is its name, with the unit as it
-    is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which axes of time
-    stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
+    ``entries`` are all metadata of the record with their places: ``turnout.readers.rate_statements`` finds the sampling
+    rate in them. ``started_at`` has a time zone only if the format states one; ``unread_start`` is a start time that
+    cannot be read, as it is written, ``unread_zone`` a time zone of it. ``time`` is the time column of the file, in
+    seconds unless ``is_time_in_seconds`` is False: then its unit is not stated; ``time_label`` is its name, with the
+    unit as it is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which
+    axes of time stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied;
-    ``unit_conflicts`` are statements about units of channels that contradict each other, by index.
-    ``not_numbers`` are variables that are no channels, name -> what they hold, for messages about missing channels.
-    ``audio`` is "whole" for an audio file of whole numbers, which are fractions of full scale, "floating" for one of
-    floating-point numbers, which may be none, and "" for any other file.
+    ``unit_conflicts`` are statements about units of channels that contradict each other, by index. ``not_numbers`` are
+    variables that are no channels, name -> what they hold, for messages about missing channels. ``audio`` is "whole"
+    for an audio file of whole numbers, which are fractions of full scale, "floating" for one of floating-point numbers,
+    which may be none, and "" for any other file.
     """
 
     names: tuple[str, ...]

@@ -11,7 +11,7 @@ from turnout.readers.calendar_dates import DATED, orders_of_date, time_of_match
 from turnout.readers.clock_texts import CLOCK, DATE_ALONE, ClockColumn
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import rate_unit, words_of
-from turnout.readers.rate_words import is_time_name
+from turnout.readers.rate_vocabulary import is_time_name
 from turnout.readers.source import RawRecord
 from turnout.readers.stamp_texts import plain_stamp
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name

@@ -8,7 +8,7 @@ from typing import Any
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
 from turnout.readers.rate_units import words_of
-from turnout.readers.scale_words import plain_word
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.texts import decode_text
 from turnout.units import conversion

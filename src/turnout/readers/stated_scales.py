@@ -15,7 +15,8 @@ import numpy as np
 
 from turnout.readers.entries import Entry, entries_of_text
 from turnout.readers.entry_owners import container_of, owners_of
-from turnout.readers.scale_words import (
+from turnout.readers.rate_statements import PLACEHOLDERS
+from turnout.readers.scale_vocabulary import (
     FACTOR,
     NEUTRAL,
     OFFSET,
@@ -32,7 +33,6 @@ from turnout.readers.scale_words import (
 )
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.stated_numbers import MAX_CHANNELS, finite_numbers, number_and_unit
-from turnout.readers.statements import PLACEHOLDERS
 from turnout.units import conversion
 
 ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of, spaced_words
-from turnout.readers.scale_words import plain_word
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME

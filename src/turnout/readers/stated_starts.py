@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from turnout.readers.entries import Entry
+from turnout.readers.rate_statements import MIN_EPOCH
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.statements import MIN_EPOCH
 from turnout.readers.time_numbers import is_declared
 from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time
 

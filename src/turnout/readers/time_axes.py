@@ -7,10 +7,10 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
+from turnout.readers.rate_statements import Statement, statements_of, time_statement
 from turnout.readers.rate_units import TIME_UNITS, rate_unit, words_of
-from turnout.readers.rate_words import CERTAIN, POSSIBLY, is_time_name, name_meaning
+from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
-from turnout.readers.statements import Statement, statements_of, time_statement
 from turnout.readers.time_numbers import unit_of_axis
 from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 

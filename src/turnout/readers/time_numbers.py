@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from fractions import Fraction
 
+from turnout.readers.rate_statements import PLAUSIBLE_RATES
 from turnout.readers.rate_units import rate_unit, words_of
-from turnout.readers.statements import PLAUSIBLE_RATES
 
 EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
 DAY = Fraction(86400)  # s

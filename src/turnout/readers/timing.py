@@ -6,8 +6,8 @@ from datetime import datetime
 import numpy as np
 
 from turnout.readers.precision import TEXT_PRECISION
+from turnout.readers.rate_statements import MAX_CLOCK_DRIFT
 from turnout.readers.source import BLOCK_SIZE, Source
-from turnout.readers.statements import MAX_CLOCK_DRIFT
 
 STEP_SAMPLES = 2**21  # samples whose median step is the usual step
 

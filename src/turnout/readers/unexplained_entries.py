@@ -5,7 +5,7 @@ or their rate must be explained, else it is reported by name, with the key of th
 (``checked_entries``). It is explained if
 
 - another module has compared it with the layout,
-- its name, its group or the words beside it speak of something else (``other_subjects``),
+- its name, its group or the words beside it speak of something else (``metadata_subjects``),
 - it agrees with the record: rate, step, number of samples, duration, units, a neutral scale, or
 - it can be none of these: a length, a temperature, a small whole number (``entry_candidates``).
 
@@ -40,10 +40,10 @@ from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
+from turnout.readers.rate_statements import PLAIN_TYPES
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import same_unit, with_stated_units
-from turnout.readers.statements import PLAIN_TYPES
 from turnout.readers.time_texts import stated_time
 from turnout.readers.whole_numbers import converting_entries
 from turnout.records import RawDescription

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from turnout.readers.entries import Entry
 from turnout.readers.entry_owners import owners_of
-from turnout.readers.scale_words import plain_word
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 from turnout.readers.stated_sensitivities import sensitivity_entries

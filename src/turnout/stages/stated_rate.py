@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from turnout.errors import ReadError
 from turnout.readers.rate_agreement import resolve
-from turnout.readers.rate_words import CERTAIN
+from turnout.readers.rate_statements import statements_of
+from turnout.readers.rate_vocabulary import CERTAIN
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.statements import statements_of
 from turnout.readers.time_axes import all_statements
 
 

@@ -8,6 +8,8 @@ from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.campaign_notes import read_campaigns
 from turnout.config.filename_pattern import compile_pattern
+from turnout.config.schema import FORMER_KEYS
+from turnout.config.settings_schema import settings_keys
 from turnout.config.turnouts_table import read_table
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
@@ -98,8 +100,8 @@ WRONG = {
     ),
     "limit in kN": (
         layout("source: force, ", "source: force, limit: 22, "),
-        "line 13, column 35: limit is 22 N for the hammer's force, and receptance.softest_blow is 50.0 N: no impact "
-        "could count. Write the limit in N",
+        "line 13, column 35: limit is 22 N for the hammer's force, and receptance.minimum_peak_force is 50.0 N: no "
+        "impact could count. Write the limit in N",
     ),
     "step as large as the limit": (
         layout("source: rail, ", "source: rail, limit: 500, resolution: 800, "),
@@ -370,9 +372,23 @@ def test_different_spellings_of_one_raw_folder_are_the_same_folder(tmp_path):
 HEADER = "turnout,section,date,kind\n"
 
 
+@pytest.mark.parametrize(
+    ("former", "present"), [("softest_blow", "minimum_peak_force"), ("weakest_blow", "minimum_peak_share")]
+)
+def test_the_error_of_a_renamed_setting_states_its_present_name(tmp_path, former, present):
+    with pytest.raises(ConfigErrors) as caught:
+        configuration(tmp_path, settings=f"receptance: {{{former}: 0.1}}")
+    assert f"unknown key {former!r}. It is called {present!r} now." in str(caught.value)
+
+
+def test_every_renamed_setting_has_a_key_that_exists():
+    keys = {name for group in settings_keys().values() for name in group.spec}
+    assert FORMER_KEYS.keys().isdisjoint(keys) and set(FORMER_KEYS.values()) <= keys
+
+
 def test_the_limit_of_a_small_hammer_may_be_below_the_least_force_of_a_large_one(tmp_path):
     small = LAYOUT.replace("source: force, ", "source: force, limit: 22, ")
-    assert configuration(tmp_path, layout=small, settings="receptance: {softest_blow: 0}").ids == ("t1", "t2")
+    assert configuration(tmp_path, layout=small, settings="receptance: {minimum_peak_force: 0}").ids == ("t1", "t2")
 
 
 def test_a_unit_that_overrides_the_file_is_checked_without_its_exclamation_mark(tmp_path):

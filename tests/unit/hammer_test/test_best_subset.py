@@ -39,7 +39,7 @@ def test_impacts_beside_the_axis_are_not_selected_and_the_reason_is_stated():
 
 def test_impacts_that_a_later_test_rejects_are_not_among_the_selected(monkeypatch):
     """Two of those that agree best turn out to be saturated."""
-    settings = replace(ReceptanceSettings(), best_impacts=N_WANTED, softest_blow=0.0)
+    settings = replace(ReceptanceSettings(), best_impacts=N_WANTED, minimum_peak_force=0.0)
     first = [i.peak for i in find_impacts(recordings_of(3), "hammer", "rail", settings) if i.accepted]
     saturated = Rejection("overload", 2.0, 1.0, "saturated")
 

@@ -50,11 +50,11 @@ def test_factors_of_units_are_found(impact_samples, factor):
     impacts = impacts_of(impact_samples[:5] * [[1.0], [factor]])
     assert {r.reason for i in impacts for r in i.rejections} == {"out_of_scale"}
     detail = impacts[0].rejections[0].detail
-    assert "rails 54E1" in detail and "receptance.softest_blow: 0" in detail
+    assert "rails 54E1" in detail and "receptance.minimum_peak_force: 0" in detail
 
 
 def test_the_limits_of_a_track_do_not_apply_to_a_small_hammer_on_a_beam(impact_samples):
-    assert not reasons_of(impact_samples[:5] * [[0.01], [1.0]], ReceptanceSettings(softest_blow=0.0))
+    assert not reasons_of(impact_samples[:5] * [[0.01], [1.0]], ReceptanceSettings(minimum_peak_force=0.0))
 
 
 def test_a_response_that_saturates_before_its_filter_is_found(impact_samples):

@@ -118,10 +118,14 @@ def test_each_position_is_tried_once_even_if_a_fit_to_convergence_has_less_evide
     base, leader = leader_at(case, 3.0)
     score_at = leaders._score_at
     monkeypatch.setattr(leaders, "_score_at", lambda s, f, x, c: tried.append(c.key) or score_at(s, f, x, c))
-    monkeypatch.setattr(leaders, "polish", lambda search, fit, score: replace(score, gain=leader.gain + len(tried)))
+    monkeypatch.setattr(
+        leaders, "refit_to_convergence", lambda search, fit, score: replace(score, gain=leader.gain + len(tried))
+    )
     at_best_position(Search(case), base, leader)
     assert len(tried) == len(set(tried))
-    monkeypatch.setattr(leaders, "polish", lambda search, fit, score: replace(score, gain=leader.gain - 1.0))
+    monkeypatch.setattr(
+        leaders, "refit_to_convergence", lambda search, fit, score: replace(score, gain=leader.gain - 1.0)
+    )
     assert at_best_position(Search(case), base, leader) is leader
 
 

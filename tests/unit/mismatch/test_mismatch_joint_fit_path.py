@@ -96,7 +96,7 @@ def test_effects_near_the_threshold_are_fitted_to_convergence_like_leaders(monke
         refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key="a"))]
     )
     monkeypatch.setattr(refit, "_score_task", lambda *a: score)
-    monkeypatch.setattr(refit, "polish", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refit, "refit_to_convergence", lambda *a: asked.append(a) or score)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
@@ -115,7 +115,7 @@ def test_only_the_first_leader_of_a_first_effect_is_restarted(monkeypatch, besid
     monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
     monkeypatch.setattr(refit, "_score_task", lambda search, fit, entry, *a: scores[entry.candidate.key])
     monkeypatch.setattr(refit, "_refit_equivalent_forms", lambda search, fit, ranked: ranked)
-    monkeypatch.setattr(refit, "polish", lambda search, fit, s: s)
+    monkeypatch.setattr(refit, "refit_to_convergence", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: asked.append(s.family) or s)
     monkeypatch.setattr(refit, "correct_for_leader", lambda search, fit, ranked: ranked)

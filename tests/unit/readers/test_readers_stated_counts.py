@@ -12,8 +12,8 @@ import soundfile
 
 from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.readers.rate_words import CERTAIN, name_meaning
-from turnout.readers.statements import statements_of_value
+from turnout.readers.rate_statements import statements_of_value
+from turnout.readers.rate_vocabulary import CERTAIN, name_meaning
 from turnout.records import RawChannel, RawDescription
 
 RATE = 20000.0

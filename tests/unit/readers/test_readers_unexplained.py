@@ -6,7 +6,7 @@ The layout states 25.6 kHz, newtons and m/s²; the file has no statement in know
 import h5py
 import numpy as np
 import pytest
-from tests.unit.readers.test_readers_other_subjects import can_hold, outcome
+from tests.unit.readers.test_readers_metadata_subjects import can_hold, outcome
 from tests.unit.readers.test_readers_rate_matrix import FORMATS, SENSORS, TRUE, described, write_csv
 
 from turnout.errors import ReadError

@@ -190,7 +190,7 @@ def test_a_small_force_is_accepted_if_the_configuration_allows_it(tmp_path):
         ]
 
     unit, turnout, _ = write_tests(tmp_path, "A7", n_test=1, change=change)
-    settings = {**turnout.settings, "receptance": replace(turnout.settings["receptance"], softest_blow=0.0)}
+    settings = {**turnout.settings, "receptance": replace(turnout.settings["receptance"], minimum_peak_force=0.0)}
     rows = hammer_unit(unit, replace(turnout, settings=settings), tmp_path, algo="1")
     assert rows["models"][0]["status"] == "accepted"
 

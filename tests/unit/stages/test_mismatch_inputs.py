@@ -488,7 +488,7 @@ def test_results_of_an_earlier_version_without_reason_codes_are_computed_again(m
 def test_impacts_are_accepted_by_the_same_settings_as_in_the_hammer_stage(folder, softest, used):
     """Both use the settings of the turnout, so both reject the same impacts as too soft."""
     file = folder / "config/config.yaml"
-    file.write_text(file.read_text() + f"receptance: {{softest_blow: {softest:g}}}\n")
+    file.write_text(file.read_text() + f"receptance: {{minimum_peak_force: {softest:g}}}\n")
     tests = gathered(folder, "hammer").tests
     turnout = turnout_in(folder)
     force, response = turnout.hammer.force["A"], turnout.hammer.response["A"]
@@ -548,7 +548,7 @@ def test_a_rail_temperature_that_no_rail_has_is_stated_once(folder):
 
 def test_a_calibration_accepts_impacts_by_the_settings_of_the_turnout(folder):
     file, track = folder / "config/config.yaml", folder / "config/tracks/small.yaml"
-    file.write_text(file.read_text() + "receptance: {softest_blow: 50000}\n")
+    file.write_text(file.read_text() + "receptance: {minimum_peak_force: 50000}\n")
     files = sorted((folder / "raw/t1/hammer").rglob("A_*"))
     with pytest.raises(SimulationError, match="calibration of A: 0 accepted impacts"):
         calibrate_to_files(str(track), "A", files, "t1", folder / "config")

@@ -17,11 +17,11 @@ class ReceptanceSettings:
         10.0, "sd", "an impact must exceed this many standard deviations of the force noise, which itself reaches 4",
         minimum=4.0, maximum=1000.0,
     )  # fmt: skip
-    weakest_blow: float = setting(
+    minimum_peak_share: float = setting(
         0.05, "1", "in a record with many impacts, a peak below this share of the usual one is handling of the hammer",
         minimum=0.01, maximum=0.5,
     )  # fmt: skip
-    softest_blow: float = setting(
+    minimum_peak_force: float = setting(
         50.0, "N", "a test whose median impact is softer has a wrong unit (kN for N?); 0 for small hammers on beams",
         minimum=0.0, maximum=1e5,
     )  # fmt: skip

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SITE_COORDINATES = ("place", "sleepers")  # along which a site has neighbours: its position [m] and its length
 
 
-def polish(search: Search, fit: Fit, score: Score) -> Score:
+def refit_to_convergence(search: Search, fit: Fit, score: Score) -> Score:
     """A leader refitted to convergence, with derivatives of its own: the verdict rests on these.
 
     Parameters
@@ -73,7 +73,7 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
         best = max(trials, key=lambda s: s.gain, default=score)
         if best.gain <= score.gain:
             return score
-        moved = polish(search, fit, best)
+        moved = refit_to_convergence(search, fit, best)
         if moved.gain <= score.gain:  # smaller in evidence, though it costs no more
             return score
         score = moved

@@ -16,7 +16,7 @@ from turnout.mismatch.engine.candidate_search import Entry, RefitTask, prescreen
 from turnout.mismatch.engine.cross_validation import gain_where_unmasked, held_out_score
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
-from turnout.mismatch.engine.leaders import at_best_position, polish, restart_leader, start_from_priors
+from turnout.mismatch.engine.leaders import at_best_position, refit_to_convergence, restart_leader, start_from_priors
 from turnout.mismatch.engine.single_source import single_sensor, single_source
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -118,10 +118,10 @@ def _refine_leaders(search: Search, fit: Fit, ranked: list[Score]) -> list[Score
         min(reportable[0].gain - settings.margin, THRESHOLDS.min_held_share * reportable[0].gain) if reportable else 0.0
     )
     leaders = [s for s in reportable if s.gain > max(THRESHOLDS.min_leader_gain * settings.threshold, min_close_gain)]
-    polished = [at_best_position(search, fit, polish(search, fit, s)) for s in leaders]
-    if polished and not fit.candidates:  # beside another effect the residual is also an error in its shape
-        polished[0] = restart_leader(search, fit, polished[0])
-    return sorted([*polished, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
+    converged = [at_best_position(search, fit, refit_to_convergence(search, fit, s)) for s in leaders]
+    if converged and not fit.candidates:  # beside another effect the residual is also an error in its shape
+        converged[0] = restart_leader(search, fit, converged[0])
+    return sorted([*converged, *(s for s in ranked if all(s is not x for x in leaders))], key=lambda s: -s.gain)
 
 
 def _base_from_leader(search: Search, fit: Fit, ranked: Sequence[Score]) -> Fit | None:
@@ -232,7 +232,7 @@ def _score_task(search: Search, fit: Fit, task: RefitTask, best_gain: float = 0.
         return score
     min_hammer_gain = max(threshold, THRESHOLDS.min_held_share * best_gain if is_channel else 0.0)
     if score.gain < THRESHOLDS.min_held_share * task.hammer_gain and task.hammer_gain > min_hammer_gain:
-        return polish(search, fit, score)
+        return refit_to_convergence(search, fit, score)
     return score
 
 

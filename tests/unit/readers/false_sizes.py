@@ -14,7 +14,7 @@ ENDINGS = {
     "wav": "wav", "flac": "flac", "csv": "csv", "lvm": "lvm", "npz": "npz", "parquet": "parquet",
 }  # fmt: skip
 N_SAMPLE, RATE = 1237, 5003.0  # primes: a number that equals them, or 2, 4 or 8 times them in bytes, states a size
-CLAIMS = (2**27, 2**30, 2**31 - 1, 2**32 - 2, 2**40, 2**62)
+FALSE_SIZES = (2**27, 2**30, 2**31 - 1, 2**32 - 2, 2**40, 2**62)
 ACCEPTED = {
     "read",
     "unreadable",
@@ -47,22 +47,22 @@ def intact(folder, format):
     return write([recording], path, format)
 
 
-def false_claims(content):
-    """Yield (place, content) for each number in the file that states a size, with each claim that fits there."""
+def false_sizes_of(content):
+    """Yield (place, content) for each number in the file that states a size, with each false_size that fits there."""
     for number in sorted({factor * N_SAMPLE + more for factor in (1, 2, 4, 8, 16) for more in (0, 1, 128)}):
         for form in INTEGERS:
-            for claim in CLAIMS:
+            for false_size in FALSE_SIZES:
                 try:
-                    old, new = struct.pack(form, number), struct.pack(form, claim)
+                    old, new = struct.pack(form, number), struct.pack(form, false_size)
                 except struct.error:
                     continue
                 for at in islice(_places(content, old), 4):
-                    yield f"{form}{number} at {at} is {claim}", content[:at] + new + content[at + len(old) :]
+                    yield f"{form}{number} at {at} is {false_size}", content[:at] + new + content[at + len(old) :]
         old = str(number).encode()
-        for claim in CLAIMS:
+        for false_size in FALSE_SIZES:
             for at in islice(_places(content, old), 4):
-                new = str(claim).encode()
-                yield f"text {number} at {at} is {claim}", content[:at] + new + content[at + len(old) :]
+                new = str(false_size).encode()
+                yield f"text {number} at {at} is {false_size}", content[:at] + new + content[at + len(old) :]
 
 
 def _places(content, old):
@@ -93,12 +93,12 @@ LAZILY = ({}, {"max_duration": 1e-3, "max_whole_file_size": 0})
 
 
 def outcomes(folder, format, most=60):
-    """{place: outcome} of at most ``most`` false claims of a format, evenly distributed over the file."""
+    """{place: outcome} of at most ``most`` false sizes of a format, evenly distributed over the file."""
     from turnout.errors import ReadError
     from turnout.readers import read
 
     path = intact(folder, format)
-    cases = list(false_claims(path.read_bytes()))
+    cases = list(false_sizes_of(path.read_bytes()))
     found = {}
     for place, content in cases[:: -(-len(cases) // most) or 1]:
         path.write_bytes(content)

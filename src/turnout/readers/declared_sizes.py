@@ -1,4 +1,4 @@
-"""Check what a raw file claims before memory is allocated for it, and that it keeps its samples in itself.
+"""Check the sizes that a raw file declares before memory is allocated for it, and that its samples are in it.
 
 A header of some bytes may claim arrays of gigabytes. What a file claims, as it is stored, may be ``MAX_EXPANSION``
 times its size plus ``FREE_CLAIM``. An HDF5 file may also name other files as the place of its samples. These are not
@@ -25,7 +25,7 @@ REMEDY = "Copy the file again from the logger; if it is whole, export it unpacke
 ELSEWHERE_REMEDY = "Export the samples into the file itself"
 
 
-def check_claims(format_module: str, source: Source) -> None:
+def check_declared_sizes(format_module: str, source: Source) -> None:
     """Stop before a reader allocates more memory than a file of this size can hold, or opens another file.
 
     The other readers check with the file that they have opened: HDF5, Parquet, and MATLAB 5 as it is unpacked.
@@ -135,7 +135,7 @@ def _npy_header(stream: io.BytesIO) -> tuple[tuple[int, ...], bool, np.dtype]:
     return read(stream)
 
 
-class Hdf5Claims:
+class Hdf5SizeCheck:
     """What the datasets of an HDF5 file claim together, and whether their values are in the file itself.
 
     Parameters
@@ -252,12 +252,12 @@ def check_hdf5(file: Any, source: Source) -> None:
     """
     import h5py
 
-    claims, addresses = Hdf5Claims(source), set()
+    size_check, addresses = Hdf5SizeCheck(source), set()
 
     def walk(group: Any, above: str) -> None:
         for name in group:
             path = f"{above}/{name.decode('utf-8', 'replace')}"
-            if not claims.check_link(group, name, path):
+            if not size_check.check_link(group, name, path):
                 continue
             try:
                 info = h5py.h5o.get_info(group, name)
@@ -270,7 +270,7 @@ def check_hdf5(file: Any, source: Source) -> None:
             if info.type == h5py.h5o.TYPE_GROUP:
                 walk(member, path)
             else:
-                claims.check_dataset(member, path)
+                size_check.check_dataset(member, path)
 
     root = h5py.h5g.open(file.id, b"/")
     addresses.add(h5py.h5o.get_info(root).addr)

@@ -1,9 +1,10 @@
 """All statements of a file about its sampling rate, compared with each other and with the layout.
 
 A reader hands over every entry of the metadata that belongs to a record, each with its place. Entries whose name or
-value speaks of a rate, a step or an interval become statements (``rate_words``), with the precision of their printed
-numbers (``precision``); time axes and evenly rising columns are statements as well. The most precise statement holds.
-A statement that contradicts it beyond rounding, and an entry that may be a rate and is not understood, are errors.
+value speaks of a rate, a step or an interval become statements (``rate_vocabulary``), with the precision of their
+printed numbers (``precision``); time axes and evenly rising columns are statements as well. The most precise statement
+holds. A statement that contradicts it beyond rounding, and an entry that may be a rate and is not understood, are
+errors.
 """
 
 import math
@@ -17,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from turnout.readers.entries import MAX_ENTRIES, Entry, entries_of_text
-from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.precision import NUMBER, Interval, around, readings
 from turnout.readers.rate_units import RateUnit, rate_unit
-from turnout.readers.rate_words import CERTAIN, NOT, POSSIBLY, name_meaning, reduction_of_name
+from turnout.readers.rate_vocabulary import CERTAIN, NOT, POSSIBLY, name_meaning, reduction_of_name
 from turnout.readers.texts import decode_text
 
 MAX_CLOCK_DRIFT = 1e-4  # relative: two clocks of one logger with separate crystals may differ by this much

@@ -17,8 +17,8 @@ from tests.unit.readers.test_readers_rate_matrix import FORMATS, SAMPLES, SENSOR
 from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.readers.entries import entries_of_text
-from turnout.readers.rate_words import NOT, name_meaning
-from turnout.readers.scale_words import says_no_scale
+from turnout.readers.rate_vocabulary import NOT, name_meaning
+from turnout.readers.scale_vocabulary import says_no_scale
 from turnout.records import RawDescription
 
 FREQUENCIES = (

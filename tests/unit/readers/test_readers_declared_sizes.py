@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from size_claims import ACCEPTED, ENDINGS, N_SAMPLE, lengths
+from false_sizes import ACCEPTED, ENDINGS, N_SAMPLE, lengths
 
 from turnout.errors import ReadError
 from turnout.readers import read
@@ -135,7 +135,7 @@ LIMITED = """
 import json, logging, re, resource, sys
 from pathlib import Path
 import h5py, nptdms, pyarrow.csv, pyarrow.parquet, pymatreader, scipy.io, soundfile
-from size_claims import ENDINGS, outcomes
+from false_sizes import ENDINGS, outcomes
 logging.disable(logging.CRITICAL)
 size = int(re.search(r"VmSize:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]) * 1024
 resource.setrlimit(resource.RLIMIT_AS, (size + 700 * 2**20,) * 2)
@@ -149,7 +149,7 @@ def test_the_intact_file_of_each_format_is_read(format, tmp_path):
 
 
 def test_a_false_size_in_a_file_of_any_format_needs_no_memory_and_gives_no_longer_record(tmp_path):
-    """Each number that states a size is replaced by each of six claims from 2**27 to 2**62."""
+    """Each number that states a size is replaced by each of six false sizes from 2**27 to 2**62."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])}
     command = [sys.executable, "-c", LIMITED, str(tmp_path)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

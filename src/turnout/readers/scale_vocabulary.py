@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from turnout.readers.other_subjects import STRONG, subject_of
+from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit, words_of
 
 FACTOR_WORDS = frozenset(
@@ -56,7 +56,7 @@ EXPONENT = re.compile(r"(?:scale|unit|decimal)?exponent\d*|zehnerpotenz|poweroft
 # What a number is converted to: "adc_to_volt", "ToSI".
 TARGETS = frozenset("si eu volt volts v mv unit units newton newtons n kn g ms physical engineering".split())
 CONVERTED = re.compile(r"[a-z]+2([a-z]+)2?")  # "lbf2N"
-# Factors and offsets of other things than the numbers of a channel, beside those of ``other_subjects``.
+# Factors and offsets of other things than the numbers of a channel, beside those of ``metadata_subjects``.
 OTHER_SCALE = re.compile(
     r"time|zeit|valid|number|^no$|^nr$|freq|rate|power|form|quality|load|sampl|decim|dynamic|posit|byte|pixel|colou?r|axis"
     r"|image|volt(?!s?$|age$)|speed|length|dist|full|range|cross|pad|limit|max|min|cover|peak|^q$|start|begin|mode|type"
