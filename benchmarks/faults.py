@@ -154,8 +154,8 @@ class Fleet:
 
     def calm_night(self):
         """A night without faults, and the registry after it."""
-        said = self.night()
-        return {"said": said, **self.contents()}
+        last_line = self.night()
+        return {"said": last_line, **self.contents()}
 
     def contents(self):
         """Hashes of the live files on the disk without those of ``runs``, and the rows that users see."""
@@ -256,9 +256,9 @@ class Seeds:
         truth, n_call = self._scenario(scenario)
         self._restore(scenario)
         status, answer, needle = self._faulty_night(kind, n_call, draw)
-        said = "hangs" if status is None else answer.get("error") or answer.get("value") or f"ended by {status}"
+        outcome = "hangs" if status is None else answer.get("error") or answer.get("value") or f"ended by {status}"
         if status is None:
-            return kind, scenario, "the night hangs", False, said
+            return kind, scenario, "the night hangs", False, outcome
         after, later = {}, ""
         for _ in range(N_CALM):
             status, answer = in_child(self.fleet.calm_night)
@@ -267,19 +267,19 @@ class Seeds:
             if status is None or (after and after["rows"] == truth["rows"] and not after["wrong"]):
                 break
         if status is None:
-            return kind, scenario, "a night after the fault hangs", False, said
+            return kind, scenario, "a night after the fault hangs", False, outcome
         if not after:
-            return kind, scenario, f"broken: {answer.get('error')} {answer.get('trace')}", False, said
+            return kind, scenario, f"broken: {answer.get('error')} {answer.get('trace')}", False, outcome
         if after["rows"] != truth["rows"] or after["wrong"]:
             right, now = (
                 {f"{view}: {row}" for view in rows for row in rows[view]} for rows in (truth["rows"], after["rows"])
             )
             problem = f"{after['wrong']} missing {sorted(right - now)}, wrong {sorted(now - right)}; {after['said']}"
-            return kind, scenario, problem, False, said
+            return kind, scenario, problem, False, outcome
         is_identical = after["files"] == truth["files"]
-        is_excused = is_identical or kind in INPUT_KINDS or any(word and word in said + later for word in needle)
+        is_excused = is_identical or kind in INPUT_KINDS or any(word and word in outcome + later for word in needle)
         problem = "" if is_excused else "other files, and the night named neither a file nor the fault"
-        return kind, scenario, problem, is_identical, said
+        return kind, scenario, problem, is_identical, outcome
 
     def _scenario(self, name):
         """What is right after the night of a scenario, and the number of its calls by kind."""

@@ -248,7 +248,7 @@ class FrfCase(Case):
     def nuisance_jacobian(self, values, terms, observations, base):
         """The difference quotients of ``Case``, but only what depends on a nuisance is computed for it."""
         frequencies, damping, shapes, loss = self._modes(values, terms)
-        heard, numbers = shapes[:, : self.n_sensor], {n.name: k for k, n in enumerate(self.nuisances)}
+        measured, numbers = shapes[:, : self.n_sensor], {n.name: k for k, n in enumerate(self.nuisances)}
         steps = {n.name: THRESHOLDS.nuisance_step * n.sd for n in self.nuisances}
         modes = [(r, str(r)) for r in range(self.n_mode)]
         modes += [(self.n_mode + r, f"rigid{r}") for r in range(self.rigid)]
@@ -265,7 +265,7 @@ class FrfCase(Case):
                 column[1, s] += change.imag / steps[name]
 
             for k, label in modes:
-                f, zeta, lines, both = frequencies[k], damping[k], all_lines[k], heard[k, :, None] * shapes[k, place]
+                f, zeta, lines, both = frequencies[k], damping[k], all_lines[k], measured[k, :, None] * shapes[k, place]
                 name = "log_frequency_0" if self.beam and k < self.n_mode else f"log_frequency_{label}"
                 put(name, both * (self._lines(f * stretch * np.exp(steps[name]), zeta, loss) - lines))
                 if k < self.n_mode:  # that of the rigid body is given
@@ -274,10 +274,10 @@ class FrfCase(Case):
                 for s in {*range(self.n_sensor), place}:
                     moved = shapes[k].copy()
                     moved[s] += steps[f"shape_{label}_{s}"]
-                    change = moved[: self.n_sensor] * moved[place] - heard[k] * shapes[k, place]
+                    change = moved[: self.n_sensor] * moved[place] - measured[k] * shapes[k, place]
                     changed = slice(None) if s == place else s
                     put(f"shape_{label}_{s}", change[changed, None] * lines, changed)
-            product = (heard * shapes[:, place, None]).T
+            product = (measured * shapes[:, place, None]).T
             put(f"hammer@{o.name}", product @ all_lines * (steps[f"hammer@{o.name}"] / gain))
             stretched = self._lines(frequencies * (stretch + steps[f"stretch@{o.name}"]), damping, loss)
             put(f"stretch@{o.name}", product @ (stretched - all_lines))

@@ -14,6 +14,8 @@ EMPTY = frozenset(
 )
 MAX_EMPTY_SHARE = 0.005  # of all stored names
 
+PRIVATE = frozenset({"said", "told", "heard", "asked", "mine"})  # in tests, which are not counted
+
 # Past participles that do not end in "ed"; former versions used them as names of functions and modules.
 IRREGULAR = frozenset(
     """begun bent borne bound broken brought built chosen cut drawn driven fallen felt found given gone heard held
@@ -86,6 +88,15 @@ def stored_names(tree):
             yield node.lineno, node.id
         elif isinstance(node, ast.arg):
             yield node.lineno, node.arg
+
+
+def test_names_in_tests_and_benchmarks_describe_their_content(repository):
+    """Parameters and variables, where the reader of a failing test sees them."""
+    paths = [
+        p for folder in ("tests", "benchmarks", "examples", "scripts") for p in (repository / folder).rglob("*.py")
+    ]
+    wrong = [f"{p}:{n} {name}" for p in paths for n, name in stored_names(tree_of(p)) if name in PRIVATE]
+    assert not wrong, "\n".join(wrong)
 
 
 def is_property(node):

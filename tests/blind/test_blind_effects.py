@@ -131,11 +131,11 @@ def test_a_clipped_channel_shows_its_limit_as_the_mean_of_both_sides():
     drawn = EFFECTS["clipping"].draw_concealed(np.random.default_rng(4), site, 2)
     EFFECTS["clipping"].act(world, site, drawn.where, drawn.parameters)
     (fault,) = world.channels[drawn.where["sensor"]]
-    shown, limit = fault("hammer", None), drawn.parameters["limit"]
-    far = shown(np.array([100.0, -100.0]) * limit, 6e4)
+    apply_fault, limit = fault("hammer", None), drawn.parameters["limit"]
+    far = apply_fault(np.array([100.0, -100.0]) * limit, 6e4)
     assert 0.5 * (far[0] - far[1]) == pytest.approx(limit)
     small = np.linspace(-0.73, 0.73, 9) * limit
-    assert shown(small, 6e4) == pytest.approx(small)
+    assert apply_fault(small, 6e4) == pytest.approx(small)
     assert 20.0 < limit / drawn.parameters["share"] < 1000.0  # an impact of 10 kN on a rail, within the sensor's range
 
 
@@ -147,9 +147,9 @@ def test_a_saturating_amplifier_limits_the_resonance_of_the_mounting():
     faults = [fault("hammer", None) for fault in world.channels["A2"]]
     click = np.zeros(6000)
     click[1000:1010] = 400.0
-    free, shown = (np.abs(amplify(MeasurementChain("A2", 1000.0), click, 60000.0, f)).max() for f in ((), faults))
-    assert free > 3.0 * shown
-    assert shown == pytest.approx(54.0)
+    free, saturated = (np.abs(amplify(MeasurementChain("A2", 1000.0), click, 60000.0, f)).max() for f in ((), faults))
+    assert free > 3.0 * saturated
+    assert saturated == pytest.approx(54.0)
 
 
 def test_rail_roughness_has_its_level_in_every_octave():
@@ -176,16 +176,16 @@ def test_wheel_roughness_repeats_every_turn():
 def test_a_mounting_is_flat_below_its_resonance_and_peaks_by_its_quality_factor():
     t = np.arange(60000) / 60000.0
     for frequency, gain in ((50.0, 1.0), (400.0, 8.0)):
-        shown = mounting_response(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
-        assert np.abs(shown[40000:]).max() == pytest.approx(gain, rel=0.03)
+        response = mounting_response(np.sin(2.0 * np.pi * frequency * t), 60000.0, 400.0, 8.0)
+        assert np.abs(response[40000:]).max() == pytest.approx(gain, rel=0.03)
 
 
 def test_a_converter_has_steps_and_range_of_sixteen_bits():
     chain = MeasurementChain("A1", 100.0, mount=0.0, coupling=0.0, noise=0.0, drift=0.0)
     t = np.arange(60000) / 60000.0
-    shown = digitise(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
-    steps = shown / chain.step
-    assert shown.size == 5000
+    digitised = digitise(chain, 150.0 * np.sin(2.0 * np.pi * 5.0 * t), 60000.0, 12, np.random.default_rng(0))
+    steps = digitised / chain.step
+    assert digitised.size == 5000
     assert np.allclose(steps, np.round(steps), atol=1e-8)
     assert (steps.min(), steps.max()) == (-32768, 32767)
 

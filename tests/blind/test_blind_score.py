@@ -188,8 +188,8 @@ def test_parameters_are_compared_with_the_concealed_ones():
 def test_train_and_axle_are_read_from_their_column(train, right):
     """The sentence may contain another number."""
     t = truth("s", "single", "flat")
-    said = {"verdict": "unknown", "locked_to": "wheel", "train": train, "sentence": "forces at axle 7 of a train"}
-    assert judge(t, answers_of([said])).located == {"lock": True, "axle": right}
+    answer_row = {"verdict": "unknown", "locked_to": "wheel", "train": train, "sentence": "forces at axle 7 of a train"}
+    assert judge(t, answers_of([answer_row])).located == {"lock": True, "axle": right}
 
 
 def test_the_gap_of_a_sleeper_that_hangs_in_part_is_not_compared():
@@ -256,9 +256,9 @@ def test_an_empty_list_of_rows_is_no_answer():
 
 def test_two_wrong_names_of_one_answer_count_as_a_wrong_name():
     t = truth("s", "single", "void")
-    said = row(t["effects"][0], "rail_shear", verdict="a_or_b", rival_term="time_offset")
-    assert judge(t, answers_of([said])).wrong_names == ("rail_shear",)
-    assert judge(t, answers_of([said | {"rival_term": "hanging_sleeper"}])).wrong_names == ()
+    answer_row = row(t["effects"][0], "rail_shear", verdict="a_or_b", rival_term="time_offset")
+    assert judge(t, answers_of([answer_row])).wrong_names == ("rail_shear",)
+    assert judge(t, answers_of([answer_row | {"rival_term": "hanging_sleeper"}])).wrong_names == ()
 
 
 def both(gap_at, sensor):

@@ -175,8 +175,8 @@ def test_the_tool_sees_neither_truth_nor_generator(copy, tmp_path):
     held = diagnose_set(out, truth, command, report=lambda line: None)
     assert not any(held["canary"].values())
     for path in (out / "findings").glob("*.json"):
-        said = json.loads(path.read_text())[0]["sentence"]
-        assert said == "" if held["isolation"] == "unshare" else "opened" not in said
+        sentence = json.loads(path.read_text())[0]["sentence"]
+        assert sentence == "" if held["isolation"] == "unshare" else "opened" not in sentence
     assert (truth / "set.json").exists()  # outside the isolation the folder is still there
     assert len(reveal(out, truth)) == 2
     report = report_text([out])
@@ -234,16 +234,16 @@ def test_one_command_diagnoses_all_cases_of_a_set_before_it_is_opened(copy):
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 @pytest.mark.parametrize(
-    ("code", "budget", "said"),
+    ("code", "budget", "output"),
     [
         ("import time; time.sleep(60)", {"timeout": 2.0}, "no answer within 2 s of the clock"),
         ("while True: pass", {"cpu": 1.0}, "no answer within 1 s of the processor"),
     ],
 )
-def test_a_case_that_exceeds_its_budget_has_no_answer(copy, code, budget, said):
+def test_a_case_that_exceeds_its_budget_has_no_answer(copy, code, budget, output):
     out, truth = copy
     held = diagnose_set(out, truth, f"{{python}} -c '{code}'", report=lambda line: None, workers=2, **budget)
-    assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", said)}
+    assert {(run["status"], run["said"]) for run in held["cases"].values()} == {("over budget", output)}
     reveal(out, truth)
     assert "| controls: false alarms | 0.0 % (0)" in report_text([out])
 

@@ -118,10 +118,10 @@ def test_the_file_of_the_owner_has_the_blade_and_both_tops(tmp_path):
     assert np.all((chairs > site.switch.toe - 0.08) & (chairs < site.switch.heel)) and chairs.size >= 7
 
 
-@pytest.mark.parametrize(("panel", "asked"), [(SWITCH, True), (PLAIN, False)])
-def test_a_proof_requests_unproven_names_at_switch_panels(tmp_path, panel, asked):
+@pytest.mark.parametrize(("panel", "is_requested"), [(SWITCH, True), (PLAIN, False)])
+def test_a_proof_requests_unproven_names_at_switch_panels(tmp_path, panel, is_requested):
     write_configuration(tmp_path, "t", draw_site(np.random.default_rng(3), panel=panel))
-    assert load_configuration(tmp_path).turnout("t").settings["mismatch"].unproven_names is asked
+    assert load_configuration(tmp_path).turnout("t").settings["mismatch"].unproven_names is is_requested
 
 
 @pytest.mark.parametrize("kind", ["chair_gap", "heel", "toe"])

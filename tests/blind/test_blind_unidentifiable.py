@@ -35,11 +35,11 @@ def site_with_effect(kind, rung=-1, seed=3):
 
 def passage_difference(site, world, other_site, other_world, k=0):
     """Share [%] of a passage's response by which two worlds differ."""
-    shown = [
+    responses = [
         _sensor_signals(s, w, passage_motion(s, w, k, np.random.default_rng(k)), "passage", [1])
         for s, w in ((other_site, other_world), (site, world))
     ]
-    return _relative_difference(*shown, PASSAGE_BAND, PASSAGE_DECIMATION)
+    return _relative_difference(*responses, PASSAGE_BAND, PASSAGE_DECIMATION)
 
 
 def impact_difference(site, world, other):

@@ -117,10 +117,10 @@ def test_the_clarity_of_an_effect_is_that_of_the_visit_with_the_largest_visibili
 
 def test_stored_answers_are_not_computed_again(monkeypatch, tmp_path):
     site = bench.Site("hanging_sleeper", "void", 0, "plain")
-    asked = []
+    calls = []
 
     def answer(question, site, without):
-        asked.append(without)
+        calls.append(without)
         return bench.Answer("unknown", "unknown at 4.2 m", 70.0, 5.0) if without else None
 
     monkeypatch.setenv("TURNOUT_LEFT_OUT_STORE", str(tmp_path / "answers"))
@@ -128,7 +128,7 @@ def test_stored_answers_are_not_computed_again(monkeypatch, tmp_path):
     for _ in range(2):
         assert bench._stored("visit", site, without=True) == answer("visit", site, True)
         assert bench._stored("visit", site, without=False) is None  # not clear
-    assert asked.count(False) == 1
+    assert calls.count(False) == 1
 
 
 def test_the_table_states_every_failure_and_the_interval():

@@ -63,23 +63,23 @@ def test_an_omitted_effect_is_named_or_the_answer_is_unknown(shared_data):
     if not (shared_data / "frf_beam_sdypy").is_dir():
         pytest.skip(f"no recordings: {shared_data}/frf_beam_sdypy does not exist")
     found = real_frfs.analyse(shared_data, ("A1", "A2", "A3", "A4", "B1", "B2"))
-    said = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
-    assert said["A1"] == ("named", ("mode",))
+    verdicts = {title: (d.verdict.answer, d.verdict.names) for title, (_, _, d) in found.items()}
+    assert verdicts["A1"] == ("named", ("mode",))
     frequency, damping = real_frfs.identified_mode(found["A1"][2])
     # printed by the authors of the recording; half a line, impacts differ by 0.4
     assert frequency == pytest.approx(477.4, abs=0.5)
     assert damping == pytest.approx(0.20, abs=0.02)
     assert found["A1"][2].verification.after > found["A1"][2].verification.before + 30.0
-    assert said["A2"][0] == "unknown"
+    assert verdicts["A2"][0] == "unknown"
     most = max(found["A2"][2].frames, key=lambda f: f.share)
     assert most.frame == "frequency" and most.level in ("449 Hz", "566 Hz")  # the thirds of an octave beside 477 Hz
-    assert said["A3"] == ("named", ("mode",)) and real_frfs.identified_mode(found["A3"][2])[0] < 60.0
+    assert verdicts["A3"] == ("named", ("mode",)) and real_frfs.identified_mode(found["A3"][2])[0] < 60.0
     beam = found["A4"][2]
-    assert said["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
+    assert verdicts["A4"] == ("named", ("shear_and_rotation",)) and beam.verdict.grade == "B"
     size, half, above = real_frfs.beam_printed()  # by six frequencies, three of which lie beyond the fitted band
     assert beam.verdict.scores[0].estimates[0][0] == pytest.approx(size, abs=half)
     assert above > 0.01  # no effect of the library describes this part: so grade B, not A
     assert beam.verification.after > beam.verification.before + 10.0
-    assert said["B1"] == ("named", ("impact_gain",))
+    assert verdicts["B1"] == ("named", ("impact_gain",))
     assert found["B1"][2].fit.terms[0].where == "impact 1"
-    assert said["B2"][0] in ("unknown", "named") and set(said["B2"][1]) <= {"mode"}
+    assert verdicts["B2"][0] in ("unknown", "named") and set(verdicts["B2"][1]) <= {"mode"}

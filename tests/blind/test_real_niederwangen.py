@@ -57,12 +57,12 @@ def folder(shared_data):
 def test_the_conclusions_and_their_page_are_reproduced(folder, tmp_path):
     """As by the method without a model, docs/niederwangen_decay_rate.md: S1, S4, S5 changed by 2013-01, S2 did not."""
     measured, answers = niederwangen.read(folder), niederwangen.analyse(folder, report=lambda line: None)
-    said = {m.section: niederwangen.conclusion(answers[m.section][1]) for m in measured}
-    assert {s for s, (what, _) in said.items() if what == "changed"} == {"S1", "S4", "S5"}
-    assert said["S2"] == ("not changed", ())
-    assert said["S3"][0] == "left open"
+    conclusions = {m.section: niederwangen.conclusion(answers[m.section][1]) for m in measured}
+    assert {s for s, (what, _) in conclusions.items() if what == "changed"} == {"S1", "S4", "S5"}
+    assert conclusions["S2"] == ("not changed", ())
+    assert conclusions["S3"][0] == "left open"
     for section in ("S1", "S4", "S5"):
-        assert set(said[section][1]) <= niederwangen.DAMPING_EFFECTS
+        assert set(conclusions[section][1]) <= niederwangen.DAMPING_EFFECTS
         assert {max(gains, key=gains.get) for gains in answers[section][2].values()} == {"2013-01"}
         for _, diagnosis in answers[section][1].values():
             assert diagnosis.verification.after > diagnosis.verification.before

@@ -202,6 +202,6 @@ def test_the_commands_of_the_help_exist(module):
 
 
 def test_the_texts_contain_queries_and_commands():
-    shown = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-    assert len(QUERY.findall(shown) + INLINE_QUERY.findall(shown)) > 30
+    text_of_pages = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert len(QUERY.findall(text_of_pages) + INLINE_QUERY.findall(text_of_pages)) > 30
     assert sum(len(loose_commands(page)) for page in PAGES) > 30

@@ -13,5 +13,5 @@ def test_the_page_is_up_to_date_with_the_catalogue(repository):
 
 def test_all_candidate_effects_of_a_case_are_marked_as_tested():
     """The table marks all candidate effects of a case, and those that only a residual suggests."""
-    asked = {c.family for c in TrackCase(measured_campaign(small_plan((15.0,)), (), 3)).candidates}
-    assert asked <= {t.name for t in TERMS if t.asked} and len(asked) > 15
+    families = {c.family for c in TrackCase(measured_campaign(small_plan((15.0,)), (), 3)).candidates}
+    assert families <= {t.name for t in TERMS if t.asked} and len(families) > 15

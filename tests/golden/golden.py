@@ -115,8 +115,8 @@ class Recording:
         start = ["-c", MAIN, *profile] if nightly else ["-m", "snakemake"]
         code, out, err = self.run([*start, *options], folder)
         (folder / "workflow.log").write_text(out + err)
-        said = re.findall(r"^(?:\w+ \S+: \d+ known|register: |ok: |failed |every job ).*", out + err, re.M)
-        self.keep(f"{name}/workflow.txt", "\n".join([*said, f"exit code {code}\n"]))
+        summary_lines = re.findall(r"^(?:\w+ \S+: \d+ known|register: |ok: |failed |every job ).*", out + err, re.M)
+        self.keep(f"{name}/workflow.txt", "\n".join([*summary_lines, f"exit code {code}\n"]))
         self.keep_files(folder / "work", "*/*.done", f"{name}/work")
         self.keep_files(folder / "work", "verdict.json", f"{name}/work")
         results = folder / "results"

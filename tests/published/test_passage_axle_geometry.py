@@ -62,8 +62,8 @@ def passing_times(pattern, rng, place_error=0.03):
 def test_the_collection_has_thirty_types_with_the_number_of_axles_in_their_names(collection):
     assert len(collection) == 30
     for pattern in collection:
-        said = re.search(r"_(\d+)$", pattern.type)
-        assert pattern.axle_counts() == (int(said[1]),) * 2
+        stated_count = re.search(r"_(\d+)$", pattern.type)
+        assert pattern.axle_counts() == (int(stated_count[1]),) * 2
 
 
 def both_ways(patterns):

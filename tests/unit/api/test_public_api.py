@@ -122,8 +122,8 @@ def test_the_five_lines_compute_modes_with_standard_errors_and_a_figure_from_a_f
     assert (folder / "modes.png").read_bytes()[:4] == b"\x89PNG"
     readme = (repository / "README.md").read_text(encoding="utf-8")
     assert f">>> impacts\n{impacts!r}\n" in readme
-    shown = readme.split(">>> model\n")[1].split("\n")[0]
-    assert re.sub(r"\d+(\.\d+)?", "#", shown) == re.sub(r"\d+(\.\d+)?", "#", repr(model))
+    printed = readme.split(">>> model\n")[1].split("\n")[0]
+    assert re.sub(r"\d+(\.\d+)?", "#", printed) == re.sub(r"\d+(\.\d+)?", "#", repr(model))
 
 
 def test_the_modes_equal_those_of_the_nightly_run(example):

@@ -61,8 +61,8 @@ def test_a_note_states_that_fast_impacts_of_a_machine_can_be_separated(hammer):
     many = sum(hammer.force(start=5e-3 + 0.15 * k, n=round(0.9 * RATE)) for k in range(6))
     recording = [hammer.recording(hammer.samples(many))]
     (one,) = hammer.impacts(recording)
-    (said,) = one.notes
-    assert "further contacts: 5" in said.detail and "set receptance.separation below" in said.detail
+    (note,) = one.notes
+    assert "further contacts: 5" in note.detail and "set receptance.separation below" in note.detail
     assert [i.accepted for i in hammer.impacts(recording, separation=0.1)] == [True] * 6
 
 

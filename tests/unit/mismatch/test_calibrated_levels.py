@@ -74,14 +74,14 @@ def test_the_constant_error_is_that_of_a_joint_state_with_the_values():
     stated = visits[0].groups[0].matrix
     covariance = np.zeros((2 * n, 2 * n))
     covariance[:n, :n], covariance[n:, n:] = 0.01 * np.eye(n), np.linalg.inv(stated)
-    shown = np.hstack([np.eye(n), np.eye(n)])
+    gradients = np.hstack([np.eye(n), np.eye(n)])
     precision, vector = np.linalg.inv(covariance), np.zeros(2 * n)
     for visit in visits:
-        precision = precision + shown.T @ (stated / 0.2) @ shown
-        vector = vector + shown.T @ visit.groups[0].vector / 0.2
+        precision = precision + gradients.T @ (stated / 0.2) @ gradients
+        vector = vector + gradients.T @ visit.groups[0].vector / 0.2
     posterior = np.linalg.inv(precision)
-    assert history.belief.mean == pytest.approx(shown @ posterior @ vector, abs=1e-9)
-    assert history.belief.covariance == pytest.approx(shown @ posterior @ shown.T, abs=1e-9)
+    assert history.belief.mean == pytest.approx(gradients @ posterior @ vector, abs=1e-9)
+    assert history.belief.covariance == pytest.approx(gradients @ posterior @ gradients.T, abs=1e-9)
 
 
 @pytest.mark.parametrize("repeated", [0.0, 0.5, 0.9])

@@ -63,8 +63,8 @@ def test_the_onset_of_growth_just_before_a_visit_is_not_after_that_visit(start):
 def test_a_change_of_the_last_visit_alone_is_a_step_of_any_size(size):
     """Growth from the previous visit on is equivalent. The prior of a step is that of the change, not of a rate."""
     effects = [ChangeEffect("f", EFFECT.direction, EFFECT.sd, grows) for grows in (False, True)]
-    shown = history(np.random.default_rng(1), lambda time: -size * (time > 1.9))
-    first, second = compare_onsets(shown, effects)
+    changed = history(np.random.default_rng(1), lambda time: -size * (time > 1.9))
+    first, second = compare_onsets(changed, effects)
     assert not first.effect.grows and first.onset == "v3"
     assert second.gains[-1] == -np.inf and first.gain > second.gain + 3.0
     two_visits = history(np.random.default_rng(1), lambda time: -size * (time > 0.0), TIMES[:2])
@@ -103,10 +103,10 @@ def test_intervals_contain_the_size_at_the_last_visit(form):
     rng, inside, of_step = np.random.default_rng(43), 0, 0
     for _ in range(1000):
         change = drawn_change(rng, form)
-        shown, present = history(rng, change), -change(TIMES[-1])
-        mean, sd = courses_of(shown, EFFECT).last_size
+        changed, present = history(rng, change), -change(TIMES[-1])
+        mean, sd = courses_of(changed, EFFECT).last_size
         inside += abs(mean - present) <= 1.96 * sd
-        step = compare_onsets(shown, [EFFECT])[0].size
+        step = compare_onsets(changed, [EFFECT])[0].size
         of_step += abs(step[0] - present) <= 1.96 * step[1]
     assert inside >= 930  # 950 expected, three standard errors of n
     assert form == "step" or of_step < 930
@@ -120,10 +120,10 @@ def test_the_size_at_the_last_visit_is_that_of_exact_data():
     for v, (time, value) in enumerate(zip(TIMES, (0.0, 0.0, -0.4, -0.8))):
         group = GroupInformation("A", 1, (PARAMETER.name,), np.array([[1e8]]), np.array([1e8 * value]))
         visits.append(VisitInformation(f"v{v}", time, (group,)))
-    shown = estimate_history(exact, visits, repeats_between_visits=False, accepted=None)
-    size, sd = courses_of(shown, EFFECT).last_size
+    changed = estimate_history(exact, visits, repeats_between_visits=False, accepted=None)
+    size, sd = courses_of(changed, EFFECT).last_size
     assert size == pytest.approx(0.8, abs=0.01) and sd < 0.02
-    assert compare_onsets(shown, [EFFECT])[0].size[0] == pytest.approx(0.6, abs=0.01)
+    assert compare_onsets(changed, [EFFECT])[0].size[0] == pytest.approx(0.6, abs=0.01)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -78,12 +78,12 @@ def test_both_programs_print_the_output_on_their_page(repository, capsys):
     page = (repository / "docs" / "own_simulator.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```console\n\$ python (\S+(?: \S+)?)\n(.*?)^```", page, re.M | re.S)
     assert [command for command, _ in blocks] == ["-m examples.own_system", "docs/examples/bring_your_own.py"]
-    for command, shown in blocks:
+    for command, output in blocks:
         if command.startswith("-m "):
             import_module(command.removeprefix("-m ")).main()
         else:
             runpy.run_path(str(repository / command), run_name="__main__")
-        assert capsys.readouterr().out == shown
+        assert capsys.readouterr().out == output
 
 
 @pytest.mark.slow
@@ -97,9 +97,9 @@ def test_two_systems_of_another_program_have_the_answers_of_their_page(repositor
     page = (repository / "docs" / "own_simulator.md").read_text(encoding="utf-8").splitlines()
     computed = list(other_systems.table())
     first = page.index(computed[0])
-    shown, found = cells(page[first + 2 : first + 6]), cells(computed[2:])
-    assert [row[:2] for row in shown] == [row[:2] for row in found]
-    for (*_, shown_amount, shown_true), (*_, found_amount, found_true) in zip(shown, found):
+    table, found = cells(page[first + 2 : first + 6]), cells(computed[2:])
+    assert [row[:2] for row in table] == [row[:2] for row in found]
+    for (*_, shown_amount, shown_true), (*_, found_amount, found_true) in zip(table, found):
         assert found_true == pytest.approx(shown_true, rel=1e-3)
         assert len(shown_amount) == len(found_amount)
         if shown_amount:

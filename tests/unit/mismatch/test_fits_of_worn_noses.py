@@ -111,11 +111,11 @@ def test_a_visit_continues_its_fit_with_wide_priors_for_large_values(monkeypatch
     pad, damper, ballast = (Nuisance(n, "-", 0.0, 0.1) for n in ("pad_3", "pad_damper_3", "ballast_3"))
     case = SimpleNamespace(nuisances=(pad, damper, ballast))
     fit = SimpleNamespace(values={"pad_3": 0.4, "pad_damper_3": 0.2, "ballast_3": 0.2})
-    asked = []
-    monkeypatch.setattr(stored_visits, "fit_again", lambda *given: asked.append(given) or "continued")
+    calls = []
+    monkeypatch.setattr(stored_visits, "fit_again", lambda *given: calls.append(given) or "continued")
     springs, partners = ["pad_3", "ballast_3"], {"pad_3": "pad_damper_3", "ballast_3": "ballast_damper_3"}
     assert stored_visits._fit_again(case, fit, springs, partners) == "continued"
-    assert asked == [(case, fit, {"pad_3", "pad_damper_3"})]
+    assert calls == [(case, fit, {"pad_3", "pad_damper_3"})]
 
     def failing(*_):
         raise SimulationError("no passage")

@@ -42,8 +42,8 @@ class Springs(Case):
         logs = [values["spring_0"], values["spring_1"]]
         for k, factor in terms:
             logs[k] += np.log(factor)
-        said = {"sum": logs[0] + logs[1], "first": logs[0]}
-        return [np.full(o.data.size, said[o.name]) for o in observations]
+        log_by_name = {"sum": logs[0] + logs[1], "first": logs[0]}
+        return [np.full(o.data.size, log_by_name[o.name]) for o in observations]
 
 
 def test_a_spring_that_absorbed_an_effect_is_a_candidate_with_the_size_of_the_effect():

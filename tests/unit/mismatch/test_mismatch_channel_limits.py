@@ -53,9 +53,9 @@ def test_impacts_of_a_flat_that_one_channel_shows_less_are_no_limit():
     limited, larger = np.array([302.0, 312.0, 320.0]), np.array([400.0, 460.0, 480.0])
     assert saturation_gain(np.log([*quiet, *limited]), np.log([*others, *larger])) > 12.0 + np.log(3.0)
 
-    def passage(mine, theirs, rolled):
+    def passage(peak, theirs, rolled):
         samples = np.outer([rolled[0], rolled[1], rolled[1]], np.sin(np.linspace(0.0, 50.0, 1001)))
-        samples[:, 300] = [mine, theirs, theirs]
+        samples[:, 300] = [peak, theirs, theirs]
         channels = tuple(Channel(n, "acceleration", "m/s²") for n in ("A1", "A2", "A3"))
         return SimpleNamespace(recording=Recording(samples, 2000.0, channels))
 

@@ -78,7 +78,7 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "expected"),
     [
         ([], "nothing is planned: give --impact-positions, --vehicles or both."),
         (
@@ -87,6 +87,6 @@ def test_passages_below_160_hz_do_not_show_frequency_dependent_pads_and_impacts_
         ),
     ],
 )
-def test_a_plan_that_can_show_no_effect_is_rejected_with_a_message(more, said, capsys):
+def test_a_plan_that_can_show_no_effect_is_rejected_with_a_message(more, expected, capsys):
     assert main(["distinguish", "--sensor-positions", "23.4", *more]) == 2
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err

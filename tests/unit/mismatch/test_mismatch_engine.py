@@ -236,11 +236,11 @@ def test_two_effects_that_agree_in_one_condition_are_distinguished_by_another():
         gain = {s.family: s.gain for s in diagnose(case).scores}
         return gain["power_3"] - gain["signed_square"]
 
-    asked = MismatchSettings().margin
+    required = MismatchSettings().margin
     same = [margin((1.5, 1.5, 1.5), seed) for seed in range(6)]
     other = [margin((0.5, 1.5, 3.0), seed) for seed in range(6)]
-    assert max(np.abs(same)) < asked  # cannot tell
-    assert min(other) > asked
+    assert max(np.abs(same)) < required  # cannot tell
+    assert min(other) > required
 
 
 def test_the_error_of_a_size_includes_the_model_error_of_its_effect():

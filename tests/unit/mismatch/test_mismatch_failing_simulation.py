@@ -58,7 +58,7 @@ def test_a_large_fit_keeps_its_updated_derivatives_if_new_ones_fail():
     """From 3 to the true 1.2 in steps; the derivatives fail from the second time on."""
 
     class Dear(Case):
-        is_large, asked = True, 0
+        is_large, n_calls = True, 0
         nuisances = (Nuisance("amount", "-", 3.0, 1.0),)
         observations = (Observation("o", "day", 1.2 * WAVE, 0.1),)
 
@@ -66,14 +66,14 @@ def test_a_large_fit_keeps_its_updated_derivatives_if_new_ones_fail():
             return [(values["amount"] + 0.3 * values["amount"] ** 2 - 0.432) * WAVE]
 
         def nuisance_jacobian(self, values, terms, observations, base):
-            self.asked += 1
-            if self.asked > 1:
+            self.n_calls += 1
+            if self.n_calls > 1:
                 raise SimulationError("it fails beside")
             return super().nuisance_jacobian(values, terms, observations, base)
 
     case = Dear()
     found = fit_jointly(case, iterations=12)
-    assert case.asked > 1
+    assert case.n_calls > 1
     assert found.values["amount"] == pytest.approx(1.2, abs=0.05)  # five standard errors
 
 

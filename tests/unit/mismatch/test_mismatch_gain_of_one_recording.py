@@ -105,10 +105,10 @@ def test_evidence_in_other_recordings_need_not_explain_the_residual_of_the_first
     """A tenth of an excess of twice the control level, which may be the shape of the effect named before; of 20
     places each costs the evidence 3 nats."""
     candidate = Candidate.of("bump", (), lambda p: None, (), n_scanned=places)
-    said = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
-    assert said.answer == answer
-    assert "10 % of the residual" in said.reason
-    assert ("the effect named first is not" in said.reason) == (answer == "named")
+    verdict = judge([Score(candidate, 40.0, 0.0, 0.1, None, unmasked_gain=apart)], 2.0, MismatchSettings())
+    assert verdict.answer == answer
+    assert "10 % of the residual" in verdict.reason
+    assert ("the effect named first is not" in verdict.reason) == (answer == "named")
 
 
 class ImpactCampaigns(Days):
@@ -169,7 +169,7 @@ def test_with_two_positions_neither_is_the_single_source():
 def test_an_effect_of_a_single_recording_has_no_name(gain, answer):
     candidate = Candidate.of("bump", (), lambda p: None, ())
     score = Score(candidate, gain, 0.0, 1.0, None, {"a": gain}, single_source="a")
-    said = judge([score], 0.8, MismatchSettings())
-    assert said.answer == answer and not said.names
-    assert "bump" in said.reason
+    verdict = judge([score], 0.8, MismatchSettings())
+    assert verdict.answer == answer and not verdict.names
+    assert "bump" in verdict.reason
     assert judge([Score(candidate, gain, 0.0, 1.0, None)], 0.8, MismatchSettings()).names == ("bump",)

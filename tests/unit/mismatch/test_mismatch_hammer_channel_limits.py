@@ -26,9 +26,9 @@ def hammer_input(place, saturated=lambda x: x, share=1.0, limit=None):
     rng, made = np.random.default_rng(int(10.0 * place)), []
     for k, peak in enumerate(FORCES):
         force = peak * force_pulse("half-sine", t - 0.025, 1.5e-3)
-        shown = saturated(share * fftconvolve(force, mode)[: t.size])
+        response = saturated(share * fftconvolve(force, mode)[: t.size])
         noise = rng.normal(size=(2, t.size)) * np.array([[1e-4 * peak], [0.01]])
-        made.append(Recording(np.array([force, shown]) + noise, RATE, channels, source="t.uff", record=k))
+        made.append(Recording(np.array([force, response]) + noise, RATE, channels, source="t.uff", record=k))
     return HammerInput(f"impacts at {place}", place, tuple(made), "force")
 
 
@@ -119,8 +119,8 @@ def campaign(names="ABC", hammer=(), peaks=()):
     sensors = [at(3.0 * (k + 1), name) for k, name in enumerate(names)]
     channels = tuple(Channel(name, "acceleration") for name in names)
     wave, passages = np.sin(np.linspace(0.0, 50.0, 1001)), []
-    for mine, theirs in peaks:
-        samples = np.outer([mine, *[theirs] * (len(names) - 1)], wave)
+    for own_peaks, theirs in peaks:
+        samples = np.outer([own_peaks, *[theirs] * (len(names) - 1)], wave)
         passages.append(SimpleNamespace(recording=Recording(samples, 2000.0, channels)))
     return SimpleNamespace(sensors=sensors, hammer=hammer, passages=passages)
 
@@ -132,10 +132,10 @@ def test_impacts_alone_show_a_limit_unless_there_is_only_one_channel(names, foun
     assert all(c.limit == pytest.approx(30.0, rel=0.05) for c in known.values())
 
 
-@pytest.mark.parametrize("shown, found", [(40.0, ["A"]), (45.0, [])])
-def test_no_limit_is_far_below_the_peaks_of_trains(shown, found):
+@pytest.mark.parametrize("peak, found", [(40.0, ["A"]), (45.0, [])])
+def test_no_limit_is_far_below_the_peaks_of_trains(peak, found):
     """A square wave of 30 overshoots to 38 m/s² in the recorder's filter; the larger side by a tenth more."""
-    assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(shown, 200.0)]), 12.0)) == found
+    assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(peak, 200.0)]), 12.0)) == found
 
 
 @pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])

@@ -80,30 +80,30 @@ def test_a_large_fit_that_decides_the_answer_continues_for_smaller_gains(monkeyp
     assert fit_jointly(Bent(False), iterations=25, stall=20.0).cost == pytest.approx(
         late.cost, abs=0.2
     )  # a small case has no such limit
-    asked = []
+    calls = []
     search = Search(Bent(True))
-    monkeypatch.setattr(Search, "fit", lambda *a, stall=THRESHOLDS.stall: asked.append(stall) or late)
+    monkeypatch.setattr(Search, "fit", lambda *a, stall=THRESHOLDS.stall: calls.append(stall) or late)
     search.converge(early)
     search.continue_fit(early)
-    assert set(asked[:-1]) == {THRESHOLDS.fine_stall} and asked[-1] == THRESHOLDS.stall > THRESHOLDS.fine_stall
+    assert set(calls[:-1]) == {THRESHOLDS.fine_stall} and calls[-1] == THRESHOLDS.stall > THRESHOLDS.fine_stall
 
 
 @pytest.mark.parametrize(("gain", "ended"), [(5.0, 0), (8.0, 1), (20.0, 1)])
 def test_effects_near_the_threshold_are_fitted_to_convergence_like_leaders(monkeypatch, gain, ended):
     """A name needs 12 nats; from half of them on the fit continues to convergence."""
-    score, asked = SimpleNamespace(gain=gain, is_reportable=True, family="a"), []
+    score, calls = SimpleNamespace(gain=gain, is_reportable=True, family="a"), []
     monkeypatch.setattr(
         refit, "shortlist", lambda *a: [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key="a"))]
     )
     monkeypatch.setattr(refit, "_score_task", lambda *a: score)
-    monkeypatch.setattr(refit, "refit_to_convergence", lambda *a: asked.append(a) or score)
+    monkeypatch.setattr(refit, "refit_to_convergence", lambda *a: calls.append(a) or score)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "_base_from_leader", lambda *a: None)
     plain = SimpleNamespace(candidates=())
     refit.score_candidates(Search(Bent(True)), plain, None)
-    assert len(asked) == ended
+    assert len(calls) == ended
 
 
 @pytest.mark.parametrize(("beside", "begun"), [((), ["a"]), (("a name",), [])])
@@ -111,19 +111,19 @@ def test_only_the_first_leader_of_a_first_effect_is_restarted(monkeypatch, besid
     """Of two leaders; beside a name the residual may be an error of the shape of that name."""
     scores = {f: SimpleNamespace(gain=g, is_reportable=True, family=f, fit=None) for f, g in (("a", 20.0), ("b", 19.0))}
     entries = [SimpleNamespace(rival=False, promise=0.0, candidate=SimpleNamespace(key=f)) for f in "ba"]
-    asked = []
+    calls = []
     monkeypatch.setattr(refit, "shortlist", lambda *a: entries)
     monkeypatch.setattr(refit, "_score_task", lambda search, fit, entry, *a: scores[entry.candidate.key])
     monkeypatch.setattr(refit, "_refit_equivalent_forms", lambda search, fit, ranked: ranked)
     monkeypatch.setattr(refit, "refit_to_convergence", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "at_best_position", lambda search, fit, s: s)
-    monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: asked.append(s.family) or s)
+    monkeypatch.setattr(refit, "restart_leader", lambda search, fit, s: calls.append(s.family) or s)
     monkeypatch.setattr(refit, "correct_for_leader", lambda search, fit, ranked: ranked)
     monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
     monkeypatch.setattr(refit, "_base_from_leader", lambda *a: None)
     plain = SimpleNamespace(candidates=beside)
     refit.score_candidates(Search(Bent(True)), plain, None)
-    assert asked == begun
+    assert calls == begun
 
 
 @pytest.mark.parametrize(("stall", "again"), [(20.0, True), (0.05, False)])
@@ -134,10 +134,10 @@ def test_the_missing_convergence_of_the_base_fit_is_no_evidence_for_an_effect(mo
     early, late = (fit_jointly(Bent(True), iterations=25, stall=s) for s in (stall, THRESHOLDS.fine_stall))
     owed = late.evidence - early.evidence
     assert (owed > MismatchSettings().threshold) == again
-    asked, prescreens, of_the_prescreen = [], [], ["entry"]
+    calls, prescreens, of_the_prescreen = [], [], ["entry"]
 
     def ranked(search, fit, prescreened):
-        asked.append(fit.evidence)
+        calls.append(fit.evidence)
         assert prescreened is of_the_prescreen
         debt = late.evidence - fit.evidence
         return [Score(SimpleNamespace(key=k), debt + g, 0.0, 1.0, late) for k, g in (("a", 20.0), ("b", 3.0))]
@@ -148,7 +148,7 @@ def test_the_missing_convergence_of_the_base_fit_is_no_evidence_for_an_effect(mo
     monkeypatch.setattr(refit, "_with_condition_gains", lambda search, fit, s: s)
     found, fit = refit.score_candidates(Search(Bent(True)), early)
     assert [s.gain for s in found] == pytest.approx([20.0, 3.0], abs=0.5)
-    assert len(asked) == 1 + again and fit.evidence == pytest.approx(asked[-1])
+    assert len(calls) == 1 + again and fit.evidence == pytest.approx(calls[-1])
     assert len(prescreens) == 1  # it does not depend on the fit without effects
     assert fit.evidence == pytest.approx(late.evidence, abs=0.5 if again else MismatchSettings().threshold)
 
@@ -179,13 +179,13 @@ def test_the_predicted_gain_of_a_step_is_its_gain_where_the_model_is_linear():
 
 
 def test_a_trial_has_the_cost_of_the_fit_without_its_last_derivatives(monkeypatch):
-    asked, jacobian = [], JointProblem.jacobian
-    monkeypatch.setattr(JointProblem, "jacobian", lambda self, *a: asked.append(1) or jacobian(self, *a))
+    calls, jacobian = [], JointProblem.jacobian
+    monkeypatch.setattr(JointProblem, "jacobian", lambda self, *a: calls.append(1) or jacobian(self, *a))
     case, at = Bent(False), {f"x{k}": 0.5 for k in range(12)}
     cost, values, _ = steps_from(case, (), np.zeros(0), at, 3)
-    assert len(asked) == 3  # where each of the three steps starts
+    assert len(calls) == 3  # where each of the three steps starts
     fit = fit_jointly(case, values=at, iterations=3)
-    assert (cost, values) == (fit.cost, fit.values) and len(asked) == 3 + 4
+    assert (cost, values) == (fit.cost, fit.values) and len(calls) == 3 + 4
 
 
 def test_a_trial_ends_early_only_if_its_steps_do_not_lead_to_the_target_cost():

@@ -242,10 +242,10 @@ class TrainAndImpacts(Case):
 
 
 def test_a_cause_at_two_positions_that_differs_between_impacts_is_located_between_them():
-    rng, shown = np.random.default_rng(5), np.arange(40) < 20
+    rng, is_changed = np.random.default_rng(5), np.arange(40) < 20
     y = 0.3 * rng.normal(size=(3, 40))
     y[0, :10] += 6.0 * rng.normal(size=10)  # the train shows a force at 0 alone
-    y[1:] += 6.0 * shown * rng.normal(size=(2, 40))
+    y[1:] += 6.0 * is_changed * rng.normal(size=(2, 40))
     case = TrainAndImpacts(y[0], y[1:])
     fit = fit_jointly(case)
     evidence = {(w.frame, w.level): w for w in weigh_spaces(case, fit, {"passage": 1.0, "hammer": 1.0})}

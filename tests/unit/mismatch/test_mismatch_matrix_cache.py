@@ -166,8 +166,8 @@ def test_the_derivative_of_a_casting_is_that_of_a_slightly_changed_one(name):
     for k, c in enumerate(pieces):
 
         def receptance(more, c=c):
-            mine = replace(c.piece.rail, **{name: getattr(c.piece.rail, name) * np.exp(more)})
-            other = track.with_(stretches=(*track.stretches, replace(c.piece, rail=mine)))
+            rail = replace(c.piece.rail, **{name: getattr(c.piece.rail, name) * np.exp(more)})
+            other = track.with_(stretches=(*track.stretches, replace(c.piece, rail=rail)))
             return ReceptanceModel(other, ()).receptance(10.7, 12.3)
 
         exact = (receptance(1e-3) - receptance(-1e-3)) / 2e-3

@@ -59,10 +59,10 @@ def test_no_effect_is_tested_more_than_a_bay_beyond_the_measured_range(lightly_d
     """Effects farther out cannot be distinguished from each other; they have values and no names."""
     case, _, _ = lightly_damped
     measured = case.campaign.positions()
-    asked = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
+    positions = [c.where["place"] for c in case.candidates if "sleeper" in c.where]
     free = case.predictor.track().support[list(case.predictor.zone.supports)]
-    assert min(asked) >= min(measured) - TRACK.effect_reach and max(asked) <= max(measured) + TRACK.effect_reach
-    assert free.min() < min(asked) and free.max() > max(asked)
+    assert min(positions) >= min(measured) - TRACK.effect_reach and max(positions) <= max(measured) + TRACK.effect_reach
+    assert free.min() < min(positions) and free.max() > max(positions)
     assert {"local_pad", "local_ballast", "hanging_sleeper"} <= {c.family for c in case.candidates}
 
 

@@ -37,11 +37,11 @@ def answer(*scores):
     return judge(list(scores), 2.0, MismatchSettings())
 
 
-@pytest.mark.parametrize("factor, said", [(0.05, "a_or_b"), (0.12, "a_or_b"), (0.40, "named")])
-def test_ballast_without_reaction_may_be_a_gap_that_no_train_closes(factor, said):
+@pytest.mark.parametrize("factor, expected", [(0.05, "a_or_b"), (0.12, "a_or_b"), (0.40, "named")])
+def test_ballast_without_reaction_may_be_a_gap_that_no_train_closes(factor, expected):
     ballast = score(candidate("local_ballast", limit_form="hanging_sleeper"), 600.0, factor, 0.1)
     verdict = answer(ballast, score(candidate("hanging_sleeper"), 500.0, 2e-3, 2e-4))
-    assert verdict.answer == said
+    assert verdict.answer == expected
     assert verdict.names[0] == "local_ballast"
 
 
@@ -87,28 +87,28 @@ def test_effects_of_the_leading_parts_are_refitted_from_their_best_starts():
     assert component_rivals(chosen[1:], scored) == []
 
 
-@pytest.mark.parametrize("behind, said", [(0.9, "a_or_b"), (1.1, "named")])
-def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, said):
+@pytest.mark.parametrize("behind, expected", [(0.9, "a_or_b"), (1.1, "named")])
+def test_a_rival_within_the_margin_is_one_also_below_the_threshold(behind, expected):
     """13 nats and 8 are odds of 150 to 1 between the two, for any evidence against the base model."""
     settings = MismatchSettings()
     best = settings.threshold + 1.0
     rival = best - behind * settings.margin
     pair = [score(candidate(n, {}), g, 2.0, 0.1) for n, g in (("clipping", best), ("wheel_flat", rival))]
-    assert judge(pair, 0.5, settings).answer == said
+    assert judge(pair, 0.5, settings).answer == expected
 
 
 @pytest.mark.parametrize(
-    "gain, excess, said", [(1.1, 0.9, "none"), (2.1, 0.9, "unknown"), (1.1, 1.2, "unknown"), (20.0, 0.5, "unknown")]
+    "gain, excess, expected", [(1.1, 0.9, "none"), (2.1, 0.9, "unknown"), (1.1, 1.2, "unknown"), (20.0, 0.5, "unknown")]
 )
-def test_a_weak_name_that_predicts_worse_has_the_answer_none_without_an_excess(gain, excess, said):
+def test_a_weak_name_that_predicts_worse_has_the_answer_none_without_an_excess(gain, excess, expected):
     """``gain`` in thresholds, ``excess`` over the control level: either one alone gives the answer unknown."""
     settings = MismatchSettings()
     found = score(candidate("rail_shear", {}), gain * settings.threshold, 2.0, 0.1)
-    assert judge([found], excess, settings, consistent=False).answer == said
+    assert judge([found], excess, settings, consistent=False).answer == expected
 
 
 @pytest.mark.parametrize(
-    "gain, worst, excess, said",
+    "gain, worst, excess, expected",
     [
         (1.4, -0.4, 0.5, "named"),
         (1.4, -0.6, 0.5, "none"),
@@ -117,16 +117,16 @@ def test_a_weak_name_that_predicts_worse_has_the_answer_none_without_an_excess(g
         (10.0, -2.1, 0.5, "unknown"),
     ],
 )
-def test_a_name_that_one_condition_contradicts_is_withdrawn(gain, worst, excess, said):
+def test_a_name_that_one_condition_contradicts_is_withdrawn(gain, worst, excess, expected):
     """``gain`` and ``worst`` in thresholds: a loss of half a threshold may be chance, a fifth of the gain is not."""
     settings = MismatchSettings()
     fit = SimpleNamespace(psi=np.array([2.0]), psi_se=np.array([0.1]), part=first)
     found = Score(candidate("rail_shear", {}), gain * settings.threshold, worst * settings.threshold, 1.0, fit)
-    assert judge([found], excess, settings).answer == said
+    assert judge([found], excess, settings).answer == expected
 
 
 @pytest.mark.parametrize(
-    "aside, scanned, sounding, gain, said",
+    "aside, scanned, sounding, gain, expected",
     [
         (30.0, 20, True, 50.0, "named"),
         (13.0, 20, True, 50.0, "unknown"),
@@ -137,7 +137,7 @@ def test_a_name_that_one_condition_contradicts_is_withdrawn(gain, worst, excess,
 )
 @pytest.mark.parametrize("explained", [0.08, -0.03])
 def test_a_name_with_separate_evidence_need_not_explain_the_residual_of_the_fit(
-    aside, scanned, sounding, gain, said, explained
+    aside, scanned, sounding, gain, expected, explained
 ):
     """Impacts once a turn are those of a flat, although the waveform in the band does not fit, which needs the angle to
     the millimetre: 30 nats less ln 20 exceed the threshold of 12, and 13 less ln 20 do not. A limit of a channel or a
@@ -147,7 +147,7 @@ def test_a_name_with_separate_evidence_need_not_explain_the_residual_of_the_fit(
     where = {"train": "railcar", "axle": 1}
     flat = candidate("wheel_flat", where, external_evidence=aside, n_scanned=scanned, evidence_suffices=sounding)
     verdict = answer(score(flat, gain, 0.08, 0.01, explained=explained))
-    assert verdict.answer == said and f"{100 * explained:.0f} %" in verdict.reason
+    assert verdict.answer == expected and f"{100 * explained:.0f} %" in verdict.reason
 
 
 def test_a_candidate_that_explains_too_little_is_no_leader_against_other_data():

@@ -39,8 +39,8 @@ class Waves(Case):
 
     def response(self, i, values, size, delay):
         shapes = SHAPES[i]
-        shown = 0.0 if i < 2 else size  # the reserved recordings do not show the effect
-        return values @ shapes[:-1] + shown * SHAPES[0, -1] + delay * SHAPES[-1, 0]
+        amplitude = 0.0 if i < 2 else size  # the reserved recordings do not show the effect
+        return values @ shapes[:-1] + amplitude * SHAPES[0, -1] + delay * SHAPES[-1, 0]
 
     def predict(self, values, terms, observations):
         size, waves = sum(t["size"] for t in terms), np.array([values[f"w{k}"] for k in range(N_VALUES)])

@@ -85,14 +85,14 @@ def test_numbers_of_a_route_without_trains_are_no_nuisances():
     assert len(RunningSurface(forked, WAVES, ("main",)).names) == len(SPREADS[NOSE]) + 1
 
 
-@pytest.mark.parametrize(("prior", "by", "said"), [(0.5, 0.2, True), (0.15, 0.7, True), (0.15, 0.2, False)])
-def test_a_value_is_reported_if_it_is_more_certain_than_in_the_file_or_differs_from_it(prior, by, said):
+@pytest.mark.parametrize(("prior", "by", "is_reported"), [(0.5, 0.2, True), (0.15, 0.7, True), (0.15, 0.2, False)])
+def test_a_value_is_reported_if_it_is_more_certain_than_in_the_file_or_differs_from_it(prior, by, is_reported):
     """An error of 10 % and 3 % of the fit: a prior of 15 % is nearly as good, but a logarithm of 0.7 is another
     nose."""
     surface = RunningSurface(replace(FILED, spreads={NOSE: {"share": prior}}), WAVES, ("main",))
     case = SimpleNamespace(nuisances=surface.nuisances())
     fit = SimpleNamespace(values={surface.names[0]: by}, covariance=np.array([[0.03**2]]), jacobian=[])
-    assert bool(list(surface.estimate(case, fit))) is said
+    assert bool(list(surface.estimate(case, fit))) is is_reported
 
 
 def test_a_reported_value_is_the_measured_one_without_the_prior():
@@ -101,22 +101,22 @@ def test_a_reported_value_is_the_measured_one_without_the_prior():
     weights = np.array([0.2, 0.5]) ** -2.0
     values = {surface.names[0]: 0.3 * weights[0] / weights.sum()}
     fit = SimpleNamespace(values=values, covariance=np.array([[1.0 / weights.sum()]]), jacobian=[])
-    (told,) = surface.estimate(SimpleNamespace(nuisances=surface.nuisances()), fit)
-    assert told["value"] == pytest.approx(NOSE.length * np.exp(0.3))
-    assert told["se"] == pytest.approx(told["value"] * np.hypot(0.2, SURFACE.model_error))
+    (estimate,) = surface.estimate(SimpleNamespace(nuisances=surface.nuisances()), fit)
+    assert estimate["value"] == pytest.approx(NOSE.length * np.exp(0.3))
+    assert estimate["se"] == pytest.approx(estimate["value"] * np.hypot(0.2, SURFACE.model_error))
 
 
 def test_the_search_for_the_nose_uses_no_held_out_recording(monkeypatch):
-    heard = []
+    calls = []
     monkeypatch.setattr(
-        passage_alignment.PassageAligner, "correlation", lambda self, values, passage: heard.append(passage.name) or 0.5
+        passage_alignment.PassageAligner, "correlation", lambda self, values, passage: calls.append(passage.name) or 0.5
     )
     passages = [SimpleNamespace(name=name, vehicle=SimpleNamespace(wheels=range(4))) for name in "abc"]
     campaign = SimpleNamespace(passages=passages, reserved=("a",), sensors_of=lambda p: ("A1",))
     surface = RunningSurface(FILED, WAVES, ("main",))
     aligner = passage_alignment.PassageAligner(campaign, SimpleNamespace(surface=surface))
     passage_alignment.fit_surface(aligner, {})
-    assert set(heard) == {"b", "c"}
+    assert set(calls) == {"b", "c"}
 
 
 def number(value, unit, prior=None):
@@ -176,17 +176,17 @@ def test_a_nose_within_its_prior_is_estimated_and_leaves_the_residual_of_an_inta
     """Position, depth and length of the true nose are within two standard errors. With certain numbers of the file the
     residual of the same recordings is five times as large, and the answer is a dip."""
     fit = fit_jointly(case, iterations=15)
-    told = {(t["term"], t["name"]): t for t in surface_estimates(case, fit)}
+    estimates = {(t["term"], t["name"]): t for t in surface_estimates(case, fit)}
     for field in ("place", "depth", "length"):
-        t = told["running_surface_kink", field]
+        t = estimates["running_surface_kink", field]
         assert abs(t["value"] - getattr(TRUE, field)) < 2.0 * t["se"]
-    depth = told["running_surface_kink", "depth"]
+    depth = estimates["running_surface_kink", "depth"]
     half = 0.5 * SPREADS[NOSE]["depth"] * NOSE.depth  # of the uncertainty in the file
     assert depth["filed"] == NOSE.depth and depth["se"] < half
     assert (
         "running_surface_dip",
         "depth",
-    ) not in told  # 3.5 m before the free waves: no recording depends on its depth
+    ) not in estimates  # 3.5 m before the free waves: no recording depends on its depth
     fit_of_the_file = fit_jointly(certain, iterations=15)
     assert fit_of_the_file.level["passage"] > 5.0 * fit.level["passage"]
     assert fit.level["passage"] < case.control_level["passage"]

@@ -126,8 +126,8 @@ def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp)
     case = Shapes(("wave", "twin"), component="spring", wave=wave, ramp=ramp)
     case.candidates += Shapes(("ramp",)).candidates
     found = diagnose(case)
-    said = {v.answer: set(v.names) for v in found.verdicts}
-    assert said == {"a_or_b": {"wave", "twin"}, "named": {"ramp"}}
+    names_by_answer = {v.answer: set(v.names) for v in found.verdicts}
+    assert names_by_answer == {"a_or_b": {"wave", "twin"}, "named": {"ramp"}}
     sizes = dict(zip((c.family for c in found.fit.candidates), found.fit.psi))
     assert sizes["ramp"] == pytest.approx(ramp, abs=0.06)  # three standard errors or more
 
@@ -135,7 +135,7 @@ def test_an_effect_beside_two_forms_of_another_is_found(monkeypatch, wave, ramp)
 class Trains(Shapes):
     """Two trains with a wave each, of twenty times the noise; ``told``: whether candidates name their train."""
 
-    def __init__(self, told):
+    def __init__(self, has_trains):
         super().__init__(())
         rng, self.of = np.random.default_rng(12), {"o0": "a", "o1": "b", "o2": "a", "o3": "b"}
         self.observations = tuple(
@@ -143,7 +143,9 @@ class Trains(Shapes):
             for name in self.of
         )
         self.candidates = tuple(
-            Candidate.of("wave", AMOUNT, lambda p, t=t: (t, p["amount"]), ((0.5,),), {"train" if told else "part": t})
+            Candidate.of(
+                "wave", AMOUNT, lambda p, t=t: (t, p["amount"]), ((0.5,),), {"train" if has_trains else "part": t}
+            )
             for t in "ab"
         )
 
@@ -151,12 +153,12 @@ class Trains(Shapes):
         return [sum(a * SHAPES["wave"] for t, a in terms if t == self.of[o.name]) + 0.0 * X for o in observations]
 
 
-@pytest.mark.parametrize("told, names", [(True, ("wave", "wave")), (False, ())])
-def test_wheels_of_two_trains_confirm_one_another(told, names):
+@pytest.mark.parametrize("has_trains, names", [(True, ("wave", "wave")), (False, ())])
+def test_wheels_of_two_trains_confirm_one_another(has_trains, names):
     """No recording shows both. Two of one kind that may act on the same recordings do not confirm each other."""
-    found = diagnose(Trains(told))
+    found = diagnose(Trains(has_trains))
     assert found.names == names
-    if told:
+    if has_trains:
         assert {c.where["train"] for c in found.fit.candidates} == {"a", "b"}
 
 
@@ -174,7 +176,7 @@ GAP = (
 
 
 @pytest.mark.parametrize(
-    "seated, nats, said",
+    "seated, nats, names",
     [
         (0.33, 93.9, ("local_ballast",)),
         (
@@ -187,15 +189,15 @@ GAP = (
         (0.33, 107.0, ("hanging_sleeper",)),
     ],
 )
-def test_a_gap_and_softer_ballast_of_equal_probability_are_a_choice(seated, nats, said):
+def test_a_gap_and_softer_ballast_of_equal_probability_are_a_choice(seated, nats, names):
     """A third of the ballast bears, and no train closes the gap: the same response as ballast of a third."""
     here = {"sleeper": 7, "place": 4.2}
     ballast = Candidate.of("local_ballast", FACTOR, lambda p: p, ((0.4,),), here)
     gap = Candidate.of("hanging_sleeper", GAP, lambda p: p, ((1e-3, 0.0),), here, simpler_form=("local_ballast", 1))
     scores = [score_of_candidate(gap, [3e-3, seated], [1e-3, 0.03], nats), score_of_candidate(ballast, [0.35], [0.04])]
     verdict = judge(scores, 2.0, MismatchSettings())
-    assert verdict.names == said
-    assert verdict.scores[0].family == said[0]  # whose fit and position are stated
+    assert verdict.names == names
+    assert verdict.scores[0].family == names[0]  # whose fit and position are stated
 
 
 def test_the_size_of_an_effect_with_two_amplitudes_is_that_of_both():
@@ -208,8 +210,8 @@ def test_the_size_of_an_effect_with_two_amplitudes_is_that_of_both():
     assert not score_of_candidate(hum, [0.3, 0.38], [0.01, 0.01]).is_reportable
 
 
-@pytest.mark.parametrize("error, told", [(1.0, True), (4.0, False)])
-def test_a_mass_that_may_be_negligible_is_not_named(error, told):
+@pytest.mark.parametrize("error, is_reportable", [(1.0, True), (4.0, False)])
+def test_a_mass_that_may_be_negligible_is_not_named(error, is_reportable):
     """8 kg, with a smallest reported mass of 5 kg: certain by three standard errors, or uncertain."""
     mass = (Parameter("mass", "kg", 0.0, (0.0, 200.0), "what hangs there", "made up 2026"),)
     hung = Candidate.of(
@@ -221,7 +223,7 @@ def test_a_mass_that_may_be_negligible_is_not_named(error, told):
         smallest_reportable=5.0,
         min_significance=1.0,
     )
-    assert score_of_candidate(hung, [8.0], [error]).is_reportable == told
+    assert score_of_candidate(hung, [8.0], [error]).is_reportable == is_reportable
 
 
 @pytest.mark.parametrize("whole, share", [(False, 1.0 / 3.0), (True, 1.0)])
@@ -345,13 +347,13 @@ def test_an_effect_that_keeps_its_gain_beside_the_leader_is_no_rival(left, answe
     assert stands is (answer == "named") and len(found.verdicts) == 1 + stands
 
 
-@pytest.mark.parametrize("promised, scouted, asked", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
-def test_a_second_effect_with_half_of_the_threshold_in_impacts_alone_is_refitted(promised, scouted, asked):
+@pytest.mark.parametrize("promised, scouted, required", [(7.0, 7.0, 6.0), (7.0, 5.0, 12.0)])
+def test_a_second_effect_with_half_of_the_threshold_in_impacts_alone_is_refitted(promised, scouted, required):
     """Trains add evidence: a soft rail of 12 nats in impacts had 20 in total. The predicted gain of a column is that of
     all recordings and has to reach the threshold; a first effect is refitted from 2 nats on."""
     settings, candidate = MismatchSettings(), Candidate.of("soft_rail", AMOUNT, tuple, ((0.5,),))
     entry, beside = Entry(promised, candidate, np.array([0.5]), {}), SimpleNamespace(candidates=("pad",))
-    assert required_promise(entry, beside, {candidate.key: scouted}, settings) == asked
+    assert required_promise(entry, beside, {candidate.key: scouted}, settings) == required
     assert required_promise(entry, SimpleNamespace(candidates=()), {candidate.key: scouted}, settings) == 2.0
 
 
@@ -360,10 +362,10 @@ def test_the_evidence_of_a_row_has_an_entry_for_each_verdict():
     first, second = (Verdict("named", (n,), "A", p, reason=r) for n, p, r in rows)
     lacking = SimpleNamespace(effect="c", words="what c changes", lack="passages", measurement="passages")
     case = SimpleNamespace(unmet_requirements=(lacking,))
-    said = _evidence(SimpleNamespace(verdicts=(first, second), frames=()), case)
-    assert [u["effect"] for u in said["not_examined"]] == ["c"]
-    assert (said["term"], said["probability"], said["reason"]) == ("a", 0.97, "x")
-    assert [(e["term"], e["probability"], e["reason"]) for e in said["beside"]] == [("b", 0.7, "y")]
+    evidence = _evidence(SimpleNamespace(verdicts=(first, second), frames=()), case)
+    assert [u["effect"] for u in evidence["not_examined"]] == ["c"]
+    assert (evidence["term"], evidence["probability"], evidence["reason"]) == ("a", 0.97, "x")
+    assert [(e["term"], e["probability"], e["reason"]) for e in evidence["beside"]] == [("b", 0.7, "y")]
 
 
 def test_a_first_name_without_a_gain_beside_the_second_is_withdrawn():
@@ -379,8 +381,8 @@ def test_a_first_name_without_a_gain_beside_the_second_is_withdrawn():
     assert found.fit.psi == pytest.approx([2.5, 2.5], abs=0.15)
 
 
-@pytest.mark.parametrize("ripple, said", [(0.0, "named"), (3.0, "unknown")])
-def test_a_second_name_that_remains_alone_has_to_explain_the_residual(ripple, said):
+@pytest.mark.parametrize("ripple, answer", [(0.0, "named"), (3.0, "unknown")])
+def test_a_second_name_that_remains_alone_has_to_explain_the_residual(ripple, answer):
     """Beside a bowl that was named first it had not to: the ripple could have been an error of the shape of the
     bowl."""
     case = Shapes(("ramp", "bowl"), ramp=2.5, ripple=ripple)
@@ -391,8 +393,8 @@ def test_a_second_name_that_remains_alone_has_to_explain_the_residual(ripple, sa
     ]
     verdicts = tuple(replace(v, posterior={v.names[0]: 0.9, "unknown": 0.1}) for v in verdicts)
     found = settle_pair(Findings(Search(case), fit_jointly(case), fit, verdicts))
-    assert [v.answer for v in found.verdicts] == [said]
-    assert len(found.fit.candidates) == (said == "named")
+    assert [v.answer for v in found.verdicts] == [answer]
+    assert len(found.fit.candidates) == (answer == "named")
 
 
 @pytest.mark.parametrize("reserved, left", [(0.0, ("ramp",)), (0.55, ("ramp", "bowl")), (1.0, ("ramp", "bowl"))])
@@ -411,8 +413,8 @@ def test_a_second_name_that_reserved_recordings_contradict_is_withdrawn(reserved
     assert ("bowl" in found.verdicts[0].reason) is (len(left) == 1)
 
 
-@pytest.mark.parametrize("last, grade, said", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
-def test_an_effect_that_has_to_explain_everything_has_no_name_if_an_excess_remains(last, grade, said):
+@pytest.mark.parametrize("last, grade, n_named", [("ramp", "A", 2), ("ramp", "B", 1), ("", "B", 2)])
+def test_an_effect_that_has_to_explain_everything_has_no_name_if_an_excess_remains(last, grade, n_named):
     """A drifting clock can imitate many other effects in its channel: as first or second name it has to explain all."""
     rules = {name: NamingRules(must_reach_control_level=name == last) for name in ("bowl", "ramp")}
     pair = [replace(c, naming=rules[c.family]) for c in Shapes(("bowl", "ramp")).candidates]
@@ -425,11 +427,11 @@ def test_an_effect_that_has_to_explain_everything_has_no_name_if_an_excess_remai
         Verdict("named", (c.family,), "", 0.97, dict(posterior), (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair
     )
     found = grade_names(Findings(Search(case), base, fit, verdicts))
-    assert [v.grade for v in found.verdicts] == ([grade, grade] if said == 2 else [""])
-    assert found.fit is (fit if said == 2 else base)
+    assert [v.grade for v in found.verdicts] == ([grade, grade] if n_named == 2 else [""])
+    assert found.fit is (fit if n_named == 2 else base)
     first = found.verdicts[0]
-    assert said == 2 or (first.answer == "unknown" and "ramp can imitate many other effects" in first.reason)
-    assert said == 2 or "must_reach_control_level" in first.trail
+    assert n_named == 2 or (first.answer == "unknown" and "ramp can imitate many other effects" in first.reason)
+    assert n_named == 2 or "must_reach_control_level" in first.trail
 
 
 @pytest.mark.parametrize("ripple, answer", [(0.0, "named"), (0.12, "unknown")])

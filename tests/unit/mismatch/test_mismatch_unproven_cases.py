@@ -36,11 +36,11 @@ class Bent(Case):
 
 
 @pytest.mark.parametrize(
-    ("reservation", "asked", "answer"),
+    ("reservation", "is_requested", "answer"),
     [("", False, "named"), (RESERVATION, False, "unknown"), (RESERVATION, True, "named")],
 )
-def test_a_name_is_withheld_if_the_diagnosis_is_not_proven(reservation, asked, answer):
-    found = diagnose(Bent(1.0, reservation), MismatchSettings(unproven_names=asked))
+def test_a_name_is_withheld_if_the_diagnosis_is_not_proven(reservation, is_requested, answer):
+    found = diagnose(Bent(1.0, reservation), MismatchSettings(unproven_names=is_requested))
     assert found.verdict.answer == answer
     assert found.names == (("bend",) if answer == "named" else ())
     if answer == "unknown":

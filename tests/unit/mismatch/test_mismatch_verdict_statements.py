@@ -219,11 +219,11 @@ def test_a_limit_of_a_channel_is_found_from_any_start_of_the_library():
     )
 
 
-@pytest.mark.parametrize("whole, asked", [(6.2, True), (13.0, True), (14.0, False), (586.6, False)])
-def test_no_candidate_limit_of_a_channel_is_below_its_peaks(whole, asked):
+@pytest.mark.parametrize("whole, is_limit", [(6.2, True), (13.0, True), (14.0, False), (586.6, False)])
+def test_no_candidate_limit_of_a_channel_is_below_its_peaks(whole, is_limit):
     """12.4 in the band are not exceeded; 0.9 of 13 is below that, 0.9 of 14 is not."""
     found = _limits_of(SimpleNamespace(name="A", place=3.0), 6.2, whole)
-    assert bool(found) == asked
+    assert bool(found) == is_limit
     assert all(0.9 * whole <= start[0] <= 12.4 for c in found for start in c.starts)
 
 

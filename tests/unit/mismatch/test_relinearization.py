@@ -114,15 +114,15 @@ def history(monkeypatch):
         cases = {f"{2020 + k}-01-01": Valleys(length, 0.5, seed=k) for k, length in enumerate(lengths)}
         fits = {day: fit_from(case, valley) for (day, case), valley in zip(cases.items(), valleys)}
         visits = [visit_of(day, cases[day], fits[day]) for day in cases]
-        asked = []
+        calls = []
 
         def fitted_groups(day):
-            asked.append(day)
+            calls.append(day)
             return [FittedGroup(cases[day], fits[day].without_jacobian(), SHARED, "S1", "main")]
 
         parameters = [replace(p, walk_sd=0.01) for p in SHARED.values()]
         result = agreeing_visits(parameters, visits, (), fitted_groups, {} if store is None else store, 12.0)
-        return SimpleNamespace(before=visits, after=result, asked=asked)
+        return SimpleNamespace(before=visits, after=result, asked=calls)
 
     return of
 

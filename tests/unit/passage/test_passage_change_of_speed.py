@@ -51,7 +51,7 @@ def test_a_freight_train_without_a_template_that_changes_its_speed_is_recognized
 def test_exact_times_of_a_train_that_changes_its_speed_give_speed_and_acceleration(acceleration, settings):
     """138 m, at 9 m/s at first and a fifth faster or two fifths slower at the end: slowness and distance are curved."""
     times = passing_times(FREIGHT[:28], PLACES, 9.0, acceleration, 1, 3.0)
-    heard = SimpleNamespace(positions=np.array(PLACES))
-    speed, se, found, _, at = _sensor_speed(times, heard, 1, settings.place_error, settings)
+    sensors = SimpleNamespace(positions=np.array(PLACES))
+    speed, se, found, _, at = _sensor_speed(times, sensors, 1, settings.place_error, settings)
     assert speed == pytest.approx(9.0 + acceleration * (at - 3.0), rel=1e-4) and se < 2e-3 * speed
     assert found == pytest.approx(acceleration, rel=5e-3)  # the prior reduces the estimate slightly

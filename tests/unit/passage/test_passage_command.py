@@ -40,12 +40,12 @@ def command_result(folder_with_link, samples, capsys):
 
 
 @pytest.mark.parametrize(
-    ("broken", "said"),
+    ("broken", "expected"),
     [(None, "no_train: nothing stands out of the noise"), (np.nan, "1 of 20000 samples are missing or not finite")],
 )
-def test_a_file_without_a_train_is_reported_with_exit_code_1(folder_with_link, capsys, broken, said):
+def test_a_file_without_a_train_is_reported_with_exit_code_1(folder_with_link, capsys, broken, expected):
     samples = np.random.default_rng(7).normal(0.0, 0.1, 20000)
     if broken is not None:
         samples[7] = broken
     code, printed = command_result(folder_with_link, samples, capsys)
-    assert code == 1 and said in printed
+    assert code == 1 and expected in printed

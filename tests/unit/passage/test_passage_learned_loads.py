@@ -118,17 +118,17 @@ def test_the_stated_error_of_a_load_includes_an_error_common_to_all_sensors(comm
 
     def train(load, speed):
         shared = common * rng.standard_normal()
-        heard = {n: load * (speed / 35.0) ** 2 * np.exp(shared + own * rng.standard_normal()) for n in names}
-        return {"load": load, "speed": speed, "amplitudes": {n: (a, 1e-4 * a) for n, a in heard.items()}}
+        amplitudes = {n: load * (speed / 35.0) ** 2 * np.exp(shared + own * rng.standard_normal()) for n in names}
+        return {"load": load, "speed": speed, "amplitudes": {n: (a, 1e-4 * a) for n, a in amplitudes.items()}}
 
     off = []
     for _ in range(200):
         trains = [train(rng.uniform(8, 22), rng.uniform(25, 45)) for _ in range(30)]
         columns = [[t[key] for t in trains] for key in ("load", "speed")]
         made = {n: calibrate([t["amplitudes"][n][0] for t in trains], *columns) for n in names}
-        heard = {n: a for n, (a, _) in train(15.0, 33.0)["amplitudes"].items()}
+        amplitudes = {n: a for n, (a, _) in train(15.0, 33.0)["amplitudes"].items()}
         recording = SimpleNamespace(channels=[SimpleNamespace(name=n, position=0.0) for n in names],
-                                    signal=heard.get, rate=1.0)  # fmt: skip
+                                    signal=amplitudes.get, rate=1.0)  # fmt: skip
         passage = Passage("accepted", (), Motion(33.0), at_sensor=dict.fromkeys(names))
         found = axle_load(recording, passage, with_error_correlation(made, trains), settings)
         off.append((found.mean - 15.0) / found.se)
@@ -175,8 +175,8 @@ def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypa
         "turnout.registry.database.open_registry", lambda path: connection_of(np.random.default_rng(1), 60)
     )
     assert main(["trains", "--turnouts", "tommerup_s1", "--raw", str(raw)]) == 0
-    said = capsys.readouterr().out
-    assert "tommerup_s1: 6 trains of known weight, 10.0 to 19.0 t per axle" in said
-    assert re.search(r" load of one train ± [\d.]+ % \(sd\), amplitude with speed to the power", said)
-    assert "clusters, version 1:" in said
+    output = capsys.readouterr().out
+    assert "tommerup_s1: 6 trains of known weight, 10.0 to 19.0 t per axle" in output
+    assert re.search(r" load of one train ± [\d.]+ % \(sd\), amplitude with speed to the power", output)
+    assert "clusters, version 1:" in output
     assert json.loads((tmp_path / "config" / "passages" / "loads.json").read_text())["tommerup_s1"]

@@ -48,14 +48,14 @@ def test_the_signal_beyond_a_row_is_compared_with_the_row(speed, direction):
     """Amplitude 2 along 60 m and 1.1, 1.3 or 1.45 over 40 m beyond it, quiet level 0.3: shares 0.47, 0.59 and 0.68."""
     step, motion, place = 0.01, Motion(speed, 4.0, 0.0, direction), 17.0
     way = motion.distance((np.arange(3000) + 0.5) * step) - direction * place
-    for beyond, told in ((1.1, False), (1.3, False), (1.45, True)):
+    for beyond, is_cut_off in ((1.1, False), (1.3, False), (1.45, True)):
         for first, last in ((60.0, 100.0), (-40.0, 0.0)):
             amplitude = np.full((1, way.size), 0.3)
             amplitude[0, (way > 0) & (way < 60.0)] = 2.0
             amplitude[0, (way > first) & (way < last)] = beyond
             levels = SimpleNamespace(amplitude=amplitude, step=step)
-            heard = SimpleNamespace(levels=levels, positions=np.array([place]))
-            assert continues_beyond(heard, motion, 0.0, 60.0) is told
+            envelopes = SimpleNamespace(levels=levels, positions=np.array([place]))
+            assert continues_beyond(envelopes, motion, 0.0, 60.0) is is_cut_off
 
 
 def test_sensors_of_the_neighbouring_track_are_not_used_beside_one_sensor_of_the_train():

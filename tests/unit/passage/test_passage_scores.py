@@ -142,9 +142,9 @@ def test_wheels_that_the_end_of_the_record_cuts_off_are_left_out(settings):
 def test_a_wheel_before_the_start_of_the_record_is_left_out_alone(settings):
     """All impacts 8 ms before the detected axles, the first of which is 6 ms into the record."""
     passage = impact_record(np.random.default_rng(19), "CP A7")
-    heard = passage.times / RATE + 0.008
-    cut = round((heard[0] - 0.006) * RATE)
-    fit = fit_channel(passage.samples[cut:], RATE, heard - cut / RATE, 44.4, paper_model("CP A7"), settings)
+    arrivals = passage.times / RATE + 0.008
+    cut = round((arrivals[0] - 0.006) * RATE)
+    fit = fit_channel(passage.samples[cut:], RATE, arrivals - cut / RATE, 44.4, paper_model("CP A7"), settings)
     assert fit.status == "accepted" and fit.times.size == passage.times.size - 1
 
 
@@ -153,13 +153,13 @@ def test_amplitudes_scatter_by_their_standard_errors(settings):
     fourteenth of the noise's power, whose density there decides: errors from its rms alone are 3.7 times too small."""
     passage = impact_record(np.random.default_rng(20), "CP A7", snr_db=120.0, start=1.2)
     rng, level = np.random.default_rng(21), 0.04 * np.abs(passage.clean).max()
-    found, said = [], []
+    found, stated_errors = [], []
     for _ in range(60):
         noisy = passage.clean + level * rng.standard_normal(passage.clean.size)
         fit = fit_channel(noisy, RATE, passage.times / RATE, 44.4, paper_model("CP A7"), settings, with_null=False)
         found.append(fit.amplitudes)
-        said.append(fit.amplitudes_se)
-    ratio = np.sqrt(np.mean(np.var(found, axis=0, ddof=1)) / np.mean(np.square(said)))
+        stated_errors.append(fit.amplitudes_se)
+    ratio = np.sqrt(np.mean(np.var(found, axis=0, ddof=1)) / np.mean(np.square(stated_errors)))
     assert ratio == pytest.approx(1.0, abs=0.2)  # the filter has no sharp edges, and times are found again
 
 

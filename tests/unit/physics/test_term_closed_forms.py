@@ -205,10 +205,10 @@ def test_a_stretch_with_four_times_the_stiffness_is_a_softer_spring_by_the_winkl
 def test_channels_have_the_transfer_function_of_the_textbook(term, frequency, expected):
     assert np.isclose(term.transfer(np.array([frequency]))[0], expected, atol=0.0, rtol=1e-12)
     t = np.arange(20000) / 20e3
-    shown = term.channel(np.sin(2.0 * np.pi * frequency * t), 20e3, A)[6000:14000]
+    output = term.channel(np.sin(2.0 * np.pi * frequency * t), 20e3, A)[6000:14000]
     inside = t[6000:14000]
     wave = abs(expected) * np.sin(2.0 * np.pi * frequency * inside + np.angle(expected))
-    assert np.max(np.abs(shown - wave)) < 0.02 * abs(expected)  # the rest of the initial transient
+    assert np.max(np.abs(output - wave)) < 0.02 * abs(expected)  # the rest of the initial transient
     other = np.ones(10)
     assert term.channel(other, 20e3, Sensor("B", 12.0)) is other
 
@@ -216,21 +216,21 @@ def test_channels_have_the_transfer_function_of_the_textbook(term, frequency, ex
 def test_a_sine_clipped_at_half_its_peak_keeps_its_fundamental():
     """First harmonic of a clipped sine: (2/π)(asin c + c sqrt(1 - c²)) with c = 1/2 is 0.6090."""
     t = np.arange(20000) / 20e3
-    shown = physics.Clipping("A", 0.5).channel(np.sin(2.0 * np.pi * 50.0 * t), 20e3, A)
-    first = 2.0 * np.mean(shown * np.sin(2.0 * np.pi * 50.0 * t))
+    output = physics.Clipping("A", 0.5).channel(np.sin(2.0 * np.pi * 50.0 * t), 20e3, A)
+    first = 2.0 * np.mean(output * np.sin(2.0 * np.pi * 50.0 * t))
     assert first == pytest.approx(2.0 / np.pi * (np.pi / 6.0 + 0.5 * np.sqrt(0.75)), rel=1e-4)
 
 
 def test_a_fast_clock_shows_a_line_at_a_higher_frequency():
     t = np.arange(40000) / 20e3
-    shown = physics.ClockDrift("A", 5e-3).channel(np.sin(2.0 * np.pi * 200.0 * t), 20e3, A)
-    spectrum = np.abs(np.fft.rfft(shown[:38000] * np.hanning(38000), 1 << 20))
+    output = physics.ClockDrift("A", 5e-3).channel(np.sin(2.0 * np.pi * 200.0 * t), 20e3, A)
+    spectrum = np.abs(np.fft.rfft(output[:38000] * np.hanning(38000), 1 << 20))
     assert np.argmax(spectrum) * 20e3 / (1 << 20) == pytest.approx(201.0, abs=0.05)
 
 
 def test_hum_has_its_stated_amplitude():
-    shown = physics.Hum("A", 3.0, 4.0).channel(np.zeros(20000), 20e3, A)
-    assert np.sqrt(2.0 * np.mean(shown**2)) == pytest.approx(5.0, rel=1e-6)
+    output = physics.Hum("A", 3.0, 4.0).channel(np.zeros(20000), 20e3, A)
+    assert np.sqrt(2.0 * np.mean(output**2)) == pytest.approx(5.0, rel=1e-6)
     assert "5 m/s²" in physics.Hum("A", 3.0, 4.0).sentence()
 
 

@@ -128,17 +128,17 @@ def test_a_wrong_gain_is_listed_if_its_interval_excludes_1_and_the_finding_is_cu
 
 def test_tamping_does_not_end_a_finding_of_a_sensor(fleet):
     """Tamping ends findings of the ballast; a gain of 0.5 stays a gain of 0.5."""
-    asked = "select channel, gain from sensors_with_wrong_gain where turnout_id = 't11'"
-    assert fleet.execute(asked).fetchall() == [("A7", 0.5)]
+    query = "select channel, gain from sensors_with_wrong_gain where turnout_id = 't11'"
+    assert fleet.execute(query).fetchall() == [("A7", 0.5)]
 
 
 def test_a_finding_ends_when_each_of_its_sections_has_a_later_finding(fleet):
     """The sections of visits differ: A9 of t12 has no later finding, all sections of t13 have one."""
-    asked = "select sections, verdict from findings_newest where turnout_id = ? order by all"
-    assert fleet.execute(asked, ["t12"]).fetchall() == [
+    query = "select sections, verdict from findings_newest where turnout_id = ? order by all"
+    assert fleet.execute(query, ["t12"]).fetchall() == [
         ("A7, A8, A9", "unknown"), ("A8", "none"), ("OT, SP", "named"), ("SP", "none"),
     ]  # fmt: skip
-    assert fleet.execute(asked, ["t13"]).fetchall() == [
+    assert fleet.execute(query, ["t13"]).fetchall() == [
         ("A7, A9, AS", "none"), ("A8", "none"), ("OT", "none"), ("SP", "none"),
     ]  # fmt: skip
     grown = fleet.execute(
@@ -232,8 +232,8 @@ def test_a_growing_gap_has_dates_at_which_it_reaches_its_limit(fleet):
     assert "t5" not in rows.index and "t3" not in rows.index  # one visit; repaired
     near = fleet.execute("select turnout_id, forecast from growth_to_limit(size_limit := 0.0008)").fetchall()
     assert ("t1", "reached") in near
-    asked = "select forecast, not_before_utc from growth_to_limit(size_limit := 0.0009) where turnout_id = 't1'"
-    assert fleet.execute(asked).fetchall() == [("open", None)]
+    query = "select forecast, not_before_utc from growth_to_limit(size_limit := 0.0009) where turnout_id = 't1'"
+    assert fleet.execute(query).fetchall() == [("open", None)]
 
 
 def test_the_page_has_dates_only_for_significant_growth(fleet):

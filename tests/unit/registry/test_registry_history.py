@@ -95,14 +95,14 @@ def test_an_earlier_generation_can_be_queried_by_number_and_by_time(merged):
         time = start + timedelta(hours=number)
         path.rename(path.with_name(f"{number:06d}-{time.strftime(TIME_FORMAT)}.json"))
     assert [count_as_of(merged.registry, number) for number in (1, 2, 3, 4)] == [1, 2, 3, 3]
-    asked = (
+    times = (
         "2026-11-24T07:00",
         "2026-11-24T08:59:59",
         datetime(2026, 11, 24, 9),
         "2026-11-24 12:30+02:00",
         "2027-01-01",
     )
-    assert [count_as_of(merged.registry, time) for time in asked] == [1, 2, 3, 3, 3]
+    assert [count_as_of(merged.registry, time) for time in times] == [1, 2, 3, 3, 3]
     with open_registry(merged.registry, as_of=2) as connection:
         assert connection.execute("select generation, n_files from registry_info").fetchall()[0][0] == 2
         assert connection.execute("select published_at()::varchar").fetchall() == [("2026-11-24 00:00:00",)]

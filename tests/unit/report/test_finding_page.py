@@ -323,8 +323,8 @@ def test_the_sentence_states_the_gain_or_the_wrong_polarity_of_a_sensor(gain, ex
 
 def test_a_rejected_effect_is_not_offered_for_acceptance():
     """The answer unknown may contain a tested effect: the page states that it is rejected."""
-    shown = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
-    assert "with the rejected effect" in shown and "with the effect" not in shown and "--accept" not in shown
+    text = page(finding("unknown", term_json=json.dumps([GAP]), fit_after_pct=26.0))
+    assert "with the rejected effect" in text and "with the effect" not in text and "--accept" not in text
     assert "base model with the effect" in page(named()) and "--accept" in page(named())
 
 

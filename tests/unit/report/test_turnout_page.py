@@ -110,8 +110,8 @@ def test_many_rows_of_a_dead_sensor_do_not_hide_other_rows_of_the_quarantine():
     rows = [row for row in rows if row not in remarks]
     text = page(quarantine=rows)
     assert "t/passages/00999.tdms" in text and "t/hammer/A7.uff" in text and text.count("00999.tdms") == 1
-    shown = text.count("<td>dead_channel</td>")
-    assert shown < 50 and f"and {1000 - shown} more of dead_channel" in text and "more of truncated" not in text
+    n_rows = text.count("<td>dead_channel</td>")
+    assert n_rows < 50 and f"and {1000 - n_rows} more of dead_channel" in text and "more of truncated" not in text
 
 
 def test_collapsed_parts_are_printed():

@@ -102,7 +102,7 @@ def test_a_body_without_support_is_rejected():
 
 
 @pytest.mark.parametrize(
-    ("build", "said"),
+    ("build", "expected"),
     [
         (lambda: Track(TRACK.rail, [0.0, 2.0, 1.0], 1e8, 0.0, layers=1), "rising positions"),
         (lambda: assemble(TRACK).weights(99.0), "outside the track"),
@@ -127,13 +127,13 @@ def test_a_body_without_support_is_rejected():
         (lambda: load_track("nowhere"), "Write one of tommerup"),
     ],
 )
-def test_errors_about_other_bad_input_state_what_is_wrong(build, said):
-    with pytest.raises(SimulationError, match=said):
+def test_errors_about_other_bad_input_state_what_is_wrong(build, expected):
+    with pytest.raises(SimulationError, match=expected):
         build()
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         ("mass: {value: 3, unit: kg}", "a number without source"),
         ("mass: {value: 3, unit: stone, source: x}", "unknown unit 'stone'"),
@@ -144,10 +144,10 @@ def test_errors_about_other_bad_input_state_what_is_wrong(build, said):
         ("name: [1, 2", "line"),
     ],
 )
-def test_an_error_of_a_parameter_file_states_the_file_and_the_cause(tmp_path, text, said):
+def test_an_error_of_a_parameter_file_states_the_file_and_the_cause(tmp_path, text, expected):
     path = tmp_path / "wrong.yaml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=expected) as caught:
         load_vehicle(str(path))
     assert "wrong.yaml" in str(caught.value)
 

@@ -23,9 +23,9 @@ def _asked(true, frequency, parameters):
     """Calibration of the plain track by receptances of a true one, measured at the support and in mid-span."""
     matrices, track = assemble(true), _track()
     given = [
-        MeasuredReceptance(frequency, h, 1e-4 * np.abs(h), PLACE, heard)
-        for heard in (PLACE, PLACE + 0.3)
-        for h in [receptance(matrices, frequency, PLACE, heard)]
+        MeasuredReceptance(frequency, h, 1e-4 * np.abs(h), PLACE, response_position)
+        for response_position in (PLACE, PLACE + 0.3)
+        for h in [receptance(matrices, frequency, PLACE, response_position)]
     ]
     return calibrate(TurnoutTrack(track, {"main": ((),)}), "S", given, location=PLACE, parameters=parameters)
 

@@ -84,13 +84,13 @@ def test_the_truth_of_a_simulated_hammer_test_is_in_a_separate_file(tmp_path, mo
     (tmp_path / "soft.yaml").write_text(SOFT)
     command = ["simulate", "hammer", "--section", "A7", "--track", "soft.yaml", "--impacts", "2", "--tests", "2"]
     assert main([*command, "--truth", "truth"]) == 0
-    told = [json.loads((tmp_path / f"truth/A7_{k}.json").read_text()) for k in (1, 2)]
-    assert all(t["effects"] == [{"term": "local_ballast", "sleeper": 24.6, "factor": 0.3}] for t in told)
-    places = [impact["position_m"] for t in told for impact in t["impacts"]]
+    truths = [json.loads((tmp_path / f"truth/A7_{k}.json").read_text()) for k in (1, 2)]
+    assert all(t["effects"] == [{"term": "local_ballast", "sleeper": 24.6, "factor": 0.3}] for t in truths)
+    places = [impact["position_m"] for t in truths for impact in t["impacts"]]
     assert len(set(places)) == 4 and np.max(np.abs(np.array(places) - 24.6)) <= 0.0201
     folder = next(tmp_path.rglob("A7_1.h5")).parent
     recordings = read("A7_1.h5", folder, RawDescription(CHANNELS)).recordings
-    for recording, impact in zip(recordings, told[0]["impacts"], strict=True):
+    for recording, impact in zip(recordings, truths[0]["impacts"], strict=True):
         assert recording.samples[0].max() == pytest.approx(impact["peak_force_n"], rel=3e-3)
 
 
@@ -98,7 +98,7 @@ HAMMER = ["simulate", "hammer", "--section", "A7"]
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "expected"),
     [
         (["simulate", "passage", "--vehicle", "tgv"], "no file config/vehicles/tgv.yaml"),
         (["simulate", "hammer", "--section", "B9"], "no section 'B9'"),
@@ -120,10 +120,10 @@ HAMMER = ["simulate", "hammer", "--section", "A7"]
         (["calibrate", "--section", "A7", "--modes", "ballast"], "not of the form"),
     ],
 )
-def test_errors_about_wrong_commands_state_what_is_wrong(tmp_path, monkeypatch, capsys, command, said):
+def test_errors_about_wrong_commands_state_what_is_wrong(tmp_path, monkeypatch, capsys, command, expected):
     monkeypatch.chdir(tmp_path)
     assert main(command) == 2
-    assert said in capsys.readouterr().err
+    assert expected in capsys.readouterr().err
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
@@ -186,14 +186,14 @@ def test_a_calibration_uses_the_track_of_the_turnout_and_states_it(tmp_path, rep
         (tmp_path / "config" / name).symlink_to(repository / "config" / name)
     for name in {own, "tommerup", "other"}:
         (tmp_path / f"config/tracks/{name}.yaml").write_text(SOFT)
-    asked, folder = ["--turnout", "aarup_n4", "--config", str(tmp_path / "config")], f"{tmp_path}/config/tracks"
-    said, taken = calibrated(monkeypatch, capsys, asked)
-    assert said.startswith(f"track: {folder}/{own}.yaml\n") and [str(p) for p in taken] == [f"{folder}/{own}.yaml"]
-    said, _ = calibrated(monkeypatch, capsys, [*asked, "--track", "other"])
-    assert said.startswith(f"track: {folder}/other.yaml\n")
+    arguments, folder = ["--turnout", "aarup_n4", "--config", str(tmp_path / "config")], f"{tmp_path}/config/tracks"
+    output, taken = calibrated(monkeypatch, capsys, arguments)
+    assert output.startswith(f"track: {folder}/{own}.yaml\n") and [str(p) for p in taken] == [f"{folder}/{own}.yaml"]
+    output, _ = calibrated(monkeypatch, capsys, [*arguments, "--track", "other"])
+    assert output.startswith(f"track: {folder}/other.yaml\n")
     monkeypatch.chdir(tmp_path)
-    said, _ = calibrated(monkeypatch, capsys, [])
-    assert said.startswith(f"track: {folder}/tommerup.yaml (no turnout and no track was named)\n")
+    output, _ = calibrated(monkeypatch, capsys, [])
+    assert output.startswith(f"track: {folder}/tommerup.yaml (no turnout and no track was named)\n")
 
 
 def test_a_calibration_states_that_the_turnout_has_no_track_file(tmp_path, repository, monkeypatch, capsys):
@@ -206,15 +206,15 @@ def test_a_calibration_states_that_the_turnout_has_no_track_file(tmp_path, repos
 
 
 def test_the_lines_for_the_track_file_hold_only_values_that_the_tests_determine(monkeypatch, capsys):
-    said, _ = calibrated(monkeypatch, capsys, [])
-    told, block = said.split("paste")
-    assert "hardly determined by these tests: about what the track file says" in told.splitlines()[3]
+    output, _ = calibrated(monkeypatch, capsys, [])
+    table, block = output.split("paste")
+    assert "hardly determined by these tests: about what the track file says" in table.splitlines()[3]
     assert '\n    pad_stiffness: {value: 300, unit: MN/m, source: "estimate: fitted", prior: 0.012}\n' in block
     assert "ballast_damping" not in block
 
 
 def test_a_fit_that_misses_its_test_gives_no_lines_for_the_track_file(monkeypatch, capsys):
-    said, _ = calibrated(monkeypatch, capsys, [], reduced=241.4)
-    block = said.split("neither values nor ±")[1]
+    output, _ = calibrated(monkeypatch, capsys, [], reduced=241.4)
+    block = output.split("neither values nor ±")[1]
     assert "do not paste" in block and "does not meet these tests (chi-squared per degree of freedom 241" in block
     assert not [line for line in block.splitlines()[1:] if line.strip() and not line.lstrip().startswith("#")]

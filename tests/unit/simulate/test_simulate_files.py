@@ -17,15 +17,15 @@ LEVEL = '  level: {value: 3, unit: dB, source: "estimate: a main line some years
 STRETCH = "stretches:\n  - {from: {value: %s, unit: m, source: x}, to: {value: %s, unit: m, source: x}, rail: *rail}\n"
 
 
-def check_rejection(load, path, text, said):
+def check_rejection(load, path, text, expected):
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=expected) as caught:
         load(str(path))
     assert str(path) in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ("  level:", "  levle:", r"roughness: unknown key 'levle'\. Did you mean 'level'"),
         ("roughness:\n" + LEVEL, "roughness: 3", "roughness: 3 instead of names with values"),
@@ -58,13 +58,13 @@ def check_rejection(load, path, text, said):
          r"routes\.main\[2\]\.places\[0\]: 1.0 has no unit and source"),
     ],
 )  # fmt: skip
-def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, new, said):
+def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, new, expected):
     assert old in TRACK
-    check_rejection(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), said)
+    check_rejection(load_track, tmp_path / "t.yaml", TRACK.replace(old, new, 1), expected)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ("payload: {value: 4.6", "paylaod: {value: 4.6", r"car_types\.end_car: unknown key 'paylaod'"),
         ("contact: {value: 93", "contcat: {value: 93", "wheel: unknown key 'contcat'"),
@@ -75,9 +75,9 @@ def test_a_track_file_is_rejected_with_the_entry_and_the_remedy(tmp_path, old, n
         ("rests_on: [b1, b2]", "rests_on: 3", r"cars\[0\]\.rests_on: 3 instead of a list"),
     ],
 )
-def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, said):
+def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, expected):
     assert old in VEHICLE
-    check_rejection(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), said)
+    check_rejection(load_vehicle, tmp_path / "v.yaml", VEHICLE.replace(old, new, 1), expected)
 
 
 @pytest.mark.parametrize(
@@ -94,14 +94,14 @@ def test_a_vehicle_file_is_rejected_with_the_entry(tmp_path, old, new, said):
 )
 def test_an_error_of_a_track_file_names_its_line(tmp_path, old, new, line):
     text = TRACK.replace(old, new, 1)
-    number = 1 + next(k for k, said in enumerate(text.split("\n")) if said.startswith(line))
+    number = 1 + next(k for k, text_line in enumerate(text.split("\n")) if text_line.startswith(line))
     check_rejection(load_track, tmp_path / "t.yaml", text, rf"t\.yaml, line {number}[,:] ")
 
 
 def test_an_error_in_an_extended_track_file_states_the_line_of_that_file(tmp_path):
     (tmp_path / "base.yaml").write_text(TRACK.replace("kind: cosine", "kind: sine"), encoding="utf-8")
     (tmp_path / "own.yaml").write_text("extends: base\n\nname: own\n", encoding="utf-8")
-    line = 1 + next(k for k, said in enumerate(TRACK.split("\n")) if "kind: cosine" in said)
+    line = 1 + next(k for k, text_line in enumerate(TRACK.split("\n")) if "kind: cosine" in text_line)
     with pytest.raises(ConfigError, match=rf"base\.yaml, line {line}, routes\.main\[0\]\.kind: no path"):
         load_track(str(tmp_path / "own.yaml"))
     (tmp_path / "base.yaml").write_text(TRACK.replace("spacing: {value: 0.6", "spacing: {value: 0"), encoding="utf-8")

@@ -62,9 +62,9 @@ def test_a_term_counts_supports_of_the_whole_track_also_if_a_stretch_is_simulate
     track, place = uniform_track(120.0), 60.0
     near, far = (LocalBallast(track.nearest_support(x), 0.2) for x in (place + 3.0, 8.0))
     above = [Sensor("A", place + 3.0, cutoff=None)]
-    said = {"sensors": above, **SHORT}
+    options = {"sensors": above, **SHORT}
     bare, short, whole = (
-        simulate_hammer(track, place, HAMMER, terms=terms, half_length=half, **said)[0].samples[1]
+        simulate_hammer(track, place, HAMMER, terms=terms, half_length=half, **options)[0].samples[1]
         for terms, half in (((), 30.0), ((near, far), 30.0), ((near, far), 200.0))
     )
     assert np.std(short - bare) > 0.02 * np.std(whole)

@@ -177,13 +177,13 @@ def test_a_calibration_reports_parameters_that_the_data_do_not_determine():
 def test_frequencies_above_the_sampled_band_cause_no_aliases(tone):
     """1 kHz with twenty steps per sample: half the rate is 500 Hz; a Hamming window attenuates by 54 dB."""
     time = (np.arange(20 * 4096) + 0.5) / 20e3
-    heard = [
+    responses = [
         record_signal(Sensor("a", 0.0), np.sin(2.0 * np.pi * f * time), 1e3, RNG, substeps=20)[500:-500]
         for f in (100.0, tone)
     ]
     mean_over_a_step = np.sinc(100.0 / 1e3)
-    assert np.ptp(heard[0]) / 2.0 == pytest.approx(mean_over_a_step, rel=5e-3)
-    assert np.ptp(heard[1]) / 2.0 < 10.0 ** (-50.0 / 20.0)
+    assert np.ptp(responses[0]) / 2.0 == pytest.approx(mean_over_a_step, rel=5e-3)
+    assert np.ptp(responses[1]) / 2.0 < 10.0 ** (-50.0 / 20.0)
 
 
 def test_the_decay_rate_of_a_winkler_beam_is_that_of_its_exponentials():
@@ -222,7 +222,7 @@ def test_friction_that_an_impact_cannot_overcome_is_a_dashpot():
     stuck[20] += 2e4 / SLIP_RATE
     cases = (track, (DryFriction(20, 2e4),)), (track.with_(pad_damping=stuck), ()), (track, ())
     once = {"sensors": sensors, "n_impacts": 1, "duration": 0.05, "pretrigger": 0.005}
-    shown = [simulate_hammer(t, 12.3, terms=terms, **once)[0].samples[1:] for t, terms in cases]
-    error, effect = (np.linalg.norm(shown[1] - shown[k]) for k in (0, 2))
-    assert effect > 0.2 * np.linalg.norm(shown[2])
+    responses = [simulate_hammer(t, 12.3, terms=terms, **once)[0].samples[1:] for t, terms in cases]
+    error, effect = (np.linalg.norm(responses[1] - responses[k]) for k in (0, 2))
+    assert effect > 0.2 * np.linalg.norm(responses[2])
     assert error < 0.03 * effect

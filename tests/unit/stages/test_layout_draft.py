@@ -72,8 +72,8 @@ def check(configuration, tmp_path, *more):
 
 def test_the_draft_of_hammer_files_is_accepted_and_reads_them(configuration, tmp_path, capsys):
     assert make_layout(configuration, *write_files(tmp_path)) == 0
-    shown = capsys.readouterr().out
-    assert "section" not in shown or "position" in shown
+    output = capsys.readouterr().out
+    assert "section" not in output or "position" in output
     layout = load_layout(configuration / "layouts" / "mine.yaml")
     assert [s.label for s in layout.sections] == ["A7", "A8"]
     description = layout.hammer.descriptions["A7"]

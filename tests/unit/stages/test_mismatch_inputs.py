@@ -79,8 +79,8 @@ def test_a_direction_is_read_in_any_capitals_and_an_unknown_one_is_reported(repo
 def test_the_noted_speed_is_used_if_impacts_between_the_axles_give_a_wrong_speed(repository):
     """With six of eight axles, 90 km/h of the notes are used; with all eight axles the recorded 74 km/h."""
     noted_values = {"speed": 25.0, "train_type": "ic3"}
-    for heard, speed in ((6, 25.0), (8, 74.0 / 3.6)):
-        row = {"train_type": "ic3", "n_axles": heard, "speed_kmh": 74.0}
+    for n_recorded, speed in ((6, 25.0), (8, 74.0 / 3.6)):
+        row = {"train_type": "ic3", "n_axles": n_recorded, "speed_kmh": 74.0}
         assert train(row, noted_values, repository).speed == pytest.approx(speed)
 
 
@@ -339,8 +339,8 @@ def _tones_at(rate):
         return sum(a * np.sin(2.0 * np.pi * f * t + a) for f, a in ((23.0, 1.0), (61.0, 0.7), (98.0, 1.3)))
 
     samples = np.tile(tones((np.arange(n) + 0.5) / rate), (len(passage.recording.channels), 1))
-    heard = replace(passage, recording=replace(passage.recording, samples=samples, rate=rate))
-    made, observation = observe_passage(heard, sensors, 0.9, passage.speed, 0.06)
+    recorded_passage = replace(passage, recording=replace(passage.recording, samples=samples, rate=rate))
+    made, observation = observe_passage(recorded_passage, sensors, 0.9, passage.speed, 0.06)
     data = observation.data.reshape(len(sensors), -1)
     inside = slice(data.shape[1] // 4, -data.shape[1] // 4)
     return data[:, inside], np.tile(tones(made.time), (len(sensors), 1))[:, inside]
@@ -386,9 +386,9 @@ def test_a_month_of_passages_keeps_the_extremes_of_speed_of_each_train():
     """A case chooses the same passages from the kept ones as from all of them."""
     rng, passages, every = np.random.default_rng(1), [], []
     for k in range(200):
-        vehicle, heard = SimpleNamespace(wheels=range(8)), SimpleNamespace(channels=())
+        vehicle, recording = SimpleNamespace(wheels=range(8)), SimpleNamespace(channels=())
         name = ("ic3", "freight")[k % 2]
-        new = PassageInput(f"{k}", heard, vehicle, float(rng.uniform(20.0, 45.0)), name, "facing", "main", {})
+        new = PassageInput(f"{k}", recording, vehicle, float(rng.uniform(20.0, 45.0)), name, "facing", "main", {})
         every.append(new)
         passages.append(new)
         _thin_out(passages)

@@ -34,9 +34,9 @@ def place_of(configuration):
 
 def test_an_alarm_is_acknowledged_and_silenced_by_command(configuration):
     turnout, label = place_of(configuration)
-    said = ["--by", "M. Jensen", "--reason", "tamping, week 14", "--configuration", str(configuration)]
-    assert main(["acknowledge", f"{turnout}/{label}", "--band", "ballast", "--at", "2026-03-01", *said]) == 0
-    assert main(["acknowledge", turnout, "--suppress-until", "2026-05-01", "--at", "2026-03-02T08:30", *said]) == 0
+    options = ["--by", "M. Jensen", "--reason", "tamping, week 14", "--configuration", str(configuration)]
+    assert main(["acknowledge", f"{turnout}/{label}", "--band", "ballast", "--at", "2026-03-01", *options]) == 0
+    assert main(["acknowledge", turnout, "--suppress-until", "2026-05-01", "--at", "2026-03-02T08:30", *options]) == 0
     first, second = load_configuration(configuration).acknowledgements
     assert first["section_id"] == f"{turnout}/{label}" and first["reason"] == "tamping, week 14"
     assert (first["action"], second["action"]) == ("acknowledge", "suppress")
@@ -49,8 +49,8 @@ def test_the_command_succeeds_after_writing_a_line_although_the_registry_is_unre
     turnout, _ = place_of(configuration)
     register([], tmp_path / "registry", read=iter)
     shutil.copytree(tmp_path / "registry", tmp_path / "copy")
-    said = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
-    assert main(["acknowledge", turnout, *said, "--registry", str(tmp_path / "copy")]) == 0
+    options = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
+    assert main(["acknowledge", turnout, *options, "--registry", str(tmp_path / "copy")]) == 0
     printed = capsys.readouterr()
     assert "not compared with the open alarms" in printed.out and "is a copy" in printed.out and not printed.err
     assert len(load_configuration(configuration).acknowledgements) == 1
@@ -65,24 +65,24 @@ def test_an_acknowledgement_without_a_matching_alarm_is_reported(configuration, 
     }  # fmt: skip
     register([], tmp_path / "registry", read=iter)
     publish(tmp_path / "registry", {"alarms": arrow_rows("alarms", pd.DataFrame([alarm]))})
-    said = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
-    said += ["--registry", str(tmp_path / "registry")]
+    options = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
+    options += ["--registry", str(tmp_path / "registry")]
     for place, at, band, changes in (
         (f"{turnout}/{label}", "2026-03-01", [], True),
         (turnout, "2026-03-02", ["--band", "ballast"], True),
         (turnout, "2026-03-03", ["--band", "railpad"], False),
         (turnout, "2026-01-03", [], False),
     ):
-        assert main(["acknowledge", place, "--at", at, *band, *said]) == 0
+        assert main(["acknowledge", place, "--at", at, *band, *options]) == 0
         assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
 
 
 def test_a_suppression_may_begin_later_and_an_acknowledgement_may_not(configuration, capsys):
     turnout, label = place_of(configuration)
-    said = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
-    assert main(["acknowledge", f"{turnout}/{label}", *said]) == 2
+    options = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2062-03-01"]
+    assert main(["acknowledge", f"{turnout}/{label}", *options]) == 2
     assert "at 2062-03-01 has not come yet" in capsys.readouterr().err
-    assert main(["acknowledge", f"{turnout}/{label}", "--suppress-until", "2062-03-10", *said]) == 0
+    assert main(["acknowledge", f"{turnout}/{label}", "--suppress-until", "2062-03-10", *options]) == 0
     (row,) = load_configuration(configuration).acknowledgements
     assert row["at_utc"] == datetime(2062, 3, 1)
 
@@ -100,8 +100,8 @@ CHART = {
 def test_a_suppression_of_one_band_leaves_the_other_bands(configuration, band):
     turnout, label = place_of(configuration)
     place = {"turnout_id": turnout, "section_id": f"{turnout}/{label}"}
-    said = ["--by", "me", "--reason", "sensor loose", "--at", "2026-05-30", "--configuration", str(configuration)]
-    command = ["acknowledge", place["section_id"], "--band", band, "--suppress-until", "2099-01-01", *said]
+    options = ["--by", "me", "--reason", "sensor loose", "--at", "2026-05-30", "--configuration", str(configuration)]
+    command = ["acknowledge", place["section_id"], "--band", band, "--suppress-until", "2099-01-01", *options]
     assert main(command) == 0
     bands = ("amplitude", "ballast", "railpad")
     of_band = [CHART | place | {"band": b} for b in bands]
@@ -128,8 +128,8 @@ def test_the_registry_accepts_an_acknowledgement_of_amplitudes_of_trains(tmp_pat
         turnout="T1", section="A", band="amplitude", action="acknowledge", by="me", at="2026-06-02", reason="x"
     )
     register([], tmp_path / "registry", read=iter)
-    said = arrow_rows("acknowledgements", pd.DataFrame([acknowledgement_row(cells)]))
-    publish(tmp_path / "registry", {"acknowledgements": said})
+    acknowledgements = arrow_rows("acknowledgements", pd.DataFrame([acknowledgement_row(cells)]))
+    publish(tmp_path / "registry", {"acknowledgements": acknowledgements})
     with open_registry(tmp_path / "registry") as con:
         assert con.execute("select section_id, band from acknowledgements").fetchall() == [("T1/A", "amplitude")]
 
@@ -239,8 +239,8 @@ def test_a_suppression_ends_on_its_day_also_without_new_files(configuration, tmp
 
 def test_the_command_rejects_a_suppression_that_has_ended(configuration, capsys):
     turnout, _ = place_of(configuration)
-    said = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]
-    assert main(["acknowledge", turnout, "--suppress-until", "2020-01-01", *said]) == 2
+    options = ["--by", "me", "--reason", "x", "--configuration", str(configuration)]
+    assert main(["acknowledge", turnout, "--suppress-until", "2020-01-01", *options]) == 2
     assert "is not after at" in capsys.readouterr().err and not (configuration / "acknowledgements.csv").exists()
 
 

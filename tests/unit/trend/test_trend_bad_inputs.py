@@ -254,8 +254,8 @@ def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(sett
     without, other = status_of(far[far["measured_at_utc"] > pd.Timestamp("2001-01-01")], settings)
     pd.testing.assert_frame_equal(status, without)
     assert charts.prepared.baseline.count.tolist() == other.prepared.baseline.count.tolist()
-    shown = chart_rows(charts)
-    assert shown.loc[shown["measured_at_utc"] < pd.Timestamp("2001-01-01"), "state"].tolist() == ["wrong_time"] * 8
+    charted = chart_rows(charts)
+    assert charted.loc[charted["measured_at_utc"] < pd.Timestamp("2001-01-01"), "state"].tolist() == ["wrong_time"] * 8
 
 
 @pytest.mark.parametrize(
@@ -264,8 +264,8 @@ def test_one_campaign_dated_many_years_before_all_others_begins_no_baseline(sett
 def test_an_acceptance_test_some_years_before_counts_and_so_do_two_old_campaigns(settings, days):
     rows = with_dates(modes(FLEET, 1), days)
     assert (rows["measured_at_utc"] < "2014-01-01").sum() == 8 * len(days)
-    shown = chart_rows(status_of(rows, settings)[1])
-    assert not (shown["state"] == "wrong_time").any()
+    charted = chart_rows(status_of(rows, settings)[1])
+    assert not (charted["state"] == "wrong_time").any()
 
 
 def measured_alone(since, bad_first=1.0, fall=0.0):

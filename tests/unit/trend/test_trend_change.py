@@ -110,16 +110,16 @@ def test_95_percent_of_the_intervals_of_date_and_size_contain_the_truth():
     rng, n = np.random.default_rng(12), 150
     held = []
     for kind, percent, phi, after in CASES:
-        mine = []
+        is_covered = []
         for _ in range(n):
             time = irregular(rng, 26, 35.0)
             since = rng.uniform(time[-after - 1], time[-after])
             values, now = history(rng, time, kind, percent, since, phi)
             found = find_change(time, values, phi)
-            mine.append((found.earliest <= since <= found.latest, found.low <= now <= found.high))
+            is_covered.append((found.earliest <= since <= found.latest, found.low <= now <= found.high))
         # One case alone scatters by sqrt(0.95 x 0.05 / 150) = 1.8 %; 0.86 is five of that below.
-        assert np.mean(mine, axis=0).min() > 0.86, (kind, percent, phi)
-        held.append(np.mean(mine, axis=0))
+        assert np.mean(is_covered, axis=0).min() > 0.86, (kind, percent, phi)
+        held.append(np.mean(is_covered, axis=0))
     # All together: 0.67 % scatter, and 2 % for what a flat prior may miss at chosen sizes.
     assert np.mean(held, axis=0) == pytest.approx([0.95, 0.95], abs=0.02 + 2 * 0.0067)
 

@@ -90,13 +90,13 @@ def test_later_maintenance_or_a_suppression_removes_the_request_for_a_confirmati
     work = {"event_id": ["e"], "turnout_id": ["T00000"], "section_id": [None], "kind": ["tamping"]}
     events = pd.DataFrame({**work, "event_at_utc": [newest], "resets_ballast": [True], "resets_railpad": [True]})
     events["event_at_utc"] += pd.Timedelta("1h")
-    said = {
+    acknowledgement = {
         "acknowledgement_id": ["a"], "turnout_id": ["T00001"], "section_id": [None], "band": [None],
         "action": ["suppress"], "by_whom": ["M. Jensen"], "at_utc": [newest], "reason": ["repeated"],
         "until_utc": [newest + pd.Timedelta("30D")],
     }  # fmt: skip
     asof = newest + pd.Timedelta("1D")
-    with evaluated_views(rows, settings, events, asof, acknowledgements=pd.DataFrame(said)) as con:
+    with evaluated_views(rows, settings, events, asof, acknowledgements=pd.DataFrame(acknowledgement)) as con:
         assert not listed(con)
         states = con.execute("select section_id, state from chart_states where section_id like '%S0'").fetchall()
     assert sorted(states) == [("T00000/S0", "learning"), ("T00001/S0", "suppressed")]

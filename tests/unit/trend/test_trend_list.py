@@ -172,8 +172,8 @@ def test_a_removed_turnout_is_not_listed_and_its_history_stays(settings, named):
                 f"select count(*) from chart_status_at({asof}) where complete and list_contains(?, turnout_id)",
                 [[*kept]],
             ).fetchall()[0][0]
-            words = [said for _, state, said in listed if state == "inspect this week"]
-            assert all(f"of all {n_charts} charts " in said for said in words)
+            words = [sentence for _, state, sentence in listed if state == "inspect this week"]
+            assert all(f"of all {n_charts} charts " in sentence for sentence in words)
         assert {t for (t,) in con.execute("select distinct turnout_id from chart_states").fetchall()} == kept
         history = con.execute("select count(*) from charts where turnout_id = 'T00001'").fetchall()
         assert history[0][0] > 800
@@ -202,14 +202,14 @@ def test_a_section_without_a_layout_is_not_listed_and_its_history_stays(settings
 def test_a_suppressed_alarm_returns_on_its_day(settings):
     rows = fallen()
     newest = rows["measured_at_utc"].max()
-    said = pd.DataFrame(
+    acknowledgements = pd.DataFrame(
         {
             "acknowledgement_id": ["a"], "turnout_id": ["T00001"], "section_id": [None], "band": [None],
             "action": ["suppress"], "by_whom": ["M. Jensen"], "at_utc": [newest], "reason": ["renewal ordered"],
             "until_utc": [newest + pd.Timedelta("3D")],
         }
     )  # fmt: skip
-    with evaluated_views(rows, settings, acknowledgements=said) as con:
+    with evaluated_views(rows, settings, acknowledgements=acknowledgements) as con:
         seen = {d: con.execute(f"select count(*) from worklist(newest_measurement() + interval {d} day) "
                                "where section_id = 'T00001/S4'").fetchall()[0][0] for d in (0, 2, 3, 4000)}  # fmt: skip
         assert seen == {0: 0, 2: 0, 3: 1, 4000: 1}
@@ -225,8 +225,8 @@ def test_a_fleet_without_new_campaigns_is_not_measured_and_its_alarm_stays(setti
     rows = fallen()
     newest = rows["measured_at_utc"].max()
     with evaluated_views(rows, settings, work("T00002", newest - pd.Timedelta(weeks=5))) as con:
-        asked = "select state, count(*) from chart_states_on(newest_measurement() + interval {} day) group by all"
-        states = {d: dict(con.execute(asked.format(d)).fetchall()) for d in (0, 89, 91, 800)}
+        query = "select state, count(*) from chart_states_on(newest_measurement() + interval {} day) group by all"
+        states = {d: dict(con.execute(query.format(d)).fetchall()) for d in (0, 89, 91, 800)}
         assert states[0] == states[89] and states[0]["learning"] == 9
         assert states[91] == states[800] == {"inspect this week": 1, "not measured": 26}
         why = con.execute(
@@ -261,12 +261,12 @@ def test_the_printed_list_states_its_newest_data_and_the_unmeasured_charts(tmp_p
     small_registry(tmp_path, rows[~silent])
     update(tmp_path, replace(settings, worklist_rows=1))
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
-    told = capsys.readouterr().out
-    assert "26 not measured for too long." in told  # of 2018: all but the alarm
+    output = capsys.readouterr().out
+    assert "26 not measured for too long." in output  # of 2018: all but the alarm
     assert [(e["state"], bool(e["look_at"])) for e in worklist_entries(tmp_path)] == [("inspect this week", True)]
     then = f"{newest + pd.Timedelta(days=1):%Y-%m-%d}"
-    assert f"The last data are of {newest:%Y-%m-%d}: " in told
-    assert told.endswith(f"turnout worklist --as-of {then} shows the list of that day.\n")
+    assert f"The last data are of {newest:%Y-%m-%d}: " in output
+    assert output.endswith(f"turnout worklist --as-of {then} shows the list of that day.\n")
     assert main(["worklist", "--registry", str(tmp_path), "--as-of", then]) == 0
     assert "26 not measured" not in capsys.readouterr().out
     pages = ["report", "--registry", str(tmp_path), "--pages", str(tmp_path / "pages")]
@@ -281,10 +281,10 @@ def test_the_printed_list_states_its_newest_data_and_the_unmeasured_charts(tmp_p
     assert "--day, date: 'yesterday'. Write YYYY-MM-DD." in capsys.readouterr().err
     monkeypatch.setattr("turnout.registry.as_of.list_day", lambda connection: f"timestamp '{newest}'")
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
-    told = capsys.readouterr().out
-    assert "INSPECT THIS WEEK: T00001" in told
+    output = capsys.readouterr().out
+    assert "INSPECT THIS WEEK: T00001" in output
     # eight sections and the turnout's median, three times; T00002 is silent
-    assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in told
+    assert f"Of 27 charts, newest campaign {newest:%Y-%m-%d}: 9 not measured for too long." in output
     assert main(["worklist", "--registry", str(tmp_path), "--as-of", f"{newest:%Y-%m-%d}"]) == 0
     assert "INSPECT THIS WEEK" in (then := capsys.readouterr().out) and "Of 27 charts" not in then
 
@@ -306,7 +306,7 @@ def test_without_charts_the_list_does_not_state_that_there_is_nothing_to_do(tmp_
 
     small_registry(tmp_path, fallen(weeks=3))
     assert main(["worklist", "--registry", str(tmp_path)]) == 0
-    assert "Nothing to do" not in (told := capsys.readouterr().out) and "No chart has been computed yet" in told
+    assert "Nothing to do" not in (output := capsys.readouterr().out) and "No chart has been computed yet" in output
 
 
 @pytest.mark.parametrize(

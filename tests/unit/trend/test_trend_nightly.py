@@ -115,8 +115,8 @@ def test_the_printed_list_states_position_cause_and_certainty(registry, capsys, 
 
     root, _ = registry
     assert main(["worklist", "--registry", str(root)]) == 0
-    said = capsys.readouterr().out
-    assert "INSPECT THIS WEEK: T00001, S4, railpad" in said and "How sure: " in said and "Look at: worn" in said
+    output = capsys.readouterr().out
+    assert "INSPECT THIS WEEK: T00001, S4, railpad" in output and "How sure: " in output and "Look at: worn" in output
     assert main(["worklist", "--registry", str(root), "--csv", str(tmp_path / "list.csv")]) == 0
     table = pd.read_csv(tmp_path / "list.csv")
     assert table.loc[0, "section_id"] == "T00001/S4" and len(table) <= 20
@@ -131,12 +131,12 @@ def test_a_list_of_a_day_before_the_first_measurement_states_that(registry, rows
     first = rows["measured_at_utc"].min()
     for more in ([], ["--all"], ["--csv", str(tmp_path / "list.csv")]):
         assert main(["worklist", "--registry", str(root), "--as-of", "1999-12-31", *more]) == 2
-        said = capsys.readouterr()
+        output = capsys.readouterr()
         assert (
             f"'1999-12-31': nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M}"
-            in said.err
+            in output.err
         )
-        assert said.out == "" and not (tmp_path / "list.csv").exists()
+        assert output.out == "" and not (tmp_path / "list.csv").exists()
     assert main(["worklist", "--registry", str(root), "--as-of", f"{first:%Y-%m-%dT%H:%M:%S}"]) == 0
 
 
@@ -193,8 +193,10 @@ def test_one_wrong_clock_does_not_stop_the_nightly_update(registry, rows, settin
     question = "select section_id, state, n_campaigns, detectable_pct from chart_status order by all"
     with open_registry(root) as sound, open_registry(tmp_path) as con:
         assert con.execute(question).fetchall() == sound.execute(question).fetchall()
-        shown = con.execute("select section_id, measured_at_utc from charts where state = 'wrong_time'").fetchall()
-        assert len(shown) == 8 and {at for _, at in shown} == {pd.Timestamp(stamp).to_pydatetime()}
+        wrong_times = con.execute(
+            "select section_id, measured_at_utc from charts where state = 'wrong_time'"
+        ).fetchall()
+        assert len(wrong_times) == 8 and {at for _, at in wrong_times} == {pd.Timestamp(stamp).to_pydatetime()}
         assert con.execute("select section_id from worklist").fetchall()[0] == ("T00001/S4",)
 
 
@@ -217,23 +219,23 @@ def test_an_alarm_that_is_not_raised_again_is_closed_and_stays_listed(settings, 
     rng = np.random.default_rng(5)
     few = pd.concat([weekly(rng, f"T{k}", s, 0.0, 0.016 * (k == 0)) for k in range(6) for s in "AB"])
     many = pd.concat([few, *[weekly(rng, f"U{k}", s, 0.8) for k in range(40) for s in "AB"]], ignore_index=True)
-    asked = "select alarm_id, closed_at_utc, closed_by from alarms where alarm_id like 'T0/%' and raised_at_utc > '{}'"
-    asked = asked.format("2018-09-01")
+    query = "select alarm_id, closed_at_utc, closed_by from alarms where alarm_id like 'T0/%' and raised_at_utc > '{}'"
+    query = query.format("2018-09-01")
     listed = "select section_id, state, sentence from worklist where section_id like 'T0/%'"
     small_registry(tmp_path, few)
     update(tmp_path, settings)
     with open_registry(tmp_path) as con:
-        before = con.execute(asked).fetchall()
+        before = con.execute(query).fetchall()
     assert before and {row[1:] for row in before} == {(None, None)}
     small_registry(tmp_path, many, 2)
     done = update(tmp_path, settings)
     taken = f"the alarm {before[0][0]} is not raised again"
     assert taken in caplog.text
     with open_registry(tmp_path) as con:
-        found, said = con.execute(asked).fetchall(), con.execute(listed).fetchall()
+        found, states = con.execute(query).fetchall(), con.execute(listed).fetchall()
         then = con.execute("select max(measured_at_utc) from charts").fetchall()[0][0]
     assert (before[0][0], then, "recomputed") in found and len(found) == len(before)
-    assert any("is not raised again" in sentence for _, state, sentence in said if state == "cannot tell")
+    assert any("is not raised again" in sentence for _, state, sentence in states if state == "cannot tell")
     again = update(tmp_path, settings, done.digests)
     assert again.generation == done.generation and caplog.text.count(taken) == 1, "the next night changes nothing"
     later = many[many["section_id"] == "U1/A"].tail(1)
@@ -241,7 +243,7 @@ def test_an_alarm_that_is_not_raised_again_is_closed_and_stays_listed(settings, 
     small_registry(tmp_path, pd.concat([many, later]), 9)
     update(tmp_path, settings)
     with open_registry(tmp_path) as con:
-        assert con.execute(asked).fetchall() == found
+        assert con.execute(query).fetchall() == found
         assert not [row for row in con.execute(listed).fetchall() if "is not raised again" in row[2]]
 
 
@@ -258,8 +260,10 @@ def test_a_campaign_with_a_future_date_is_shown_and_not_used(registry, rows, set
     assert done.newest == rows["measured_at_utc"].max()
     with open_registry(registry[0]) as sound, open_registry(tmp_path) as con:
         pd.testing.assert_frame_equal(con.execute(STATES).df(), sound.execute(STATES).df())
-        shown = con.execute("select section_id, measured_at_utc::date::varchar from charts where state = 'wrong_time'")
-        assert shown.fetchall() == [("T00000/S3", day) for day in ahead]
+        wrong_times = con.execute(
+            "select section_id, measured_at_utc::date::varchar from charts where state = 'wrong_time'"
+        )
+        assert wrong_times.fetchall() == [("T00000/S3", day) for day in ahead]
 
 
 def test_if_most_charts_are_ahead_the_clock_of_this_machine_is_late(registry, settings, tmp_path, rows):

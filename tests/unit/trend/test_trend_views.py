@@ -274,25 +274,25 @@ def test_cannot_see_lists_every_chart_without_an_answer(con, frames):
 
 def test_an_acknowledged_alarm_is_planned_and_a_suppressed_one_silent_but_both_stay_in_the_record(frames):
     newest = frames["modes"]["measured_at_utc"].max()
-    said = pd.DataFrame(
+    acknowledgements = pd.DataFrame(
         {
             "acknowledgement_id": ["a"], "turnout_id": ["T00003"], "section_id": ["T00003/S2"], "band": ["railpad"],
             "action": ["acknowledge"], "by_whom": ["M. Jensen"], "at_utc": [newest - pd.Timedelta("1D")],
             "until_utc": [pd.NaT], "reason": ["tamping ordered"],
         }
     )  # fmt: skip
-    with connect_views(frames | {"acknowledgements": said}, newest) as con:
+    with connect_views(frames | {"acknowledgements": acknowledgements}, newest) as con:
         row = con.execute("select * from worklist where section_id = 'T00003/S2'").df().iloc[0]
         assert row["state"] == "plan" and "M. Jensen: tamping ordered" in row["sentence"]
         states = con.execute("select state from chart_states where section_id = 'T00003/S2'").fetchall()
         assert states == [("plan",)]
-    silenced = said.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"), band=None)
+    silenced = acknowledgements.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"), band=None)
     with connect_views(frames | {"acknowledgements": silenced}, newest) as con:
         assert con.execute("select * from worklist where section_id = 'T00003/S2'").df().empty
         assert con.execute("select count(*) from alarms where section_id = 'T00003/S2'").fetchall()[0][0] >= 1
         states = con.execute("select state from chart_states where section_id = 'T00003/S2'").fetchall()
         assert states == [("suppressed",)]
-    old = said.assign(at_utc=pd.Timestamp("2017-01-01"))
+    old = acknowledgements.assign(at_utc=pd.Timestamp("2017-01-01"))
     with connect_views(frames | {"acknowledgements": old}, newest) as con:
         row = con.execute("select state from worklist where section_id = 'T00003/S2'").fetchall()
         assert row == [("inspect this week",)]  # entered before the alarm was raised
@@ -346,9 +346,9 @@ def test_the_state_of_an_earlier_day_equals_the_update_of_that_day(con, frames, 
     learning = both["state"] == "learning"
     assert (both["n_learned"] == both["n_learned_night"])[learning].all()
     # Every baseline but the late section's is complete early in 2017: from then on the memory hardly moves.
-    told = both[both["detectable_pct"].notna()]
-    assert np.allclose(told["detectable_pct"], told["detectable_pct_night"], rtol=0.08, atol=0.0)
-    assert len(told) >= 40 or day < "2017"
+    detectable = both[both["detectable_pct"].notna()]
+    assert np.allclose(detectable["detectable_pct"], detectable["detectable_pct_night"], rtol=0.08, atol=0.0)
+    assert len(detectable) >= 40 or day < "2017"
 
 
 def test_the_state_of_an_earlier_day_of_a_turnout_in_alarm_is_not_unmeasured(frames, settings):
@@ -361,8 +361,8 @@ def test_the_state_of_an_earlier_day_of_a_turnout_in_alarm_is_not_unmeasured(fra
     newest = rows["measured_at_utc"].max()
     now, then = (frames_at(given, settings, day) for day in (newest, newest - pd.Timedelta(days=15)))
     with connect_views(now, newest, rounded=False) as connection:
-        asked = "select state, reason from chart_status_at(?) where section_id = '*'"
-        found = connection.execute(asked, [(newest - pd.Timedelta(days=15)).to_pydatetime()]).fetchall()
+        query = "select state, reason from chart_status_at(?) where section_id = '*'"
+        found = connection.execute(query, [(newest - pd.Timedelta(days=15)).to_pydatetime()]).fetchall()
     night = then["chart_status"][then["chart_status"]["section_id"] == "*"][["state", "reason"]]
     assert found == [("cannot_tell", "too_few_sections")] == list(night.itertuples(index=False, name=None))
 
@@ -376,9 +376,9 @@ def test_the_state_of_an_earlier_day_states_missing_temperatures(settings, days,
     rows.loc[cold, "rail_temperature_c"] = np.nan
     given = {"modes": rows.assign(method="joint"), "events": pd.DataFrame(columns=["event_at_utc"])}
     now, then = (frames_at(given, settings, day) for day in (newest, newest - pd.Timedelta(days=days)))
-    asked = "select section_id, state, reason from chart_status_at(?) where section_id <> '*' order by all"
+    query = "select section_id, state, reason from chart_status_at(?) where section_id <> '*' order by all"
     with connect_views({k: v for k, v in now.items() if k != "events"}, newest, rounded=False) as connection:
-        found = connection.execute(asked, [(newest - pd.Timedelta(days=days)).to_pydatetime()]).fetchall()
+        found = connection.execute(query, [(newest - pd.Timedelta(days=days)).to_pydatetime()]).fetchall()
     night = then["chart_status"].query("section_id != '*'")[["section_id", "state", "reason"]]
     assert found == list(night.astype(object).itertuples(index=False, name=None))
     assert [r for s, _, r in found if s != "T00000/S6"] == [reason] * 7 and ("T00000/S6", "ok", "") in found
@@ -447,15 +447,15 @@ def test_sql_equals_loops_pandas_and_statsmodels(settings):
 def test_an_acknowledgement_after_the_newest_campaign_counts_now_and_not_on_earlier_days(frames):
     """A fleet with monthly campaigns does not list the alarm again every day until its next campaign."""
     newest = frames["modes"]["measured_at_utc"].max()
-    said = pd.DataFrame(
+    acknowledgements = pd.DataFrame(
         {
             "acknowledgement_id": ["a"], "turnout_id": ["T00003"], "section_id": ["T00003/S2"], "band": ["railpad"],
             "action": ["acknowledge"], "by_whom": ["M. Jensen"], "at_utc": [newest + pd.Timedelta("1D")],
             "until_utc": [pd.NaT], "reason": ["tamping ordered"],
         }
     )  # fmt: skip
-    silenced = said.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"))
-    for entered, state, listed in ((said, "plan", [("plan",)]), (silenced, "suppressed", [])):
+    silenced = acknowledgements.assign(action="suppress", until_utc=pd.Timestamp("2999-01-01"))
+    for entered, state, listed in ((acknowledgements, "plan", [("plan",)]), (silenced, "suppressed", [])):
         with connect_views(frames | {"acknowledgements": entered}, newest) as con:
             where = "where section_id = 'T00003/S2' and band = 'railpad'"
             assert con.execute(f"select state from chart_states {where}").fetchall() == [(state,)]
@@ -470,7 +470,7 @@ def test_an_acknowledgement_or_suppression_with_a_future_date_counts_from_that_d
     """A date half a year ahead, as when 12/03 is read as 3 December, or that of a planned suppression."""
     newest = frames["modes"]["measured_at_utc"].max()
     at = newest + pd.Timedelta("180D")
-    said = pd.DataFrame(
+    acknowledgements = pd.DataFrame(
         {
             "acknowledgement_id": ["a"], "turnout_id": ["T00003"], "section_id": ["T00003/S2"], "band": ["railpad"],
             "action": [action], "by_whom": ["M. Jensen"], "at_utc": [at],
@@ -478,7 +478,7 @@ def test_an_acknowledgement_or_suppression_with_a_future_date_counts_from_that_d
         }
     )  # fmt: skip
     where = "where section_id = 'T00003/S2' and band = 'railpad'"
-    with connect_views(frames | {"acknowledgements": said}, newest) as con:
+    with connect_views(frames | {"acknowledgements": acknowledgements}, newest) as con:
         for day, counts in ((newest, False), (at - pd.Timedelta("2D"), False), (at + pd.Timedelta("1D"), True)):
             listed = con.execute(f"select state from worklist(timestamp '{day}') {where}").fetchall()
             charted = con.execute(f"select state from chart_states_on(timestamp '{day}') {where}").fetchall()
