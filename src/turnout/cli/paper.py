@@ -1,9 +1,9 @@
 """Print Tables 1 to 4 of the paper for a turnout and a campaign, each value with ± and n.
 
-  turnout paper tommerup_s1                              the newest campaign
+  turnout paper tommerup_s1                                the newest campaign
   turnout paper tommerup_s1 --campaign 2024-09-14
   turnout paper tommerup_s1 --format latex
-  turnout paper tommerup_s2 --table 4 --figure bars.html fits to trains, and charts by type, speed and axle load
+  turnout paper tommerup_s2 --table 4 --figure bars.html   fits to trains, and charts by type, speed and axle load
 
 Table 1: matrices of the ballast resonance. Table 2: of the railpad resonance. Table 3: poles, frequencies and damping
 ratios. Table 4: fit of the model to hammer tests and to trains. ± is the standard error of the campaign value, in
