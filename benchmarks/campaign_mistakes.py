@@ -17,7 +17,8 @@ import numpy as np
 from benchmarks.blind_bridge import campaigns_of
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.turnout.common_delay import typical_lags
-from turnout.mismatch.turnout.observed_tests import compare_channels, correlations_at, observe_tests
+from turnout.mismatch.turnout.filed_tests import FiledTests
+from turnout.mismatch.turnout.observed_tests import observe_tests
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import CHANNELS_CHECK
@@ -44,15 +45,17 @@ def test_figures(campaign):
     """(amplitudes of the tests over their median, least gains beside the positions, least lag in ms or None)."""
     tests = observe_tests(campaign, MismatchSettings().pair_tolerance)
     predictor = Predictor(site_of(campaign), Track1D()).with_recordings(tests.frf_pairs, {})
-    amplitudes = np.array([np.median(c.ratios) for c in compare_channels(predictor, tests)])
+    filed = FiledTests(predictor, tests, tuple(test.place for test in campaign.hammer))
+    amplitudes = np.array([np.median(c.ratios) for c in filed.comparisons])
     gains = []
-    for test in {p.test.name: p.test for p in tests.frf_pairs.values()}.values():
-        distances = [p.sensor.place - test.place for p in tests.frf_pairs.values() if p.test.name == test.name]
+    for pairs in filed.pairs_by_test.values():
+        test = pairs[0].test
+        distances = [p.sensor.place - test.place for p in pairs]
         if min(distances) < -CHANNELS_CHECK.min_side_distance and max(distances) > CHANNELS_CHECK.min_side_distance:
-            stated = correlations_at(predictor, tests, test, test.place)
+            stated = filed.correlations_at(test, test.place)
             beside = [test.place + side * CHANNELS_CHECK.first_position_step for side in (-1.0, 1.0)]
-            gains += [float(np.min(correlations_at(predictor, tests, test, x) - stated)) for x in beside]
-    lags = 1e3 * np.array([lag for group in typical_lags(predictor, tests) for lag in group.values()])
+            gains += [float(np.min(filed.correlations_at(test, x) - stated)) for x in beside]
+    lags = 1e3 * np.array([lag for group in typical_lags(filed) for lag in group.values()])
     is_one_sided = lags.size > 0 and abs(np.sign(lags).sum()) == lags.size
     return amplitudes / np.median(amplitudes), gains, float(np.min(np.abs(lags))) if is_one_sided else None
 

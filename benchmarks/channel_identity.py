@@ -15,7 +15,8 @@ from pathlib import Path
 from benchmarks.blind_bridge import campaigns_of
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.turnout.channel_identity import typical_correlations
-from turnout.mismatch.turnout.observed_tests import compare_channels, observe_tests
+from turnout.mismatch.turnout.filed_tests import FiledTests
+from turnout.mismatch.turnout.observed_tests import observe_tests
 from turnout.mismatch.turnout.passage_alignment import PassageAligner
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.prediction import Predictor
@@ -32,7 +33,7 @@ def correlations_of(campaign):
         aligner.correlation(values, passage)
     passages = [c for c in map(aligner.comparison, campaign.passages) if c is not None]
     return {
-        "hammer tests": typical_correlations(compare_channels(predictor, tests), {}),
+        "hammer tests": typical_correlations(FiledTests(predictor, tests, ()).comparisons, {}),
         "passages": typical_correlations(passages, {}),
     }
 

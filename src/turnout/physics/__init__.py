@@ -24,6 +24,8 @@ from turnout.physics.mount_resonance import MountResonance
 from turnout.physics.out_of_round import OutOfRound
 from turnout.physics.pad_preload import PadPreload
 from turnout.physics.pad_temperature import PadTemperature
+from turnout.physics.passage_delay import PassageDelay
+from turnout.physics.passage_gain import PassageGain
 from turnout.physics.rail_bending import RailBending
 from turnout.physics.rail_corrugation import RailCorrugation
 from turnout.physics.rail_shear import RailShear
@@ -61,6 +63,8 @@ TERMS: tuple[type[PhysicsTerm], ...] = (
     SensorPosition,
     LowPass,
     HighPass,
+    PassageDelay,
+    PassageGain,
     ClockDrift,
     Clipping,
     Hum,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
 from turnout.physics.hypothesis import ChannelSite, Hypothesis
-from turnout.physics.requirement import IMPACTS
+from turnout.physics.requirement import IMPACTS, Requirement
 from turnout.physics.term import ACCURATE, Parameter
 from turnout.physics.transfer import TransferTerm
 
@@ -39,7 +39,7 @@ class TimeOffset(TransferTerm):
     separating_test = "passages at another speed"
     frame = "clock"
     site_types = (ChannelSite,)
-    requirements = (IMPACTS,)
+    requirements: ClassVar[tuple[Requirement, ...]] = (IMPACTS,)
     column_type = "channel"
     smallest_reportable = 5e-5
     model_error_share = ACCURATE

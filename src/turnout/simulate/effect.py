@@ -30,12 +30,15 @@ class Effect:
         Name of the effect in rows, track files and options.
     effect_type : str
         How it enters the simulation, one of ``EFFECT_TYPES``.
+    recording_types : tuple of str
+        Types of recordings in which a channel shows it, "hammer" and "passage".
     scales_track : bool
         Whether its links are a multiple of the track's springs; other effects then act on the result.
     """
 
     name: ClassVar[str] = ""
     effect_type: ClassVar[str] = ""
+    recording_types: ClassVar[tuple[str, ...]] = ("hammer", "passage")
     scales_track: ClassVar[bool] = False
 
     def links(self, track: Track) -> Sequence[Link]:

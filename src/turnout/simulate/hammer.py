@@ -181,7 +181,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     rng = np.random.default_rng(seed)
     probes = [actual_sensor(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
     channels = (replace(hammer.force, place=position), *sensors)
-    channel_terms = [term for term in prepared.terms if term.effect_type == "channel"]
+    channel_terms = [t for t in prepared.terms if t.effect_type == "channel" and "hammer" in t.recording_types]
     recordings = []
     for record in range(n_impacts):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())

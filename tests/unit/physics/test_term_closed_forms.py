@@ -198,6 +198,8 @@ def test_a_stretch_with_four_times_the_stiffness_is_a_softer_spring_by_the_winkl
         (physics.SensorGain("A", 1.3), 77.0, 1.3),
         (physics.MountResonance("A", 1 / 400.0, 12.0), 400.0, -12.0j),  # at resonance -iQ
         (physics.TimeOffset("A", 1e-3), 250.0, np.exp(-0.5j * np.pi)),  # a quarter period
+        (physics.PassageDelay("A", 2e-3), 125.0, -1j),  # a quarter period
+        (physics.PassageGain("A", -0.7), 77.0, -0.7),
         (physics.HighPass("A", 10.0), 10.0, 0.5 + 0.5j),  # 3 dB and 45 degrees ahead
         (physics.LowPass("A", 1 / 500.0), 500.0, -1j / np.sqrt(2.0)),  # 3 dB and 90 degrees behind
     ],

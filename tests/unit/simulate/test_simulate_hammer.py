@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from turnout.errors import SimulationError
-from turnout.physics import TERMS, LiftingSleepers, LocalBallast, SensorGain, SensorPosition, SurfaceDip
+from turnout.physics import TERMS, LiftingSleepers, LocalBallast, PassageGain, SensorGain, SensorPosition, SurfaceDip
 from turnout.simulate import Hammer, Sensor, prepare_hammer, simulate_hammer, uniform_track
 from turnout.simulate.links import terms_on_stretch
 
@@ -54,6 +54,14 @@ def test_the_terms_of_a_prepared_track_also_act_on_its_channels():
     ]
     assert np.allclose(by_gain[1][1], 3.0 * by_gain[0][1], rtol=1e-9, atol=1e-9)
     assert np.array_equal(impact(sensors=quiet, terms=(*terms, SensorGain("A", 3.0))), by_gain[1])
+
+
+def test_a_fault_of_the_passages_alone_changes_no_hammer_test():
+    bare, of_passages, of_all = (
+        impact(sensors=[Sensor("A", 15.0)], terms=terms)
+        for terms in ((), (PassageGain("A", 3.0),), (SensorGain("A", 3.0),))
+    )
+    assert np.array_equal(of_passages, bare) and not np.allclose(of_all, bare)
 
 
 def test_a_term_counts_supports_of_the_whole_track_also_if_a_stretch_is_simulated():

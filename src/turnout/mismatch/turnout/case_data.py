@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,23 +11,23 @@ import numpy as np
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
+from turnout.mismatch.turnout.amplitude_scale import wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
-from turnout.mismatch.turnout.channel_identity import ChannelFaults, exchanged_channels
-from turnout.mismatch.turnout.common_delay import CommonDelay, common_delay
-from turnout.mismatch.turnout.deviating_tests import DeviatingTests, deviating_tests
+from turnout.mismatch.turnout.channel_identity import exchanged_channels
+from turnout.mismatch.turnout.common_delay import common_delay
+from turnout.mismatch.turnout.deviating_tests import deviating_tests
 from turnout.mismatch.turnout.disturbances import Disturbance
-from turnout.mismatch.turnout.impact_positions import MisplacedTests, misplaced_tests
+from turnout.mismatch.turnout.filed_tests import FiledTests
+from turnout.mismatch.turnout.impact_positions import misplaced_tests
+from turnout.mismatch.turnout.layout_fault import LayoutFault
 from turnout.mismatch.turnout.observed_passages import observe_passages
-from turnout.mismatch.turnout.observed_tests import compare_channels, fit_hammer_start, observe_tests
+from turnout.mismatch.turnout.observed_tests import fit_hammer_start, observe_tests
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
-
-LayoutFault = ChannelFaults | MisplacedTests | WrongScale | DeviatingTests | CommonDelay
 
 
 @dataclass(frozen=True)
@@ -175,28 +175,22 @@ def case_data(
     SimulationError
         No recording can be used, or all of them are reserved.
     """
-    as_filed, is_corrected = campaign, {faults.recording_type for faults in corrected}
+    as_filed, is_corrected = campaign, {fault.recording_type for fault in corrected}
     saturated = saturated_channels(campaign, settings.threshold)
     campaign = without_saturated(campaign, saturated)
     site = site_of(campaign)
     tests = observe_tests(campaign, settings.pair_tolerance, saturated)
     predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
-    comparisons = compare_channels(predictor, tests)
-    for faults in (
-        common_delay(predictor, tests),
-        misplaced_tests(predictor, tests, [test.place for test in campaign.hammer]),
-        exchanged_channels("hammer tests", comparisons),
-        wrong_scale("hammer tests", comparisons),
-        deviating_tests(list(dict.fromkeys(p.test.name for p in tests.frf_pairs.values())), comparisons),
-    ):
-        if faults and faults.recording_type not in is_corrected:
-            return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))
+    filed = FiledTests(predictor, tests, tuple(test.place for test in campaign.hammer))
+    for fault in _faults_of_tests(filed):
+        if fault and fault.recording_type not in is_corrected:
+            return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))
     predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
     passages = observe_passages(campaign, settings.materiality, predictor, start_values)
-    for faults in (passages.channel_faults, passages.wrong_scale):
-        if faults and faults.recording_type not in is_corrected:
-            return case_data(faults.correct(as_filed), settings, solver, (*corrected, faults))
+    for fault in passages.layout_faults:
+        if fault and fault.recording_type not in is_corrected:
+            return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:
@@ -219,3 +213,12 @@ def case_data(
     if not data.observations:
         raise SimulationError("every recording is reserved for the verification: nothing is left to fit.")
     return data, predictor.with_recordings(data.frf_pairs, data.aligned_passages)
+
+
+def _faults_of_tests(filed: FiledTests) -> Iterator[LayoutFault]:
+    """What every check of hammer tests finds, in the order in which faults are corrected."""
+    yield common_delay(filed)
+    yield misplaced_tests(filed)
+    yield exchanged_channels("hammer tests", filed.comparisons)
+    yield wrong_scale("hammer tests", filed.comparisons)
+    yield deviating_tests(list(filed.pairs_by_test), filed.comparisons)

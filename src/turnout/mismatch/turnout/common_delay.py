@@ -16,8 +16,7 @@ from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 
 if TYPE_CHECKING:
     from turnout.mismatch.turnout.campaign import CampaignInput
-    from turnout.mismatch.turnout.observed_tests import ObservedTests
-    from turnout.mismatch.turnout.prediction import Predictor
+    from turnout.mismatch.turnout.filed_tests import FiledTests
     from turnout.records import Recording
 
 
@@ -100,14 +99,12 @@ def earlier(samples: np.ndarray, n: float) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(padded) * shift, padded.size)[margin : 2 * margin]
 
 
-def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
+def common_delay(filed: FiledTests) -> CommonDelay:
     """The lag of all accelerations behind the force, if all channels and tests share one that is far from 0.
 
     Parameters
     ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
+    filed : FiledTests
         Hammer tests of the campaign.
 
     Returns
@@ -115,7 +112,7 @@ def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
     CommonDelay
         False if there is none, channels or tests differ, or there are fewer than two channels.
     """
-    by_channel, by_test = typical_lags(predictor, tests)
+    by_channel, by_test = typical_lags(filed)
     lags = [*by_channel.values(), *by_test.values()]
     if len(by_channel) < 2 or np.ptp(lags) > CHANNELS_CHECK.delay_spread:
         return CommonDelay({}, len(by_test))
@@ -123,7 +120,7 @@ def common_delay(predictor: Predictor, tests: ObservedTests) -> CommonDelay:
     return CommonDelay(by_channel if is_far else {}, len(by_test))
 
 
-def typical_lags(predictor: Predictor, tests: ObservedTests) -> tuple[dict[str, float], dict[str, float]]:
+def typical_lags(filed: FiledTests) -> tuple[dict[str, float], dict[str, float]]:
     r"""Lags behind the force [s] by channel, medians over the tests, and by test, medians over the channels.
 
     The lag of a channel in a test is the one at which it correlates best with the simulation on the track as filed,
@@ -134,9 +131,7 @@ def typical_lags(predictor: Predictor, tests: ObservedTests) -> tuple[dict[str, 
 
     Parameters
     ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
+    filed : FiledTests
         Hammer tests of the campaign.
 
     Returns
@@ -144,15 +139,13 @@ def typical_lags(predictor: Predictor, tests: ObservedTests) -> tuple[dict[str, 
     by_channel : dict of str to float
     by_test : dict of str to float
     """
-    values = {n.name: n.mean for n in predictor.site.shared_nuisances()}
-    observations = [o for _, o in tests.observations]
     n_lag = round(CHANNELS_CHECK.max_delay / CHANNELS_CHECK.delay_step)
     lags = CHANNELS_CHECK.delay_step * np.arange(-n_lag, n_lag + 1)
     by_channel: dict[str, list[float]] = {}
     by_test: dict[str, list[float]] = {}
-    for observation, simulated in zip(observations, predictor.predict(values, (), observations)):
-        pair = tests.frf_pairs[observation.name]
-        measured, modelled = (_as_complex(x) * pair.size for x in (observation.data, simulated))
+    for _, observation in filed.tests.observations:
+        pair = filed.tests.frf_pairs[observation.name]
+        measured, modelled = (_as_complex(x) * pair.size for x in (observation.data, filed.simulated[pair.name]))
         sums = (np.exp(2j * np.pi * np.outer(lags, pair.frequency)) @ (modelled.conj() * measured)).real
         best = int(np.argmax(sums))
         if sums[best] >= CHANNELS_CHECK.same_sensor * np.linalg.norm(measured) * np.linalg.norm(modelled):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
-from turnout.mismatch.turnout.observed_tests import ObservedTests, correlations_at, mean_correlation
-from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.filed_tests import FiledTests
 from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 
 
@@ -59,52 +58,53 @@ class MisplacedTests:
         )
 
 
-def misplaced_tests(predictor: Predictor, tests: ObservedTests, positions: Iterable[float]) -> MisplacedTests:
-    """Tests that agree with impacts at another one of the ``positions``, and not at their own.
+def misplaced_tests(filed: FiledTests) -> MisplacedTests:
+    """Tests that agree with impacts at the position of another test, or beside their own, and not at their own.
 
     Parameters
     ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
+    filed : FiledTests
         Hammer tests of the campaign.
-    positions : iterable of float
-        Positions of all hammer tests of the campaign. [m]
 
     Returns
     -------
     MisplacedTests
         False if there are none.
     """
-    stated_positions, misplaced = sorted(set(positions)), {}
-    for test in {pair.test.name: pair.test for pair in tests.frf_pairs.values()}.values():
-        stated_correlation = mean_correlation(predictor, tests, test, test.place)
+    misplaced = {}
+    for test in (pairs[0].test for pairs in filed.pairs_by_test.values()):
+        stated_correlation = _mean_correlation(filed, test, test.place)
         if stated_correlation >= CHANNELS_CHECK.same_sensor:
-            if (nearby := _position_nearby(predictor, tests, test)) is not None:
+            if (nearby := _position_nearby(filed, test)) is not None:
                 misplaced[test.name] = test.place, nearby
             continue
-        trials = [(mean_correlation(predictor, tests, test, x), x) for x in stated_positions if x != test.place]
+        others = sorted(set(filed.positions) - {test.place})
+        trials = [(_mean_correlation(filed, test, x), x) for x in others]
         best_correlation, best_position = max(trials, default=(-np.inf, test.place))
         if best_correlation >= max(CHANNELS_CHECK.same_sensor, stated_correlation + CHANNELS_CHECK.min_gain):
             misplaced[test.name] = test.place, best_position
     return MisplacedTests(misplaced)
 
 
-def _position_nearby(predictor: Predictor, tests: ObservedTests, test: HammerInput) -> float | None:
+def _mean_correlation(filed: FiledTests, test: HammerInput, position: float) -> float:
+    return float(np.mean(filed.correlations_at(test, position)))
+
+
+def _position_nearby(filed: FiledTests, test: HammerInput) -> float | None:
     """Position beside the stated one where *every* channel of a test agrees better [m], None if there is none.
 
     Sensors on both sides are needed. A track that is stiffer or softer than in its file, or a sensor elsewhere, moves
     the best position of a channel towards its sensor or away from it, and that of one on the other side oppositely.
     """
-    distances = [p.sensor.place - test.place for p in tests.frf_pairs.values() if p.test.name == test.name]
+    distances = [p.sensor.place - test.place for p in filed.pairs_by_test[test.name]]
     far = CHANNELS_CHECK.min_side_distance
     if not min(distances) <= -far < far <= max(distances):
         return None
-    stated = correlations_at(predictor, tests, test, test.place)
+    stated = filed.correlations_at(test, test.place)
     for side in (-1.0, 1.0):
         position, agreeing, step = None, stated, CHANNELS_CHECK.first_position_step
         while step <= CHANNELS_CHECK.max_position_step:
-            trial = correlations_at(predictor, tests, test, test.place + side * step)
+            trial = filed.correlations_at(test, test.place + side * step)
             if np.any(trial <= stated) or trial.mean() <= agreeing.mean():
                 break
             position, agreeing = test.place + side * step, trial

@@ -10,10 +10,11 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import passage_observation
-from turnout.mismatch.turnout.amplitude_scale import WrongScale, wrong_scale
+from turnout.mismatch.turnout.amplitude_scale import wrong_scale
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
-from turnout.mismatch.turnout.channel_identity import ChannelFaults, channel_faults
+from turnout.mismatch.turnout.channel_identity import channel_faults
 from turnout.mismatch.turnout.disturbances import Disturbance, disturbances
+from turnout.mismatch.turnout.layout_fault import LayoutFault
 from turnout.mismatch.turnout.passage_alignment import PassageAligner, fit_surface
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
@@ -26,8 +27,8 @@ from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 class ObservedPassages:
     """Passages as ``observations`` (name, Observation), with those that are not used, and notes.
 
-    ``surface_values`` are the nuisances of the running surface with which they were aligned. ``channel_faults`` are
-    channels that do not record their sensor, ``wrong_scale`` a wrong unit; nothing else holds where there is one.
+    ``surface_values`` are the nuisances of the running surface with which they were aligned. ``layout_faults`` are
+    channels that do not record their sensor, and a wrong unit; nothing else holds where there is one.
     """
 
     aligned: Mapping[str, AlignedPassage]
@@ -36,8 +37,7 @@ class ObservedPassages:
     disturbed: tuple[Disturbance, ...]
     surface_values: Mapping[str, float]
     notes: tuple[str, ...]
-    channel_faults: ChannelFaults
-    wrong_scale: WrongScale
+    layout_faults: tuple[LayoutFault, ...] = ()
 
 
 def observe_passages(
@@ -60,7 +60,7 @@ def observe_passages(
     ObservedPassages
     """
     if not campaign.passages:
-        return ObservedPassages({}, (), (), (), {}, (), channel_faults("passages", ()), wrong_scale("passages", ()))
+        return ObservedPassages({}, (), (), (), {}, ())
     aligner = PassageAligner(campaign, predictor)
     values = {**{n.name: 0.0 for n in predictor.site.nuisances()}, **start_values}
     surface_values = fit_surface(aligner, values)
@@ -95,8 +95,7 @@ def observe_passages(
         disturbed,
         surface_values,
         tuple(notes),
-        channel_faults("passages", comparisons),
-        wrong_scale("passages", comparisons if start_values else ()),
+        (channel_faults("passages", comparisons), wrong_scale("passages", comparisons if start_values else ())),
     )
 
 

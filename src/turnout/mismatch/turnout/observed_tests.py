@@ -6,13 +6,10 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
 from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
-from turnout.mismatch.turnout.channel_identity import Comparison
 from turnout.mismatch.turnout.hammer_case import HammerCase
 from turnout.mismatch.turnout.lifting_chairs import count_alike, lifting_chairs, with_lifting_error
 from turnout.mismatch.turnout.prediction import Predictor
@@ -82,99 +79,6 @@ def _fault_of_channel(test: HammerInput, channel: str) -> str | None:
     """The reason of most rejections of the impacts of a test that concern this channel, None without any."""
     reasons = Counter(r.reason for i in test.impacts(channel) for r in i.rejections if r.channel == channel)
     return reasons.most_common(1)[0][0] if reasons else None
-
-
-def compare_channels(predictor: Predictor, tests: ObservedTests) -> list[Comparison]:
-    """Correlation of each channel of a hammer test with the simulation at each of its sensors, on the track as filed.
-
-    Parameters
-    ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
-        Hammer tests of the campaign.
-
-    Returns
-    -------
-    list of Comparison
-        One per test.
-    """
-    values = {n.name: n.mean for n in predictor.site.shared_nuisances()}
-    observations = {o.name: o for _, o in tests.observations}
-    pairs_by_test: dict[str, list[FrfPair]] = {}
-    for pair in tests.frf_pairs.values():
-        pairs_by_test.setdefault(pair.test.name, []).append(pair)
-    comparisons = []
-    for pairs in pairs_by_test.values():
-        names = tuple(p.channel for p in pairs)
-        correlations, ratios = np.zeros((len(pairs), len(pairs), 1)), np.zeros(len(pairs))
-        for i, measured in enumerate(pairs):
-            at_sensors = [
-                replace(measured, name=str(j), channel=p.channel, sensor=p.sensor) for j, p in enumerate(pairs)
-            ]
-            observation = observations[measured.name]
-            trials = predictor.with_recordings({**tests.frf_pairs, **{p.name: p for p in at_sensors}}, {})
-            simulated = trials.predict(values, (), [replace(observation, name=p.name) for p in at_sensors])
-            for j, row in enumerate(simulated):
-                correlations[i, j] = _correlation(measured, observation.data, row)
-            ratios[i] = 1.0 / max(np.median(np.hypot(*simulated[i].reshape(2, -1))), 1e-12)
-        comparisons.append(Comparison(names, names, correlations, ratios))
-    return comparisons
-
-
-def mean_correlation(predictor: Predictor, tests: ObservedTests, test: HammerInput, position: float) -> float:
-    """Mean correlation of the channels of a test with the simulation of impacts at a position, on the track as filed.
-
-    Parameters
-    ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
-        Hammer tests of the campaign.
-    test : HammerInput
-        One of them.
-    position : float
-        Of the impacts. [m]
-
-    Returns
-    -------
-    float
-    """
-    return float(np.mean(correlations_at(predictor, tests, test, position)))
-
-
-def correlations_at(predictor: Predictor, tests: ObservedTests, test: HammerInput, position: float) -> np.ndarray:
-    """Correlation of each channel of a test with the simulation of impacts at a position, on the track as filed.
-
-    Parameters
-    ----------
-    predictor : Predictor
-        Of the site as filed.
-    tests : ObservedTests
-        Hammer tests of the campaign.
-    test : HammerInput
-        One of them.
-    position : float
-        Of the impacts. [m]
-
-    Returns
-    -------
-    (n_channel,) array of float
-    """
-    values = {n.name: n.mean for n in predictor.site.shared_nuisances()}
-    moved = replace(test, place=position)
-    pairs = {n: replace(p, test=moved) for n, p in tests.frf_pairs.items() if p.test.name == test.name}
-    observations = [o for _, o in tests.observations if o.name in pairs]
-    trials = predictor.with_recordings({**tests.frf_pairs, **pairs}, {})
-    simulated = trials.predict(values, (), observations)
-    return np.array([_correlation(pairs[o.name], o.data, row) for o, row in zip(observations, simulated)])
-
-
-def _correlation(pair: FrfPair, measured: np.ndarray, simulated: np.ndarray) -> float:
-    """Correlation of two receptances, both over the magnitude of the measured one."""
-    size = np.tile(pair.size, 2)
-    a, b = measured * size, simulated * size
-    return float(a @ b / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-30))
 
 
 def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]:

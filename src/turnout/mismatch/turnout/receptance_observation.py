@@ -12,6 +12,7 @@ import numpy as np
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.priors import RECEPTANCE
+from turnout.physics.transfer import TransferTerm
 from turnout.simulate.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -269,7 +270,7 @@ def track_terms(terms: Sequence[PhysicsTerm], conditions: Mapping[str, Any]) -> 
 
 
 def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.ndarray) -> np.ndarray:
-    """Complex factor by which linear channel terms change a spectrum.
+    """Complex factor by which linear channel terms change a spectrum of a hammer test.
 
     Parameters
     ----------
@@ -286,7 +287,7 @@ def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.n
     """
     factor = np.ones(frequency.size, dtype=complex)
     for term in terms:
-        if hasattr(term, "transfer") and getattr(term, "channel_name", "") == sensor.name:
+        if isinstance(term, TransferTerm) and term.channel_name == sensor.name and "hammer" in term.recording_types:
             factor = factor * term.transfer(frequency)
     return factor
 
