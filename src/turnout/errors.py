@@ -264,7 +264,16 @@ def _import_message(module: str, error: BaseException) -> str:
 
 # Remarks: the recordings are used all the same. No run fails and no turnout is overdue because of one.
 REMARK_REASONS = frozenset(
-    ("entry_unknown", "library_warning", "condition_lost", "start_unknown", "rate_ambiguous", "other_turnout", "spikes")
+    (
+        "entry_unknown",
+        "library_warning",
+        "condition_lost",
+        "start_unknown",
+        "rate_ambiguous",
+        "other_turnout",
+        "spikes",
+        "mains_hum",
+    )
 )
 # Reasons that concern a channel of a recording: ``turnout.records.Rejection.channel`` names it.
 CHANNEL_REASONS = frozenset(

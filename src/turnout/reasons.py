@@ -63,6 +63,7 @@ REASONS = {
     "drop_out": "a channel repeats one value for many samples, while it moves before and behind them",
     "interference": "electrical pulses on all channels at the same moment; they were removed",
     "spikes": "single samples that stand out of a channel; they were replaced by the mean of their neighbours",
+    "mains_hum": "hum of the mains or of traction current in most channels; it was subtracted",
     "simulation_failed": "the simulation could not be completed",
     "internal_error": "a fault of this program, with its traceback",
 }

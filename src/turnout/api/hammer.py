@@ -11,7 +11,7 @@ from turnout import hammer_test
 from turnout.config.settings.identify import IdentifySettings
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.records import Impact, ModalModel, Receptance, Recording
-from turnout.signal.spikes import replace_spikes
+from turnout.signal.cleaning import clean_recordings
 from turnout.stages.hammer import identify_accepted
 
 LOG = logging.getLogger("turnout.hammer")
@@ -41,8 +41,8 @@ def find_impacts(
 ) -> Impacts:
     """Find the impacts of one hammer test, measure them, and reject those that cannot be used.
 
-    As in the hammer stage, single wrong samples are replaced first (``turnout.signal.spikes``). A warning of the log
-    "turnout" states them.
+    As in the hammer stage, single wrong samples are replaced first, and hum is subtracted. A warning of the log
+    "turnout" states both (``turnout.signal.cleaning``).
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def find_impacts(
         raise ValueError("no recording is given")
     force = force or _only_channel(listed[0], "force", "force")
     response = response or _only_channel(listed[0], "acceleration", "response")
-    clean = replace_spikes(listed, LOG, (force, response))
+    clean = clean_recordings(listed, LOG, (force, response))
     return Impacts(hammer_test.find_impacts(clean, force, response, settings))
 
 

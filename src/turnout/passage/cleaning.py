@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from turnout.passage.electrical_pulses import without_pulses
 from turnout.records import Recording, Rejection
-from turnout.signal.spikes import without_spikes
+from turnout.signal.cleaning import without_artefacts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def clean(recording: Recording, sensors: Sequence[PassageSensor]) -> tuple[Recording, tuple[Rejection, ...]]:
-    """The recording without electrical pulses and spikes, and what was removed as findings.
+    """The recording without electrical pulses, spikes and hum, and what was removed as findings.
 
     Parameters
     ----------
@@ -32,5 +32,5 @@ def clean(recording: Recording, sensors: Sequence[PassageSensor]) -> tuple[Recor
         What was removed.
     """
     recording, pulses = without_pulses(recording, sensors)
-    recording, spikes = without_spikes(recording, {s.name for s in sensors})
-    return recording, (*pulses, *spikes)
+    recording, removed = without_artefacts(recording, {s.name for s in sensors})
+    return recording, (*pulses, *removed)

@@ -12,6 +12,8 @@ from turnout.physics.clipping import Clipping
 from turnout.physics.clock_drift import ClockDrift
 from turnout.physics.contact_stiffness import ContactStiffness
 from turnout.physics.dry_friction import DryFriction
+from turnout.physics.hammer_delay import HammerDelay
+from turnout.physics.hammer_gain import HammerGain
 from turnout.physics.hanging_sleeper import HangingSleeper
 from turnout.physics.heel_support import HeelSupport
 from turnout.physics.high_pass import HighPass
@@ -65,6 +67,8 @@ TERMS: tuple[type[PhysicsTerm], ...] = (
     HighPass,
     PassageDelay,
     PassageGain,
+    HammerDelay,
+    HammerGain,
     ClockDrift,
     Clipping,
     Hum,

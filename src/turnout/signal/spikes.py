@@ -16,8 +16,7 @@ from turnout.records import Recording, Rejection
 from turnout.signal.converter import converter_step
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable
-    from logging import Logger
+    from collections.abc import Container
 
 SPIKE_FACTOR = 8.0  # least height of a spike, in units of the bends before and behind it
 SPIKE_REACH = 8  # samples before and behind a spike with which it is compared
@@ -68,34 +67,6 @@ def without_spikes(
         text = f"{channel.name}: {at.size} sample{'s' * (at.size > 1)} replaced, the first at {first:.3f} s"
         findings.append(Rejection("spikes", float(at.size), 0.0, text, channel.name, time=first))
     return (recording if samples is None else replace(recording, samples=samples)), tuple(findings)
-
-
-def replace_spikes(
-    recordings: Iterable[Recording], log: Logger, names: Container[str] | None = None
-) -> list[Recording]:
-    """The recordings without spikes; a warning for each channel that had some.
-
-    Parameters
-    ----------
-    recordings : iterable of Recording
-        Any recordings.
-    log : Logger
-        Takes the warnings.
-    names : container of str, optional
-        Of the channels that are searched, by default all.
-
-    Returns
-    -------
-    list of Recording
-        In the same order.
-    """
-    clean_recordings = []
-    for recording in recordings:
-        clean_recording, findings = without_spikes(recording, names)
-        clean_recordings.append(clean_recording)
-        for finding in findings:
-            log.warning("%s, record %d: %s", recording.source, recording.record + 1, finding.detail)
-    return clean_recordings
 
 
 def spikes_in(samples: np.ndarray) -> np.ndarray:

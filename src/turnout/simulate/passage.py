@@ -181,7 +181,7 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     _check_sensor_positions(seats, prepared.track, drive)
     outcome = run(prepared, duration, probes, vehicle, drive, forces=truth)
     rng = np.random.default_rng([seed, 1])
-    channel_terms = [term for term in prepared.terms if term.effect_type == "channel"]
+    channel_terms = [t for t in prepared.terms if t.effect_type == "channel" and "passage" in t.recording_types]
     samples = np.array(
         [
             record_signal(sensor, row, rate, rng, channel_terms, substeps)

@@ -17,7 +17,7 @@ from turnout.hammer_test import find_impacts, receptance_of
 from turnout.modal import identify
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription, Receptance, Recording
-from turnout.signal.spikes import replace_spikes
+from turnout.signal.cleaning import clean_recordings
 from turnout.simulate import load_track
 from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibrate
 from turnout.simulate.hammer import resolve_location
@@ -137,7 +137,7 @@ def _recordings(files: Iterable[str | Path], description: RawDescription) -> tup
             rejected.append(str(error))
             continue
         rejected += map(str, result.errors)
-        recordings += replace_spikes(result.recordings, LOG)
+        recordings += clean_recordings(result.recordings, LOG)
     return recordings, rejected
 
 

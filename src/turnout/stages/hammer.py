@@ -23,7 +23,7 @@ from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.modal import identify
 from turnout.records import Impact, ModalModel, RawDescription, Receptance, Recording, Rejection, Unit
 from turnout.registry.ids import content_id
-from turnout.signal.spikes import without_spikes
+from turnout.signal.cleaning import is_notable, without_artefacts
 from turnout.stages.filed_times import MAX_CAMPAIGN_OFFSET, MISFILED_REMEDY, time_contradiction
 from turnout.stages.hammer_curve_rows import density_columns, receptance_row
 from turnout.stages.hammer_responses import response_model, responses_of
@@ -43,7 +43,10 @@ from turnout.stages.recording_notes import (
 
 # Largest value of the registry's column `test`.
 MAX_TEST_NUMBER = 2**31 - 1
-REPLACED_REMEDY = "Nothing: they were replaced. Where they are frequent, look at the converter or the cable"
+REMOVED_REMEDIES = {
+    "spikes": "Nothing: they were replaced. Where they are frequent, look at the converter or the cable",
+    "mains_hum": "Nothing: it was subtracted. Look at shields and earthing",
+}
 
 
 def hammer_unit(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, algo: str = "") -> dict[str, list[dict]]:
@@ -134,16 +137,18 @@ def _read_recordings(
                 rows["quarantine"].append(quarantine_row(wrong, base, "hammer", "hammer", None, ids[path]))
             rows["recordings"].append(recording_row(result, path, size, description, base, "hammer"))
             for recording in result.recordings:
-                clean_recording, removed = without_spikes(recording)
+                clean_recording, removed = without_artefacts(recording)
                 recordings.append(clean_recording)
-                rows["quarantine"] += (_spikes_row(r, recording, base, ids[path]) for r in removed)
+                rows["quarantine"] += (_removed_row(r, recording, base, ids[path]) for r in removed if is_notable(r))
     return recordings, ids
 
 
-def _spikes_row(finding: Rejection, recording: Recording, base: Mapping[str, Any], recording_id: str) -> dict[str, Any]:
-    """Row of ``quarantine`` for samples that were replaced; the record is used."""
-    where = f"record {recording.record + 1}, channel {finding.channel}"
-    error = ReadError(recording.source, where, finding.detail, REPLACED_REMEDY, finding.reason)
+def _removed_row(
+    finding: Rejection, recording: Recording, base: Mapping[str, Any], recording_id: str
+) -> dict[str, Any]:
+    """Row of ``quarantine`` for what was removed from a record; the record is used."""
+    where = f"record {recording.record + 1}" + (f", channel {finding.channel}" if finding.channel else "")
+    error = ReadError(recording.source, where, finding.detail, REMOVED_REMEDIES[finding.reason], finding.reason)
     row = quarantine_row(error, base, "hammer", "hammer", recording.record, recording_id)
     return row | {"measured_value": finding.value, "channels": list(finding.channels)}
 

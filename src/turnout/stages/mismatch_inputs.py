@@ -22,7 +22,7 @@ from turnout.passage.timetable import listed_at, listed_trains
 from turnout.readers import read
 from turnout.reasons import REASONS
 from turnout.records import LongRecording, Recording, Rejection, Unit
-from turnout.signal.spikes import without_spikes
+from turnout.signal.cleaning import without_artefacts
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
@@ -158,7 +158,7 @@ def _add_test(
     recordings = []
     for record in records:
         if isinstance(record, Recording):  # without a limit none is a long one
-            clean_recording, removed = without_spikes(record)
+            clean_recording, removed = without_artefacts(record)
             recordings.append(clean_recording)
             inputs.notes += map(_note_of_removed, removed)
     if not recordings:

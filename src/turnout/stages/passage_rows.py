@@ -16,6 +16,7 @@ from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain
 from turnout.passage.train_type import UNKNOWN
 from turnout.records import Rejection
+from turnout.signal.cleaning import is_notable
 from turnout.stages.raw_files import quarantine_row
 from turnout.stages.recording_notes import noted_number, noted_rail_temperature
 
@@ -30,6 +31,7 @@ REMEDIES = {
     "drop_out": "Look at the radio link, or at the buffer of the logger",
     "interference": "Nothing: they were cut out. Where they come with many trains, look at shields and earthing",
     "spikes": "Nothing: they were replaced. Where they come with many trains, look at the converter or radio link",
+    "mains_hum": "Nothing: it was subtracted. Where it is strong, look at shields and earthing",
     "channels_swapped": "Exchange the two channels in the layout, or at the logger",
     "clock_drift": "Synchronise the loggers, or correct the sensor's position in the layout",
     "two_trains": "Nothing: the passage is used as far as it is sound",
@@ -63,7 +65,7 @@ def finding_rows(
     rows: list[dict] = []
     for finding in passage.findings:
         is_whole_record = finding.reason in ("no_train", "two_trains", "train_cut_off")
-        if is_whole_record and passage.status != "rejected":
+        if (is_whole_record and passage.status != "rejected") or not is_notable(finding):
             continue
         place = f"record {record + 1}" if is_whole_record else f"record {record + 1}, {_subject(finding)}"
         remedy = REMEDIES.get(finding.reason, "Look at the recording")
@@ -80,7 +82,7 @@ def _subject(finding: Rejection) -> str:
     """The part of a record that a finding concerns: its channels, all channels, or what is uncertain, in words."""
     if finding.channels:
         return " and ".join(finding.channels)
-    return "all channels" if finding.reason == "interference" else finding.detail
+    return "all channels" if finding.reason in ("interference", "mains_hum") else finding.detail
 
 
 def passage_row(

@@ -116,7 +116,7 @@ class PassagePredictor(SiteModel):
         start = _start_time(values, aligned)
         conditions = {"name": aligned.name, "start": start, "hum_lines": aligned.hum_lines}
         for term in terms:
-            if term.effect_type == "channel":
+            if term.effect_type == "channel" and "passage" in term.recording_types:
                 signal = term.under_conditions(conditions).channel(signal, 4.0 * self.solver.rate, sensor)
         return signal
 

@@ -175,7 +175,7 @@ def _passage_channel_changes(
     linear_output = _LinearChannels(case, fit, aligned, signals)
     for c, k in chosen:
         term = c.term(c.starts[k])
-        if type(term).sensor is not PhysicsTerm.sensor:
+        if type(term).sensor is not PhysicsTerm.sensor or "passage" not in term.recording_types:
             continue
         change = np.zeros_like(rows)
         for row, sensor in enumerate(aligned.sensors):
