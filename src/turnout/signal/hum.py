@@ -22,18 +22,23 @@ LINE_RATE = 1000.0  # Hz: to about which samples are averaged before a line is s
 BLOCK = 0.005  # s: over which the level of a channel is measured
 QUIET_QUANTILE, QUIET_FACTOR = 0.1, 2.0  # quiet blocks are at most this factor above this quantile of all
 MIN_WINDOW, MAX_WINDOWS = 0.02, 8  # s: of a quiet time that is used; how many of them, the longest ones
-STEP_PERIODS, REFINEMENT = 0.05, 10  # between trial frequencies, at the ends of the quiet times; then parts of a step
+STEP_TURNS, REFINEMENT = 0.1, 20  # between trial frequencies, in turns over the quiet times; parts of a step
+FREQUENCY_ERROR = 0.1  # of a line in turns over the quiet times: three standard errors at a tenth of noise, 10 samples
 MIN_PERIODS = 2.0  # of a line in all quiet times together
-NOTABLE_STRENGTH = 0.02  # of hum, as a share of the peak: less is subtracted without a row in a table
+LEAST_SHARE = 0.1  # of any channel, beside what still rings: with less there is no hum
 HUM_SHARE = 0.5  # least share of a channel's power in its quiet times, and least share of the channels
+NOTABLE_STRENGTH = 0.02  # of hum, as a share of the peak: less is subtracted without a row in a table
 
 
 @dataclass(frozen=True)
 class _Line:
-    """A line in the quiet times: its frequency [Hz], and the share of the power of each channel that it explains."""
+    """A line in the quiet times: its frequency [Hz], the share of the power of each channel that it explains, and
+    whether its frequency is one of the mains.
+    """
 
     frequency: float
     shares: np.ndarray
+    is_mains: bool
 
 
 def without_hum(recording: Recording, names: Container[str] | None = None) -> tuple[Recording, tuple[Rejection, ...]]:
@@ -65,18 +70,15 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
         for i, (channel, x) in enumerate(zip(recording.channels, recording.samples))
         if (names is None or channel.name in names) and np.isfinite(x).all() and np.ptp(x) > 0.0
     ]
-    windows = _quiet_windows(recording.samples[rows], recording.rate) if rows else []
-    line = _common_line(recording.samples[rows], recording.rate, windows)
-    if line is None:
+    found = _common_line(recording.samples[rows], recording.rate) if rows else None
+    if found is None:
         return recording, ()
+    line, windows = found
     samples, time = recording.samples.copy(), np.arange(recording.n_sample) / recording.rate
     of_line = _line_columns(time, line.frequency)
-    quiet = np.concatenate([np.arange(*w) for w in windows])
-    columns = np.column_stack([of_line[quiet], _drift_columns(windows)])
     amplitudes, strength = {}, 0.0
-    for i, share in zip(rows, line.shares):
+    for i, share, parts in zip(rows, line.shares, _amplitudes(samples[rows], of_line, windows).T):
         if share >= HUM_SHARE:
-            parts = np.linalg.lstsq(columns, samples[i, quiet], rcond=None)[0][:2]
             samples[i] -= of_line @ parts
             amplitude = float(np.hypot(*parts))
             amplitudes[recording.channels[i].name] = amplitude
@@ -87,26 +89,55 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     return replace(recording, samples=samples), (finding,)
 
 
-def _quiet_windows(samples: np.ndarray, rate: float) -> list[tuple[int, int]]:
-    """(first, end) of the longest times in which most channels change little from sample to sample."""
+def _common_line(samples: np.ndarray, rate: float) -> tuple[_Line, list[tuple[int, int]]] | None:
+    """The line of the mains that most channels have, and the quiet times; None without one.
+
+    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are left out.
+    """
     size = max(1, round(BLOCK * rate))
-    n = samples.shape[1] // size
-    changes = np.diff(samples, axis=1, append=samples[:, -1:])[:, : n * size]
-    levels = np.sqrt(np.mean(changes.reshape(len(samples), n, size) ** 2, axis=2))
-    limits = QUIET_FACTOR * np.quantile(levels, QUIET_QUANTILE, axis=1, keepdims=True) if n else levels
-    is_quiet = np.median(levels / np.maximum(limits, 1e-300), axis=0) <= 1.0
+    is_quiet = _is_low(_levels(np.diff(samples, axis=1, append=samples[:, -1:]), size))
+    line = _strongest_line(samples, rate, windows := _windows(is_quiet, size, rate), beside=False)
+    if line is None:
+        return None
+    of_line = _line_columns(np.arange(samples.shape[1]) / rate, line.frequency)
+    rest = samples - (of_line @ _amplitudes(samples, of_line, windows)).T
+    is_quiet[is_quiet] = _is_low(_levels(rest, size)[:, is_quiet])
+    line = _strongest_line(samples, rate, windows := _windows(is_quiet, size, rate))
+    return (line, windows) if line and line.is_mains and np.mean(line.shares >= HUM_SHARE) >= HUM_SHARE else None
+
+
+def _levels(signals: np.ndarray, size: int) -> np.ndarray:
+    """(n_channel, n_block) root mean square of each block."""
+    n = signals.shape[1] // size
+    return np.sqrt(np.mean(signals[:, : n * size].reshape(len(signals), n, size) ** 2, axis=2))
+
+
+def _is_low(levels: np.ndarray) -> np.ndarray:
+    """(n_block,) whether most channels are little louder than in their quietest blocks."""
+    if not levels.size:
+        return np.zeros(levels.shape[1], dtype=bool)
+    limits = QUIET_FACTOR * np.quantile(levels, QUIET_QUANTILE, axis=1, keepdims=True)
+    return np.median(levels / np.maximum(limits, 1e-300), axis=0) <= 1.0
+
+
+def _windows(is_quiet: np.ndarray, size: int, rate: float) -> list[tuple[int, int]]:
+    """(first, end) of the longest quiet times."""
     edges = np.flatnonzero(np.diff(is_quiet.astype(int), prepend=0, append=0)) * size
     windows = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2]) if b - a >= MIN_WINDOW * rate]
     return sorted(sorted(windows, key=lambda w: w[0] - w[1])[:MAX_WINDOWS])
 
 
-def _common_line(samples: np.ndarray, rate: float, windows: list[tuple[int, int]]) -> _Line | None:
-    """The line at a frequency of the mains that explains most of the quiet times, None if most channels have none."""
+def _strongest_line(
+    samples: np.ndarray, rate: float, windows: list[tuple[int, int]], beside: bool = True
+) -> _Line | None:
+    """The line near a frequency of the mains that explains most of the quiet times, None without or if they are short.
+
+    Frequencies ``beside`` those of the mains are tried too: there, a line that is none of the mains explains more.
+    """
     size = max(1, int(rate / LINE_RATE))
     coarse = [(-(-a // size), b // size) for a, b in windows]  # whole blocks alone
     quiet = np.concatenate([np.arange(*w) for w in coarse]) if coarse else np.zeros(0, dtype=int)
-    duration = quiet.size * size / rate
-    nominal = [f for f in MAINS if duration >= MIN_PERIODS / f and rate / size >= 4.0 * f]
+    nominal = [f for f in MAINS if quiet.size * size / rate >= MIN_PERIODS / f and rate / size >= 4.0 * f]
     if not nominal:
         return None
     n = samples.shape[1] // size
@@ -114,17 +145,21 @@ def _common_line(samples: np.ndarray, rate: float, windows: list[tuple[int, int]
     time = (quiet * size + 0.5 * (size - 1)) / rate
     drift = np.linalg.qr(_drift_columns(coarse))[0]
     means -= drift @ (drift.T @ means)
-    step = STEP_PERIODS / np.ptp(time)
-    deviations = np.linspace(-MAINS_DEVIATION, MAINS_DEVIATION, 2 * int(np.ceil(MAINS_DEVIATION / step)) + 1)
+    turn = 1.0 / np.ptp(time)
+    reach = MAINS_DEVIATION
+    if beside:  # in a single quiet time, a line farther off does not look like one of the mains
+        reach += rate / size / max(b - a for a, b in coarse)
+    deviations = np.linspace(-reach, reach, 2 * int(np.ceil(reach / (STEP_TURNS * turn))) + 1)
     trials = np.concatenate([f + deviations for f in nominal])
     shares = _shares(means, time, drift, trials)
-    best = trials[np.argmax(np.sum(shares, axis=1))]
-    if np.max(shares) < 0.5 * HUM_SHARE:  # far from any line
+    k = int(np.argmax(np.sum(shares, axis=1)))
+    if np.max(shares[k]) < LEAST_SHARE:
         return None
-    trials = best + step * np.linspace(-1.0, 1.0, 2 * REFINEMENT + 1)
+    trials = trials[k] + STEP_TURNS * turn * np.linspace(-1.0, 1.0, 2 * REFINEMENT + 1)
     shares = _shares(means, time, drift, trials)
     k = int(np.argmax(np.sum(shares, axis=1)))
-    return _Line(float(trials[k]), shares[k]) if np.mean(shares[k] >= HUM_SHARE) >= HUM_SHARE else None
+    is_mains = min(abs(trials[k] - f) for f in nominal) <= MAINS_DEVIATION + FREQUENCY_ERROR * turn
+    return _Line(float(trials[k]), shares[k], is_mains)
 
 
 def _shares(signals: np.ndarray, time: np.ndarray, drift: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
@@ -139,6 +174,13 @@ def _shares(signals: np.ndarray, time: np.ndarray, drift: np.ndarray, frequencie
     by_sine, by_cosine = sine.T @ signals, cosine.T @ signals
     explained = (cc * by_sine**2 - 2.0 * sc * by_sine * by_cosine + ss * by_cosine**2) / (ss * cc - sc**2)
     return explained / np.maximum(np.sum(signals**2, axis=0), 1e-300)
+
+
+def _amplitudes(samples: np.ndarray, of_line: np.ndarray, windows: list[tuple[int, int]]) -> np.ndarray:
+    """(2, n_channel) amplitudes of sine and cosine by least squares in the quiet times, beside the drift of each."""
+    quiet = np.concatenate([np.arange(*w) for w in windows])
+    columns = np.column_stack([of_line[quiet], _drift_columns(windows)])
+    return np.linalg.lstsq(columns, samples[:, quiet].T, rcond=None)[0][:2]
 
 
 def _line_columns(time: np.ndarray, frequency: float) -> np.ndarray:

@@ -1,0 +1,111 @@
+"""Hum of the mains is subtracted where most channels share it; vibrations of track and train stay."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from turnout.records import Channel, Recording
+from turnout.signal.cleaning import is_notable, without_artefacts
+from turnout.signal.hum import without_hum
+
+RATE, NAMES = 5000.0, ("A1", "A2", "A3", "A4")
+AMPLITUDES = np.array([0.5, 0.3, 0.7, 0.4])  # m/s²
+PHASES = np.array([0.1, 1.3, -2.0, 2.6])
+
+
+def passage(rng=5, duration=4.0, start=1.2, stop=2.8):
+    """Noise of 0.03 m/s² and, from start to stop, wide-band vibration of 20 m/s² as under a train."""
+    rng = np.random.default_rng(rng)
+    t = np.arange(round(duration * RATE)) / RATE
+    train = (t > start) & (t < stop)
+    samples = 0.03 * rng.normal(size=(4, t.size)) + 20.0 * train * rng.normal(size=(4, t.size))
+    return Recording(samples, RATE, tuple(Channel(name, "acceleration") for name in NAMES), "passage"), t
+
+
+def with_line(recording, t, frequency, rows=(0, 1, 2, 3)):
+    samples = recording.samples.copy()
+    for i in rows:
+        samples[i] += AMPLITUDES[i] * np.sin(2.0 * np.pi * frequency * t + PHASES[i])
+    return Recording(samples, recording.rate, recording.channels, recording.kind)
+
+
+@pytest.mark.parametrize("frequency", [50.0 / 3.0, 16.7, 25.0, 49.96, 50.03, 60.0])
+def test_the_line_is_subtracted_also_under_the_train(frequency):
+    """The error of a sine fitted to n samples of noise s has the standard deviation s sqrt(2/n) in each component. Its
+    frequency is known to sqrt(6) s / (pi T a sqrt(n)), so that the phase errs by less than 0.02 within the record."""
+    recording, t = passage()
+    hums = with_line(recording, t, frequency)
+    cleaned, (finding,) = without_hum(hums)
+    assert finding.reason == "mains_hum" and f"line of {frequency:.1f} Hz" in finding.detail
+    rest = cleaned.samples - recording.samples
+    assert np.all(np.max(np.abs(rest), axis=1) < 0.04 * AMPLITUDES)
+
+
+def test_an_impact_with_hum_is_as_without():
+    """One impact in a quarter of a second, with a decaying response of 150 Hz; the hum is as large as the noise."""
+    rate, rng = 20e3, np.random.default_rng(2)
+    t = np.arange(5000) / rate
+    since = np.clip(t - 0.025, 0.0, None)
+    response = 150.0 * np.exp(-60.0 * since) * np.sin(2.0 * np.pi * 150.0 * since)
+    force = 9e3 * signal.windows.hann(60).sum() * np.zeros(t.size)
+    force[500:560] = 9e3 * signal.windows.hann(60)
+    clean = np.stack([force, response, 0.4 * response, 0.1 * response])
+    noise = rng.normal(size=clean.shape) * [[2.0], [0.05], [0.05], [0.05]]
+    hum = np.outer([0.0, 0.5, 0.5, 0.5], np.sin(2.0 * np.pi * 50.0 * t + 0.7))
+    channels = (Channel("hammer", "force"), *(Channel(name, "acceleration") for name in NAMES[:3]))
+    cleaned, findings = without_hum(Recording(clean + noise + hum, rate, channels, "hammer"))
+    assert [f.reason for f in findings] == ["mains_hum"]
+    assert np.array_equal(cleaned.samples[0], (clean + noise)[0])  # the force does not hum
+    assert np.max(np.abs(cleaned.samples - clean - noise)[1:]) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("frequency", "rows"),
+    [
+        (50.0, (2,)),  # of one channel of four: an effect with a name
+        (40.0, (0, 1, 2, 3)),  # a machine
+        (50.4, (0, 1, 2, 3)),  # no grid is so far from its frequency
+        (100.0, (0, 1, 2, 3)),  # a harmonic alone
+    ],
+)
+def test_other_lines_stay(frequency, rows):
+    recording, t = passage()
+    hums = with_line(recording, t, frequency, rows)
+    cleaned, findings = without_hum(hums)
+    assert cleaned is hums and findings == ()
+
+
+def test_vibration_of_50_hz_under_the_train_stays():
+    """Sleepers 0.6 m apart pass at 50 Hz at 30 m/s."""
+    recording, t = passage()
+    samples = recording.samples + 5.0 * ((t > 1.2) & (t < 2.8)) * np.sin(2.0 * np.pi * 50.0 * t)
+    vibrates = Recording(samples, RATE, recording.channels, "passage")
+    assert without_hum(vibrates) == (vibrates, ())
+
+
+def test_channels_without_signal_are_not_asked():
+    recording, t = passage()
+    hums = with_line(recording, t, 50.0)
+    samples = np.vstack([hums.samples, np.full(t.size, np.nan), np.zeros(t.size)])
+    channels = (*hums.channels, Channel("broken", "acceleration"), Channel("dead", "acceleration"))
+    cleaned, (finding,) = without_hum(Recording(samples, RATE, channels, "passage"))
+    assert "broken" not in finding.detail and np.isnan(cleaned.samples[4]).all() and not cleaned.samples[5].any()
+
+
+@pytest.mark.parametrize("n", [1, 30, 200])
+def test_a_record_that_is_too_short_stays(n):
+    """Two periods of 60 Hz take 33 ms, 167 samples; below, nothing is judged. At 200 all of it is noise."""
+    samples = np.random.default_rng(1).normal(size=(4, n))
+    recording = Recording(samples, RATE, tuple(Channel(name, "acceleration") for name in NAMES), "passage")
+    assert without_hum(recording) == (recording, ())
+
+
+@pytest.mark.parametrize(("factor", "notable"), [(1.0, False), (4.0, True)])
+def test_weak_hum_is_not_worth_a_row(factor, notable):
+    """The peak of the noise under the train is about 4.2 standard deviations, 84 m/s²: 2 % of it are 1.7 m/s²."""
+    recording, t = passage()
+    line = np.outer(factor * AMPLITUDES, np.sin(2.0 * np.pi * 50.0 * t))
+    _, (finding,) = without_artefacts(
+        Recording(recording.samples + line, RATE, recording.channels, "passage"), set(NAMES)
+    )
+    assert is_notable(finding) == notable
