@@ -55,7 +55,9 @@ def test_a_channel_that_agrees_with_no_sensor_is_not_used_and_one_of_wrong_polar
     assert channel_faults("passages", noise).unrelated == {"A2": 0.02}
     inverted = comparison(NAMES)
     inverted.correlations[1] *= -1.0
-    assert not channel_faults("passages", [inverted] * 4)
+    assert not channel_faults("passages", [inverted] * 4)  # as in its hammer tests: a fault of the sensor
+    assert channel_faults("passages", [inverted] * 4, NAMES).inverted == {"A2": -0.95}
+    assert not channel_faults("passages", [comparison(NAMES)] * 4, NAMES)
 
 
 def test_recordings_that_agree_with_no_sensor_show_no_fault_of_a_channel():
@@ -128,6 +130,30 @@ def test_a_channel_of_noise_in_passages_is_left_out_there_and_used_in_hammer_tes
     assert list(faults) == ["passages"] and list(faults["passages"].unrelated) == [name]
     assert all(name not in [s.name for s in a.sensors] for a in data.aligned_passages.values())
     assert any(pair.channel == name for pair in data.frf_pairs.values())
+
+
+@pytest.mark.parametrize("in_tests", [False, True])
+def test_a_polarity_that_is_wrong_in_the_passages_alone_is_corrected(campaign, in_tests):
+    name = campaign.sensors[2].name
+
+    def inverted(recording):
+        samples = recording.samples.copy()
+        samples[recording.index(name)] *= -1.0
+        return replace(recording, samples=samples)
+
+    changed = campaign.with_recordings("passages", inverted)
+    changed = changed.with_recordings("hammer tests", inverted) if in_tests else changed
+    data, faults = faults_of(changed)
+    if in_tests:
+        assert faults == {}
+        return
+    assert list(faults) == ["passages"] and list(faults["passages"].inverted) == [name]
+    (sentence,) = faults["passages"].sentences()
+    assert f"channel {name} has the wrong polarity, and in other recordings the right one" in sentence
+    right, _ = case_data(campaign, MismatchSettings(), Track1D())
+    by_name = {o.name: o.data for o in right.observations}
+    for o in data.observations:
+        np.testing.assert_allclose(o.data, by_name[o.name], rtol=1e-6, atol=1e-9 * np.max(np.abs(o.data)))
 
 
 def test_impacts_in_misnamed_files_are_used_at_their_true_position(campaign):

@@ -119,6 +119,29 @@ def test_spikes_change_no_mode_and_are_stated(tmp_path, is_force):
         assert abs(mode["frequency_hz"] - other["frequency_hz"]) < 0.1 * mode["frequency_se_hz"]
 
 
+@pytest.mark.parametrize(("amplitude", "reasons"), [(0.5, set()), (20.0, {"mains_hum"})])
+def test_hum_changes_no_mode_and_strong_hum_is_stated(tmp_path, amplitude, reasons):
+    """The responses have peaks of 190 to 310 m/s²: 2 % of these, 4 to 6 m/s², are worth a row."""
+
+    def hum(test, recordings):
+        changed = []
+        for k, r in enumerate(recordings):
+            line = amplitude * np.sin(2 * np.pi * 50.02 * np.arange(r.n_sample) / r.rate + 1.7 * k)
+            hums = np.array([c.quantity == "acceleration" for c in r.channels])
+            changed.append(replace(r, samples=r.samples + hums[:, None] * line))
+        return changed
+
+    rows = []
+    for name, change in (("clean", None), ("hum", hum)):
+        unit, turnout, _ = write_tests(tmp_path / name, "A8", change=change)
+        rows.append(hammer_unit(unit, turnout, tmp_path / name, algo="1"))
+    clean, hums = rows
+    assert {q["reason_code"] for q in hums["quarantine"]} == reasons and status_of(hums) == "ok"
+    assert [i["status"] for i in hums["impacts"]] == [i["status"] for i in clean["impacts"]]
+    for mode, other in zip(clean["modes"], hums["modes"], strict=True):
+        assert abs(mode["frequency_hz"] - other["frequency_hz"]) < 0.2 * mode["frequency_se_hz"]
+
+
 def test_an_impact_that_the_modes_do_not_describe_is_rejected_and_not_counted(tmp_path):
     """Only one impact of ten has a resonance of 1350 Hz, at half of the peak, as from a hit elsewhere."""
 

@@ -536,6 +536,21 @@ def test_spikes_in_recordings_are_replaced_and_stated_once_for_each_channel(fold
     assert "3 samples replaced" in note and "Other records with this fault: 1." in note
 
 
+def test_hum_of_all_channels_is_subtracted_and_stated_once(folder):
+    def hum(recording):
+        line = 2.0 * np.sin(2.0 * np.pi * 50.0 * np.arange(recording.n_sample) / recording.rate)
+        return replace(recording, samples=recording.samples + line)
+
+    small.write_passages(folder, speeds=(100.0, 110.0))
+    bare = {p.name: p.recording.samples for p in gathered(folder, "passage").passages}
+    small.write_passages(folder, speeds=(100.0, 110.0), change=hum)
+    found = gathered(folder, "passage")
+    (note,) = (n.text for n in found.notes if "hum" in n.text)
+    assert "line of 50.0 Hz subtracted" in note and "Other records with this fault: 1." in note
+    for passage in found.passages:
+        assert np.max(np.abs(passage.recording.samples - bare[passage.name])) < 0.2
+
+
 def test_a_rail_temperature_that_no_rail_has_is_stated_once(folder):
     """29.5 °C are 85.1 degrees Fahrenheit; a broken thermometer notes 85."""
     hot = {"rail_temperature": 85.1}

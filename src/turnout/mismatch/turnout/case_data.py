@@ -187,7 +187,7 @@ def case_data(
             return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))
     predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
     predictor = predictor.recentre(start_values)
-    passages = observe_passages(campaign, settings.materiality, predictor, start_values)
+    passages = observe_passages(campaign, settings.materiality, predictor, start_values, filed.upright_channels)
     for fault in passages.layout_faults:
         if fault and fault.recording_type not in is_corrected:
             return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))

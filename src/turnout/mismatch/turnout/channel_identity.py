@@ -6,8 +6,8 @@ also if track, wheels or sensors have any known fault, and by less than 0.5 with
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -56,16 +56,18 @@ class ChannelFaults:
     """Channels that do not record their sensor, in recordings of one ``recording_type`` ("passages" or "hammer tests").
 
     ``sensor_of`` are exchanged channels, each with the sensor that it records. ``unrelated`` are channels that record
-    nothing of what the others do, with their correlation. ``n`` is the number of recordings compared.
+    nothing of what the others do, with their correlation. ``inverted`` are channels of the wrong polarity, with theirs.
+    ``n`` is the number of recordings compared.
     """
 
     recording_type: str
     n: int
     sensor_of: Mapping[str, str]
-    unrelated: Mapping[str, float]
+    unrelated: Mapping[str, float] = field(default_factory=dict)
+    inverted: Mapping[str, float] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return bool(self.sensor_of or self.unrelated)
+        return bool(self.sensor_of or self.unrelated or self.inverted)
 
     def sentences(self) -> list[str]:
         """What was found, what was done, and what to do.
@@ -73,7 +75,7 @@ class ChannelFaults:
         Returns
         -------
         list of str
-            One text without its full stop for exchanged channels, and one for each unrelated one.
+            One text without its full stop for exchanged channels, and one for each unrelated or inverted one.
         """
         texts = []
         if self.sensor_of:
@@ -88,10 +90,16 @@ class ChannelFaults:
             "was not used. Check the sensor, its cable and 'source' of this channel in the layout"
             for c, r in sorted(self.unrelated.items())
         ]
+        texts += [
+            f"In the {self.recording_type} channel {c} has the wrong polarity, and in other recordings the right one: "
+            f"its correlation with the simulation at its sensor is {r:.2f}. The diagnosis inverts it. Check the cable "
+            "of this channel, and the sign of its sensitivity in the layout"
+            for c, r in sorted(self.inverted.items())
+        ]
         return texts
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
-        """The campaign with exchanged channels named by the sensors that they record, without unrelated ones.
+        """The campaign with exchanged channels named by their sensors, inverted ones inverted, without unrelated ones.
 
         Parameters
         ----------
@@ -114,11 +122,16 @@ class ChannelFaults:
             else c
             for c in channels
         )
-        return replace(recording, samples=recording.samples[rows], channels=tuple(renamed))
+        signs = np.array([-1.0 if c.name in self.inverted else 1.0 for c in channels])
+        return replace(recording, samples=signs[:, None] * recording.samples[rows], channels=tuple(renamed))
 
 
-def channel_faults(recording_type: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
-    """Channels that do not record their sensor: exchanged ones, and those that record nothing of the train.
+def channel_faults(
+    recording_type: str, comparisons: Sequence[Comparison], upright: Container[str] = ()
+) -> ChannelFaults:
+    """Channels that do not record their sensor: exchanged ones, inverted ones, and those without a trace of the train.
+
+    A channel that is inverted in all recordings is none of them: that is a fault of its sensor, which has a name.
 
     Parameters
     ----------
@@ -126,6 +139,8 @@ def channel_faults(recording_type: str, comparisons: Sequence[Comparison]) -> Ch
         Of the recordings: "passages".
     comparisons : sequence of Comparison
         One per recording.
+    upright : container of str
+        Channels that have the right polarity in other recordings.
 
     Returns
     -------
@@ -139,7 +154,12 @@ def channel_faults(recording_type: str, comparisons: Sequence[Comparison]) -> Ch
         for (c, s), r in correlations.items()
         if c == s and c not in exchanged.sensor_of and abs(r) < CHANNELS_CHECK.other_sensor
     }
-    return replace(exchanged, unrelated=unrelated)
+    inverted = {
+        c: r
+        for (c, s), r in correlations.items()
+        if c == s and c not in exchanged.sensor_of and c in upright and r <= -CHANNELS_CHECK.same_sensor
+    }
+    return replace(exchanged, unrelated=unrelated, inverted=inverted)
 
 
 def exchanged_channels(recording_type: str, comparisons: Sequence[Comparison]) -> ChannelFaults:
@@ -164,7 +184,7 @@ def exchanged_channels(recording_type: str, comparisons: Sequence[Comparison]) -
         >= max(CHANNELS_CHECK.same_sensor, correlations.get((c, c), 1.0) + CHANNELS_CHECK.min_gain)
         for c, s in sensor_of.items()
     )
-    return ChannelFaults(recording_type, len(comparisons), sensor_of if is_certain else {}, {})
+    return ChannelFaults(recording_type, len(comparisons), sensor_of if is_certain else {})
 
 
 def typical_correlations(

@@ -13,6 +13,7 @@ from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.channel_identity import Comparison
 from turnout.mismatch.turnout.observed_tests import ObservedTests
 from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.priors import CHANNELS_CHECK
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 
 
@@ -45,6 +46,16 @@ class FiledTests:
     def comparisons(self) -> list[Comparison]:
         """Correlation of each channel with the simulation at each of the sensors of its test, one per test."""
         return [self._compare(pairs) for pairs in self.pairs_by_test.values()]
+
+    @property
+    def upright_channels(self) -> set[str]:
+        """Channels that agree with the simulation of their sensor, in the median of the tests, with its polarity."""
+        correlations: dict[str, list[float]] = {}
+        for comparison in self.comparisons:
+            for (channel, sensor), r in comparison.at_best_lag({}).items():
+                if channel == sensor:
+                    correlations.setdefault(channel, []).append(r)
+        return {channel for channel, r in correlations.items() if np.median(r) >= CHANNELS_CHECK.same_sensor}
 
     def correlations_at(self, test: HammerInput, position: float) -> np.ndarray:
         """Correlation of each channel of a test with the simulation of impacts at a position.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +41,7 @@ class ObservedPassages:
 
 
 def observe_passages(
-    campaign: CampaignInput, tolerance: float, predictor: Predictor, start_values: Values
+    campaign: CampaignInput, tolerance: float, predictor: Predictor, start_values: Values, upright: Container[str]
 ) -> ObservedPassages:
     """Observations of the passages that correlate with the simulation of their train and are not disturbed.
 
@@ -54,6 +54,8 @@ def observe_passages(
         With the rail that the hammer tests give.
     start_values : mapping
         Nuisances of track and sensors from the hammer tests, by name.
+    upright : container of str
+        Channels that have the right polarity in the hammer tests.
 
     Returns
     -------
@@ -95,7 +97,10 @@ def observe_passages(
         disturbed,
         surface_values,
         tuple(notes),
-        (channel_faults("passages", comparisons), wrong_scale("passages", comparisons if start_values else ())),
+        (
+            channel_faults("passages", comparisons, upright),
+            wrong_scale("passages", comparisons if start_values else ()),
+        ),
     )
 
 
