@@ -70,10 +70,10 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
         for i, (channel, x) in enumerate(zip(recording.channels, recording.samples))
         if (names is None or channel.name in names) and np.isfinite(x).all() and np.ptp(x) > 0.0
     ]
-    found = _common_line(recording.samples[rows], recording.rate) if rows else None
-    if found is None:
+    line_in_windows = _common_line(recording.samples[rows], recording.rate) if rows else None
+    if line_in_windows is None:
         return recording, ()
-    line, windows = found
+    line, windows = line_in_windows
     samples, time = recording.samples.copy(), np.arange(recording.n_sample) / recording.rate
     of_line = _line_columns(time, line.frequency)
     amplitudes, strength = {}, 0.0
@@ -100,8 +100,8 @@ def _common_line(samples: np.ndarray, rate: float) -> tuple[_Line, list[tuple[in
     if line is None:
         return None
     of_line = _line_columns(np.arange(samples.shape[1]) / rate, line.frequency)
-    rest = samples - (of_line @ _amplitudes(samples, of_line, windows)).T
-    is_quiet[is_quiet] = _is_low(_levels(rest, size)[:, is_quiet])
+    remainder = samples - (of_line @ _amplitudes(samples, of_line, windows)).T
+    is_quiet[is_quiet] = _is_low(_levels(remainder, size)[:, is_quiet])
     line = _strongest_line(samples, rate, windows := _windows(is_quiet, size, rate))
     return (line, windows) if line and line.is_mains and np.mean(line.shares >= HUM_SHARE) >= HUM_SHARE else None
 

@@ -85,10 +85,10 @@ class FiledTests:
         for i, measured in enumerate(pairs):
             elsewhere = [p for p in pairs if p is not measured]
             rows = iter(self._simulate([replace(measured, channel=p.channel, sensor=p.sensor) for p in elsewhere]))
-            own = self.simulated[measured.name]
+            at_its_sensor = self.simulated[measured.name]
             for j, pair in enumerate(pairs):
-                correlations[i, j] = self._correlation(measured, own if pair is measured else next(rows))
-            ratios[i] = 1.0 / max(np.median(np.hypot(*own.reshape(2, -1))), 1e-12)
+                correlations[i, j] = self._correlation(measured, at_its_sensor if pair is measured else next(rows))
+            ratios[i] = 1.0 / max(np.median(np.hypot(*at_its_sensor.reshape(2, -1))), 1e-12)
         return Comparison(names, names, correlations, ratios)
 
     def _simulate(self, pairs: Sequence[FrfPair]) -> list[np.ndarray]:

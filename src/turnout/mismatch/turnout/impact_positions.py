@@ -78,8 +78,7 @@ def misplaced_tests(filed: FiledTests) -> MisplacedTests:
             if (nearby := _position_nearby(filed, test)) is not None:
                 misplaced[test.name] = test.place, nearby
             continue
-        others = sorted(set(filed.positions) - {test.place})
-        trials = [(_mean_correlation(filed, test, x), x) for x in others]
+        trials = [(_mean_correlation(filed, test, x), x) for x in sorted(set(filed.positions) - {test.place})]
         best_correlation, best_position = max(trials, default=(-np.inf, test.place))
         if best_correlation >= max(CHANNELS_CHECK.same_sensor, stated_correlation + CHANNELS_CHECK.min_gain):
             misplaced[test.name] = test.place, best_position
