@@ -16,8 +16,12 @@ from turnout_blind.score.names import RIGHT_NAMES
 OWN_KINDS = Path(__file__).with_name("left_out_effects")  # named as the effect of the library that they conceal
 OWN_NAMES = {path.stem: (path.stem,) for path in sorted(OWN_KINDS.glob("*.py"))}
 
-# Effects of one part without a ``component``: the tread of a wheel, and the running surface of the rail
-SAME_PART = (frozenset({"wheel_flat", "out_of_round"}), frozenset({"surface_dip", "rail_corrugation"}))
+# Effects of one part without a ``component``: the tread of a wheel, the running surface of the rail, and an amplifier
+SAME_PART = (
+    frozenset({"wheel_flat", "out_of_round"}),
+    frozenset({"surface_dip", "rail_corrugation"}),
+    frozenset({"sensor_gain", "passage_gain", "hammer_gain"}),
+)
 # Effect -> why the generator has no case of it
 WITHOUT_KIND = {
     "dry_friction": "its supports have no slider",
