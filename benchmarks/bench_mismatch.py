@@ -53,8 +53,15 @@ EFFECTS = {
     "high_pass": (physics.HighPass("S4", 18.0), {"sensor": "S4"}),
     "clock_drift": (physics.ClockDrift("S1", 2e-3), {"sensor": "S1"}),
 }
-# A gap that only the heavy train closes. One that no train closes cannot be distinguished from missing ballast.
-SECOND_EFFECTS = {"hanging_sleeper": (physics.HangingSleeper(43, 8e-4), {"place": 25.8})}
+# Later ones, so that the others keep their seeds. The gap is one that only the heavy train closes: one that no train
+# closes cannot be distinguished from missing ballast.
+SECOND_EFFECTS = {
+    "hanging_sleeper": (physics.HangingSleeper(43, 8e-4), {"place": 25.8}),
+    "passage_delay": (physics.PassageDelay("S4", 1.5e-3), {"sensor": "S4"}),
+    "passage_gain": (physics.PassageGain("S3", 1.3), {"sensor": "S3"}),
+    "hammer_delay": (physics.HammerDelay("S4", 1.5e-3), {"sensor": "S4"}),
+    "hammer_gain": (physics.HammerGain("S3", 1.3), {"sensor": "S3"}),
+}
 DEVELOPMENT = [(f"control {k}", None, {}) for k in range(12)]
 DEVELOPMENT += [(name, *entry) for more in (EFFECTS, SECOND_EFFECTS) for name, entry in more.items()]
 WHOLE = "whole turnout"
