@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.records import Recording, Rejection
+from turnout.signal.converter import converter_step
+from turnout.signal.drop_outs import drop_outs
 
 if TYPE_CHECKING:
     from collections.abc import Container
@@ -27,6 +29,8 @@ FREQUENCY_ERROR = 0.1  # of a line in turns over the quiet times: three standard
 MIN_PERIODS = 2.0  # of a line in all quiet times together
 LEAST_SHARE = 0.1  # of any channel, beside what still rings: with less there is no hum
 HUM_SHARE = 0.5  # least share of a channel's power in its quiet times, and least share of the channels
+MIN_EXTREME_RUN = 3  # equal samples at the top or bottom of a channel that count as clipped, if it has two such runs
+MIN_HELD_TIME = 0.05  # s: equal samples at an end of a recording that count as a lost sensor
 NOTABLE_STRENGTH = 0.02  # of hum, as a share of the peak: less is subtracted without a row in a table
 
 
@@ -47,7 +51,8 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     A recording hums if a line within 0.1 Hz of 16.7, 25, 50 or 60 Hz explains half of the power below some 500 Hz of
     half of its channels, in their quiet times: where they change by at most twice as much from sample to sample as in
     their quietest tenth. The line is fitted to the quiet times by least squares, beside a straight line for each, and
-    subtracted from the whole of every channel that has it. Harmonics stay, and so does the hum of one channel of many.
+    subtracted from the whole of every channel that has it. Channels that are clipped, lost, or have a drop-out stay, so
+    that later checks find this. Harmonics stay, and so does the hum of one channel of many.
 
     .. math:: x(t) = a \sin(2 \pi f t) + b \cos(2 \pi f t) + c_k + d_k t
 
@@ -78,11 +83,14 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     of_line = _line_columns(time, line.frequency)
     amplitudes, strength = {}, 0.0
     for i, share, parts in zip(rows, line.shares, _amplitudes(samples[rows], of_line, windows).T):
-        if share >= HUM_SHARE:
-            samples[i] -= of_line @ parts
+        if share >= HUM_SHARE and not _holds_a_value(samples[i], recording.rate):
+            step = converter_step(samples[i])  # later checks need the steps of the converter
+            samples[i] = step * (np.round(samples[i] / step) - np.round(of_line @ parts / step))
             amplitude = float(np.hypot(*parts))
             amplitudes[recording.channels[i].name] = amplitude
             strength = max(strength, amplitude / float(np.max(np.abs(samples[i]))))
+    if not amplitudes:
+        return recording, ()
     listed = ", ".join(f"{name} {amplitude:.3g}" for name, amplitude in amplitudes.items())
     text = f"line of {line.frequency:.1f} Hz subtracted, amplitudes: {listed}"
     finding = Rejection("mains_hum", strength, NOTABLE_STRENGTH, text)
@@ -181,6 +189,16 @@ def _amplitudes(samples: np.ndarray, of_line: np.ndarray, windows: list[tuple[in
     quiet = np.concatenate([np.arange(*w) for w in windows])
     columns = np.column_stack([of_line[quiet], _drift_columns(windows)])
     return np.linalg.lstsq(columns, samples[:, quiet].T, rcond=None)[0][:2]
+
+
+def _holds_a_value(samples: np.ndarray, rate: float) -> bool:
+    """Whether a channel repeats one value where it should move: clipped, in a drop-out, or at an end."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(samples)) + 1, [samples.size]])
+    values, lengths = samples[edges[:-1]], np.diff(edges)
+    is_long = lengths >= MIN_EXTREME_RUN
+    n_extreme = max(np.sum(is_long & (values == x)) for x in (samples.min(), samples.max()))
+    is_lost = max(lengths[0], lengths[-1]) >= MIN_HELD_TIME * rate
+    return bool(n_extreme >= 2 or is_lost or drop_outs(samples).size)
 
 
 def _line_columns(time: np.ndarray, frequency: float) -> np.ndarray:

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from turnout.passage.channel_checks import channel_states
 from turnout.records import Channel, Recording
 from turnout.signal.cleaning import is_notable, without_artefacts
+from turnout.signal.converter import converter_step
 from turnout.signal.hum import without_hum
 
 RATE, NAMES = 5000.0, ("A1", "A2", "A3", "A4")
@@ -90,6 +92,24 @@ def test_channels_without_signal_are_not_asked():
     channels = (*hums.channels, Channel("broken", "acceleration"), Channel("dead", "acceleration"))
     cleaned, (finding,) = without_hum(Recording(samples, RATE, channels, "passage"))
     assert "broken" not in finding.detail and np.isnan(cleaned.samples[4]).all() and not cleaned.samples[5].any()
+
+
+def test_channels_that_repeat_one_value_stay_so_that_later_checks_find_it():
+    """A range of 30 m/s² that cuts off the train, a drop-out of 0.1 s, a sensor that is lost 0.3 s before the end."""
+    recording, t = passage()
+    hums = with_line(recording, t, 50.0).samples.round(2)  # converter steps of 0.01 m/s²
+    hums[0] = np.clip(hums[0], -30.0, 30.0)
+    hums[1, 7000:7500] = hums[1, 6999]
+    hums[2, -1500:] = hums[2, -1501]
+    cleaned, (finding,) = without_hum(Recording(hums, RATE, recording.channels, "passage"))
+    assert [name in finding.detail for name in NAMES] == [False, False, False, True]
+    before, after = (
+        {name: {f.reason for f in state.findings} for name, state in zip(NAMES, channel_states(r))}
+        for r in (Recording(hums, RATE, recording.channels, "passage"), cleaned)
+    )
+    assert before == after == {"A1": {"clipped"}, "A2": {"drop_out"}, "A3": {"sensor_lost"}, "A4": set()}
+    assert converter_step(cleaned.samples[3]) == pytest.approx(0.01, rel=1e-6)
+    assert np.std(cleaned.samples[3, :5000]) < 0.04  # noise of 0.03 m/s²
 
 
 @pytest.mark.parametrize("n", [1, 30, 200])
