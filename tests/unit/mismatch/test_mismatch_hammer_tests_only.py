@@ -106,6 +106,26 @@ def test_channels_without_impacts_are_left_out_with_a_note(plan):
         TrackCase(replace(campaign, hammer=(silent,)))
 
 
+def test_the_note_on_a_test_without_impacts_states_why_they_were_rejected(plan):
+    campaign = measured_campaign(replace(plan, hammer_points=plan.hammer_points[:2]), seed=1)
+    first = campaign.hammer[0]
+    row = first.recordings[0].index(first.force)
+    level = 0.6 * min(r.samples[row].max() for r in first.recordings)
+
+    def limited(recording):
+        samples = recording.samples.copy()
+        samples[row] = np.minimum(samples[row], level)
+        return replace(recording, samples=samples)
+
+    clipped = replace(first, recordings=tuple(map(limited, first.recordings)))
+    (note,) = (
+        n
+        for n in TrackCase(replace(campaign, hammer=(clipped, campaign.hammer[1])), families=()).notes
+        if "accepted impacts" in n
+    )
+    assert first.name in note and "rejected, counted for each channel: overload, a channel left its range" in note
+
+
 @pytest.mark.slow
 def test_the_size_of_a_soft_rail_in_shear_refers_to_the_rail_of_the_file(plan):
     """The fits start from a rail that impacts have calibrated. The named size still refers to the rail of the file,

@@ -61,7 +61,7 @@ def observe_tests(
         if not pairs_of_test:
             notes.append(
                 f"hammer test {test.name}: no channel within {CASE.max_hammer_distance:g} m with "
-                f"{RECEPTANCE.min_impacts} accepted impacts"
+                f"{RECEPTANCE.min_impacts} accepted impacts{_usual_rejection(test, sensors)}"
             )
         for pair, observation in pairs_of_test:
             pairs[pair.name] = pair
@@ -79,6 +79,16 @@ def _fault_of_channel(test: HammerInput, channel: str) -> str | None:
     """The reason of most rejections of the impacts of a test that concern this channel, None without any."""
     reasons = Counter(r.reason for i in test.impacts(channel) for r in i.rejections if r.channel == channel)
     return reasons.most_common(1)[0][0] if reasons else None
+
+
+def _usual_rejection(test: HammerInput, sensors: Sequence[Sensor]) -> str:
+    """How many of all impacts were rejected for the most frequent reason, in words; "" if none was."""
+    impacts = [impact for sensor in sensors for impact in test.impacts(sensor.name)]
+    reasons = Counter(reason for impact in impacts for reason in {r.reason for r in impact.rejections})
+    if not reasons:
+        return ""
+    reason, n = reasons.most_common(1)[0]
+    return f" ({n} of {len(impacts)} rejected, counted for each channel: {reason}, {REASONS[reason]})"
 
 
 def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]:
