@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.errors import REMARK_REASONS
 from turnout.passage.axle_count import best_count, count_without_distance
 from turnout.passage.axles import sensor_times
 from turnout.passage.channel_checks import channel_states, lost_sensors
@@ -22,7 +23,7 @@ from turnout.passage.train_type import UNKNOWN
 from turnout.records import Recording, Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from turnout.config.settings.passage import PassageSettings
     from turnout.passage.axle_patterns import Pattern
@@ -111,8 +112,13 @@ def _with_lost_sensors(
         passage,
         at_sensor={**passage.at_sensor, **lost_times},
         findings=findings,
-        status="partly" if findings else passage.status,
+        status=_status(findings, passage.status),
     )
+
+
+def _status(findings: Iterable[Rejection], otherwise: str) -> str:
+    """ "partly" if a finding limits what can be used: what was replaced or subtracted does not."""
+    return "partly" if any(f.reason not in REMARK_REASONS for f in findings) else otherwise
 
 
 def _analyse_train(
@@ -139,7 +145,7 @@ def _analyse_train(
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
     findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
-    return replace(passage, status="partly" if findings else "accepted", findings=tuple(findings))
+    return replace(passage, status=_status(findings, "accepted"), findings=tuple(findings))
 
 
 def _count_by_several_sensors(

@@ -14,7 +14,7 @@ from turnout.physics.time_offset import STARTS, TimeOffset
 class PassageDelay(TimeOffset):
     r"""One channel lags by the same time in every passage, :math:`T = e^{-2\pi i f \Delta t}`, and in no hammer test.
 
-    A filter before this channel alone is such a lag. That of a clock that runs fast or slow grows during the record.
+    A filter before this channel alone is such a lag. The lag of a clock that runs fast or slow grows during the record.
     """
 
     name = "passage_delay"

@@ -1,12 +1,13 @@
-"""Remove hum from the channels of a recording: mains or traction current that most of them share.
+"""Remove hum from the accelerations of a recording: mains or traction current that most channels share.
 
-Where nothing excites the track it does not vibrate. A steady line at a frequency of the mains is no vibration there,
-and its phase goes on through the impact or the train.
+Where nothing excites the track it does not vibrate. A steady line at a frequency of the mains is no vibration there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,38 +22,38 @@ if TYPE_CHECKING:
 MAINS = (50.0 / 3.0, 25.0, 50.0, 60.0)  # Hz: EN 50163:2004, and grids and railways of North America
 MAINS_DEVIATION = 0.1  # Hz: the European grid keeps 0.05 Hz in ordinary operation
 LINE_RATE = 1000.0  # Hz: to about which samples are averaged before a line is sought
-BLOCK = 0.005  # s: over which the level of a channel is measured
+BLOCK = 0.02  # s: over which the level of a channel is measured, a period of 50 Hz
 QUIET_QUANTILE, QUIET_FACTOR = 0.1, 2.0  # quiet blocks are at most this factor above this quantile of all
-MIN_WINDOW, MAX_WINDOWS = 0.02, 8  # s: of a quiet time that is used; how many of them, the longest ones
-STEP_TURNS, REFINEMENT = 0.1, 20  # between trial frequencies, in turns over the quiet times; parts of a step
-FREQUENCY_ERROR = 0.1  # of a line in turns over the quiet times: three standard errors at a tenth of noise, 10 samples
+QUIET_CHANNELS = 0.9  # share of the channels that must be quiet at a time: sensors may lie far apart
+MAX_WINDOW, MAX_WINDOWS = 1.0, 8  # s: of a quiet time that is used, beside the train; how many of them
+MAX_GAP, MAX_END = 8.0, 4.0  # s: without quiet time, between two of them and at an end; the mains drift
 MIN_PERIODS = 2.0  # of a line in all quiet times together
+STEP_TURNS, REFINEMENT = 0.1, 20  # between trial frequencies, in turns over the quiet times; parts of a step
+FREQUENCY_ERROR = 0.1  # turns: three standard errors of a line of which 10 samples have a tenth of it as noise
+CHUNK = 64  # trial frequencies at a time, which limits the memory
 LEAST_SHARE = 0.1  # of any channel, beside what still rings: with less there is no hum
-HUM_SHARE = 0.5  # least share of a channel's power in its quiet times, and least share of the channels
+HUM_SHARE = 0.5  # least share of a channel's power in its quiet times; more than this share of the channels hum
+MAX_CHANGE = 0.2  # of a line between two halves of the quiet time, as a share of its amplitude: a line is steady
+MAX_QUIET_LEVEL = 0.25  # of what is left in the quiet times, as a share of the whole recording
 MIN_EXTREME_RUN = 3  # equal samples at the top or bottom of a channel that count as clipped, if it has two such runs
 MIN_HELD_TIME = 0.05  # s: equal samples at an end of a recording that count as a lost sensor
 NOTABLE_STRENGTH = 0.02  # of hum, as a share of the peak: less is subtracted without a row in a table
 
-
-@dataclass(frozen=True)
-class _Line:
-    """A line in the quiet times: its frequency [Hz], the share of the power of each channel that it explains, and
-    whether its frequency is one of the mains.
-    """
-
-    frequency: float
-    shares: np.ndarray
-    is_mains: bool
+Windows = Sequence[tuple[int, int]]
 
 
 def without_hum(recording: Recording, names: Container[str] | None = None) -> tuple[Recording, tuple[Rejection, ...]]:
     r"""The recording without its hum, and the finding.
 
-    A recording hums if a line within 0.1 Hz of 16.7, 25, 50 or 60 Hz explains half of the power below some 500 Hz of
-    half of its channels, in their quiet times: where they change by at most twice as much from sample to sample as in
-    their quietest tenth. The line is fitted to the quiet times by least squares, beside a straight line for each, and
-    subtracted from the whole of every channel that has it. Channels that are clipped, lost, or have a drop-out stay, so
-    that later checks find this. Harmonics stay, and so does the hum of one channel of many.
+    A recording hums if one line near 16.7, 25, 50 or 60 Hz explains half of the power, below some 500 Hz, of more than
+    half of its accelerations in the quiet times. These are blocks in which nearly all channels change by at most twice
+    as much from sample to sample as in their quietest tenth, up to 1 s before and behind what is louder. The line must
+    be as strong in both halves of the quiet time, and in each part of it that is as long as a period. What it leaves
+    must be far below the rest of the recording.
+
+    It is fitted by least squares beside a straight line for each quiet time. It is subtracted from every channel that
+    has it, within and between these times, if they are 8 s apart at most. Channels that are clipped, lost, or have a
+    drop-out stay, so that later checks find this. Harmonics stay.
 
     .. math:: x(t) = a \sin(2 \pi f t) + b \cos(2 \pi f t) + c_k + d_k t
 
@@ -68,50 +69,149 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     recording : Recording
         The same object where nothing is removed.
     findings : tuple of Rejection
-        One finding "mains_hum", or none. Its value is the largest amplitude as a share of the peak of its channel.
+        One finding "mains_hum", or none. Its value is the largest amplitude as a share of the range of its channel's
+        samples, halved.
     """
     rows = [
         i
         for i, (channel, x) in enumerate(zip(recording.channels, recording.samples))
-        if (names is None or channel.name in names) and np.isfinite(x).all() and np.ptp(x) > 0.0
+        if channel.quantity == "acceleration"
+        and (names is None or channel.name in names)
+        and np.isfinite(x).all()
+        and np.ptp(x) > 0.0
     ]
-    line_in_windows = _common_line(recording.samples[rows], recording.rate) if rows else None
-    if line_in_windows is None:
+    line = _common_line(recording.samples[rows], recording.rate) if rows else None
+    if line is None:
         return recording, ()
-    line, windows = line_in_windows
-    samples, time = recording.samples.copy(), np.arange(recording.n_sample) / recording.rate
-    of_line = _line_columns(time, line.frequency)
-    amplitudes, strength = {}, 0.0
-    for i, share, parts in zip(rows, line.shares, _amplitudes(samples[rows], of_line, windows).T):
+    samples, time = recording.samples.astype(float), np.arange(recording.n_sample) / recording.rate
+    of_line = _sine_and_cosine(time, line.frequency) * ((time >= line.start) & (time <= line.end))[:, None]
+    amplitudes, strength = list[float](), 0.0
+    for i, share, parts in zip(rows, line.shares, line.amplitudes.T):
         if share >= HUM_SHARE and not _holds_a_value(samples[i], recording.rate):
+            amplitude = float(np.hypot(*parts))
+            strength = max(strength, 2.0 * amplitude / float(np.ptp(samples[i])))
             step = converter_step(samples[i])  # later checks need the steps of the converter
             samples[i] = step * (np.round(samples[i] / step) - np.round(of_line @ parts / step))
-            amplitude = float(np.hypot(*parts))
-            amplitudes[recording.channels[i].name] = amplitude
-            strength = max(strength, amplitude / float(np.max(np.abs(samples[i]))))
+            amplitudes.append(amplitude)
     if not amplitudes:
         return recording, ()
-    listed = ", ".join(f"{name} {amplitude:.3g}" for name, amplitude in amplitudes.items())
-    text = f"line of {line.frequency:.1f} Hz subtracted, amplitudes: {listed}"
-    finding = Rejection("mains_hum", strength, NOTABLE_STRENGTH, text)
-    return replace(recording, samples=samples), (finding,)
+    text = f"line of {line.frequency:.1f} Hz subtracted in {len(amplitudes)} channels, up to {max(amplitudes):.1g} m/s²"
+    return replace(recording, samples=samples), (Rejection("mains_hum", strength, NOTABLE_STRENGTH, text),)
 
 
-def _common_line(samples: np.ndarray, rate: float) -> tuple[_Line, list[tuple[int, int]]] | None:
-    """The line of the mains that most channels have, and the quiet times; None without one.
+@dataclass(frozen=True)
+class _Line:
+    """A line from ``start`` to ``end`` [s]: its frequency [Hz], the share of the power of each channel that it explains
+    in the quiet times, and its ``amplitudes`` (2, n_channel) of sine and cosine.
+    """
+
+    frequency: float
+    shares: np.ndarray
+    amplitudes: np.ndarray
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class _Averages:
+    """Signals (n_channel, n) averaged over ``merged`` samples each; ``rate`` is that of the averages. [Hz]"""
+
+    signals: np.ndarray
+    rate: float
+    merged: int
+
+    @classmethod
+    def of(cls, samples: np.ndarray, rate: float) -> _Averages:
+        """Of (n_channel, n_sample) samples with a sampling rate. [Hz]"""
+        merged = max(1, int(rate / LINE_RATE))
+        n = samples.shape[1] // merged
+        means = samples[:, : n * merged].reshape(len(samples), n, merged).mean(axis=2)
+        return cls(means, rate / merged, merged)
+
+    @property
+    def block(self) -> int:
+        """Averages in a block."""
+        return max(1, round(BLOCK * self.rate))
+
+    def times(self, windows: Windows) -> np.ndarray:
+        """Times in windows, in the middle of the samples that were averaged. [s]"""
+        numbers = np.concatenate([np.arange(a, b) for a, b in windows])
+        return (numbers + 0.5 - 0.5 / self.merged) / self.rate
+
+    def line(self, windows: Windows, frequency: float) -> np.ndarray:
+        """(n, 2) averages of sine and cosine of a frequency in windows."""
+        x = np.pi * frequency / self.rate
+        gain = np.sin(x) / (self.merged * np.sin(x / self.merged))
+        return gain * _sine_and_cosine(self.times(windows), frequency)
+
+    def without_drift(self, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+        """Signals (n, n_channel) in windows without a straight line in each, and orthonormal columns of these lines."""
+        columns = np.zeros((sum(b - a for a, b in windows), 2 * len(windows)))
+        start = 0
+        for k, (a, b) in enumerate(windows):
+            columns[start : start + b - a, 2 * k] = 1.0
+            columns[start : start + b - a, 2 * k + 1] = np.linspace(-1.0, 1.0, b - a)
+            start += b - a
+        drift = np.linalg.qr(columns)[0]
+        signals = np.concatenate([self.signals[:, a:b] for a, b in windows], axis=1).T
+        return signals - drift @ (drift.T @ signals), drift
+
+    def fit(self, windows: Windows, frequency: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Amplitudes (2, n_channel) of sine and cosine, signals (n, n_channel), and what the line leaves of them."""
+        signals, drift = self.without_drift(windows)
+        columns = self.line(windows, frequency)
+        columns -= drift @ (drift.T @ columns)
+        amplitudes = np.linalg.lstsq(columns, signals, rcond=None)[0]
+        return amplitudes, signals, signals - columns @ amplitudes
+
+
+def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
+    """The line of the mains that most channels (n_channel, n_sample) have, None without one.
 
     What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are left out.
     """
-    size = max(1, round(BLOCK * rate))
-    is_quiet = _is_low(_levels(np.diff(samples, axis=1, append=samples[:, -1:]), size))
-    line = _strongest_line(samples, rate, windows := _windows(is_quiet, size, rate), beside=False)
-    if line is None:
+    averages = _Averages.of(samples, rate)
+    size, everything = averages.block, [(0, averages.signals.shape[1])]
+    is_quiet = _is_low(_levels(_changes(samples), size * averages.merged))
+    is_quiet &= _is_low(_levels(_changes(averages.signals), size))[: is_quiet.size]
+    windows = _windows(is_quiet, size, averages.rate)
+    if not windows or _strongest(averages, windows[:1], beside=False) is None:  # one quiet time tells most recordings
         return None
-    of_line = _line_columns(np.arange(samples.shape[1]) / rate, line.frequency)
-    remainder = samples - (of_line @ _amplitudes(samples, of_line, windows)).T
-    is_quiet[is_quiet] = _is_low(_levels(remainder, size)[:, is_quiet])
-    line = _strongest_line(samples, rate, windows := _windows(is_quiet, size, rate))
-    return (line, windows) if line and line.is_mains and np.mean(line.shares >= HUM_SHARE) >= HUM_SHARE else None
+    found = _strongest(averages, windows, beside=True)
+    if found is not None:
+        rest = averages.signals - (averages.line(everything, found[0]) @ averages.fit(windows, found[0])[0]).T
+        windows = _without_ringing(windows, _is_low_in(_levels(rest, size), is_quiet), size)
+        found = _strongest(averages, windows, beside=True)
+    if found is None:
+        return None
+    frequency, shares = found
+    hums, extent = shares >= HUM_SHARE, _extent(windows, is_quiet, averages)
+    if extent is None or np.mean(hums) <= HUM_SHARE or not _is_steady(averages, windows, frequency, hums):
+        return None
+    amplitudes, _, left = averages.fit(windows, frequency)
+    rest = averages.signals - (averages.line(everything, frequency) @ amplitudes).T
+    if np.median(np.std(left, axis=0)[hums] / np.maximum(np.std(rest, axis=1)[hums], 1e-300)) > MAX_QUIET_LEVEL:
+        return None
+    return _Line(frequency, shares, amplitudes, *extent)
+
+
+def _extent(windows: Windows, is_quiet: np.ndarray, averages: _Averages) -> tuple[float, float] | None:
+    """First and last time [s] for which the quiet times tell the line, None if a train is longer than they reach."""
+    rate, n = averages.rate, averages.signals.shape[1]
+    ordered = sorted(windows)
+    if any(b - a > MAX_GAP * rate for (_, a), (b, _) in pairwise(ordered)):
+        return None
+    start, end = ordered[0][0], ordered[-1][1]
+    is_quiet_before = np.all(is_quiet[: start // averages.block])
+    is_quiet_behind = np.all(is_quiet[-(-end // averages.block) :])
+    if (start > MAX_END * rate and not is_quiet_before) or (n - end > MAX_END * rate and not is_quiet_behind):
+        return None
+    return start / rate if start > MAX_END * rate else 0.0, end / rate if n - end > MAX_END * rate else np.inf
+
+
+def _changes(signals: np.ndarray) -> np.ndarray:
+    """From sample to sample, 0 behind the last one."""
+    return np.diff(signals, axis=1, append=signals[:, -1:])
 
 
 def _levels(signals: np.ndarray, size: int) -> np.ndarray:
@@ -121,53 +221,68 @@ def _levels(signals: np.ndarray, size: int) -> np.ndarray:
 
 
 def _is_low(levels: np.ndarray) -> np.ndarray:
-    """(n_block,) whether most channels are little louder than in their quietest blocks."""
+    """(n_block,) whether nearly all channels are little louder than in their quietest blocks."""
     if not levels.size:
         return np.zeros(levels.shape[1], dtype=bool)
     limits = QUIET_FACTOR * np.quantile(levels, QUIET_QUANTILE, axis=1, keepdims=True)
-    return np.median(levels / np.maximum(limits, 1e-300), axis=0) <= 1.0
+    return np.quantile(levels / np.maximum(limits, 1e-300), QUIET_CHANNELS, axis=0) <= 1.0
+
+
+def _is_low_in(levels: np.ndarray, is_quiet: np.ndarray) -> np.ndarray:
+    """(n_block,) which of the quiet blocks are low by levels (n_channel, n_block)."""
+    is_low = is_quiet.copy()
+    is_low[is_quiet] = _is_low(levels[:, : is_quiet.size][:, is_quiet])
+    return is_low
+
+
+def _without_ringing(windows: Windows, is_low: np.ndarray, size: int) -> list[tuple[int, int]]:
+    """Quiet times without the blocks at their start in which something still rings; one that rings throughout stays."""
+    rest = []
+    for a, b in windows:
+        blocks = np.flatnonzero(is_low[a // size : b // size])
+        rest.append((a + size * int(blocks[0]) if a > 0 and blocks.size else a, b))
+    return rest
 
 
 def _windows(is_quiet: np.ndarray, size: int, rate: float) -> list[tuple[int, int]]:
-    """(first, end) of the longest quiet times."""
+    """(first, end) of the longest quiet times, the longest first; of each the part beside what is louder."""
     edges = np.flatnonzero(np.diff(is_quiet.astype(int), prepend=0, append=0)) * size
-    windows = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2]) if b - a >= MIN_WINDOW * rate]
-    return sorted(sorted(windows, key=lambda w: w[0] - w[1])[:MAX_WINDOWS])
+    most = round(MAX_WINDOW * rate)
+    windows = [(max(a, b - most), b) if a == 0 else (a, min(b, a + most)) for a, b in edges.reshape(-1, 2)]
+    return sorted(((int(a), int(b)) for a, b in windows), key=lambda w: w[0] - w[1])[:MAX_WINDOWS]
 
 
-def _strongest_line(
-    samples: np.ndarray, rate: float, windows: list[tuple[int, int]], beside: bool = True
-) -> _Line | None:
-    """The line near a frequency of the mains that explains most of the quiet times, None without or if they are short.
+def _strongest(averages: _Averages, windows: Windows, beside: bool) -> tuple[float, np.ndarray] | None:
+    """Frequency of the line that explains most of the quiet times near the mains, and its share of each channel.
 
-    Frequencies ``beside`` those of the mains are tried too: there, a line that is none of the mains explains more.
+    None without one. Frequencies ``beside`` those of the mains are tried too: a line there is none of the mains, though
+    between two quiet times it may look like one.
     """
-    size = max(1, int(rate / LINE_RATE))
-    coarse = [(-(-a // size), b // size) for a, b in windows]  # whole blocks alone
-    quiet = np.concatenate([np.arange(*w) for w in coarse]) if coarse else np.zeros(0, dtype=int)
-    nominal = [f for f in MAINS if quiet.size * size / rate >= MIN_PERIODS / f and rate / size >= 4.0 * f]
+    duration = sum(b - a for a, b in windows) / averages.rate
+    nominal = [f for f in MAINS if duration >= MIN_PERIODS / f and averages.rate >= 4.0 * f]
     if not nominal:
         return None
-    n = samples.shape[1] // size
-    means = samples[:, : n * size].reshape(len(samples), n, size).mean(axis=2)[:, quiet].T  # (n_quiet, n_channel)
-    time = (quiet * size + 0.5 * (size - 1)) / rate
-    drift = np.linalg.qr(_drift_columns(coarse))[0]
-    means -= drift @ (drift.T @ means)
-    turn = 1.0 / np.ptp(time)
-    reach = MAINS_DEVIATION
-    if beside:  # in a single quiet time, a line farther off does not look like one of the mains
-        reach += rate / size / max(b - a for a, b in coarse)
+    (signals, drift), time = averages.without_drift(windows), averages.times(windows)
+    turn = 1.0 / np.ptp(time)  # Hz: a line so far off turns once more within the quiet times
+    reach = MAINS_DEVIATION + (averages.rate / max(b - a for a, b in windows) if beside else 0.0)
     deviations = np.linspace(-reach, reach, 2 * int(np.ceil(reach / (STEP_TURNS * turn))) + 1)
     trials = np.concatenate([f + deviations for f in nominal])
-    shares = _shares(means, time, drift, trials)
+    shares = _shares(signals, time, drift, trials)
     k = int(np.argmax(np.sum(shares, axis=1)))
     if np.max(shares[k]) < LEAST_SHARE:
         return None
+    if not beside:
+        return float(trials[k]), shares[k]
     trials = trials[k] + STEP_TURNS * turn * np.linspace(-1.0, 1.0, 2 * REFINEMENT + 1)
-    shares = _shares(means, time, drift, trials)
-    k = int(np.argmax(np.sum(shares, axis=1)))
-    is_mains = min(abs(trials[k] - f) for f in nominal) <= MAINS_DEVIATION + FREQUENCY_ERROR * turn
-    return _Line(float(trials[k]), shares[k], is_mains)
+    totals = np.sum(_shares(signals, time, drift, trials), axis=1)
+    k = int(np.clip(np.argmax(totals), 1, trials.size - 2))
+    below, most, above = totals[k - 1 : k + 2]
+    bend = below - 2.0 * most + above  # of the parabola through three trials, whose top is the frequency
+    top = float(np.clip(0.5 * (below - above) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
+    frequency = float(trials[k] + top * (trials[1] - trials[0]))
+    if min(abs(frequency - f) for f in nominal) > MAINS_DEVIATION + FREQUENCY_ERROR * turn:
+        return None
+    return frequency, _shares(signals, time, drift, np.array([frequency]))[0]
 
 
 def _shares(signals: np.ndarray, time: np.ndarray, drift: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
@@ -176,19 +291,51 @@ def _shares(signals: np.ndarray, time: np.ndarray, drift: np.ndarray, frequencie
     The line is made orthogonal to the drift, whose columns are orthonormal; then the normal equations of its two
     components are solved.
     """
-    phase = 2.0 * np.pi * np.outer(time, frequencies)
-    sine, cosine = (x - drift @ (drift.T @ x) for x in (np.sin(phase), np.cos(phase)))
-    ss, cc, sc = (np.sum(x * y, axis=0)[:, None] for x, y in ((sine, sine), (cosine, cosine), (sine, cosine)))
-    by_sine, by_cosine = sine.T @ signals, cosine.T @ signals
-    explained = (cc * by_sine**2 - 2.0 * sc * by_sine * by_cosine + ss * by_cosine**2) / (ss * cc - sc**2)
-    return explained / np.maximum(np.sum(signals**2, axis=0), 1e-300)
+    explained = []
+    for chunk in np.split(frequencies, np.arange(CHUNK, frequencies.size, CHUNK)):
+        phase = 2.0 * np.pi * np.outer(time, chunk)
+        sine, cosine = (x - drift @ (drift.T @ x) for x in (np.sin(phase), np.cos(phase)))
+        ss, cc, sc = (np.sum(x * y, axis=0)[:, None] for x, y in ((sine, sine), (cosine, cosine), (sine, cosine)))
+        by_sine, by_cosine = sine.T @ signals, cosine.T @ signals
+        explained.append((cc * by_sine**2 - 2.0 * sc * by_sine * by_cosine + ss * by_cosine**2) / (ss * cc - sc**2))
+    return np.concatenate(explained) / np.maximum(np.sum(signals**2, axis=0), 1e-300)
 
 
-def _amplitudes(samples: np.ndarray, of_line: np.ndarray, windows: list[tuple[int, int]]) -> np.ndarray:
-    """(2, n_channel) amplitudes of sine and cosine by least squares in the quiet times, beside the drift of each."""
-    quiet = np.concatenate([np.arange(*w) for w in windows])
-    columns = np.column_stack([of_line[quiet], _drift_columns(windows)])
-    return np.linalg.lstsq(columns, samples[:, quiet].T, rcond=None)[0][:2]
+def _is_steady(averages: _Averages, windows: Windows, frequency: float, hums: np.ndarray) -> bool:
+    """Whether a line has one amplitude and phase in the whole quiet time, in most of the channels that hum.
+
+    Neither what decays after an impact nor mains that drift are such a line.
+    """
+    period = averages.rate / frequency
+    amplitudes, _, _ = averages.fit(windows, frequency)
+    for part in [[w] for w in windows if w[1] - w[0] >= period]:
+        signals, drift = averages.without_drift(part)
+        line = averages.line(part, frequency)
+        left = signals - (line - drift @ (drift.T @ line)) @ amplitudes
+        if (
+            np.median((np.sum(left**2, axis=0) / np.maximum(np.sum(signals**2, axis=0), 1e-300))[hums])
+            > 1.0 - HUM_SHARE
+        ):
+            return False
+    halves = _halves(sorted(windows))
+    if min(sum(b - a for a, b in half) for half in halves) < period:
+        return False
+    first, second = (averages.fit(half, frequency)[0][:, hums] for half in halves)
+    change = np.linalg.norm(first - second, axis=0) / np.linalg.norm(amplitudes[:, hums], axis=0)
+    return bool(np.median(change) <= MAX_CHANGE)
+
+
+def _halves(windows: Windows) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """The first and the second half of the time in windows."""
+    first: list[tuple[int, int]] = []
+    second: list[tuple[int, int]] = []
+    remaining = sum(b - a for a, b in windows) // 2
+    for a, b in windows:
+        n = min(b - a, remaining)
+        first += [(a, a + n)] if n > 1 else []
+        second += [(a + n, b)] if b - a - n > 1 else []
+        remaining -= n
+    return first, second
 
 
 def _holds_a_value(samples: np.ndarray, rate: float) -> bool:
@@ -201,18 +348,7 @@ def _holds_a_value(samples: np.ndarray, rate: float) -> bool:
     return bool(n_extreme >= 2 or is_lost or drop_outs(samples).size)
 
 
-def _line_columns(time: np.ndarray, frequency: float) -> np.ndarray:
-    """(n_time, 2) sine and cosine of a frequency."""
+def _sine_and_cosine(time: np.ndarray, frequency: float) -> np.ndarray:
+    """(n, 2) sine and cosine of a frequency."""
     phase = 2.0 * np.pi * frequency * time
     return np.column_stack([np.sin(phase), np.cos(phase)])
-
-
-def _drift_columns(windows: list[tuple[int, int]]) -> np.ndarray:
-    """(n_quiet, 2 n_window) constant and straight line of each window."""
-    columns = np.zeros((sum(b - a for a, b in windows), 2 * len(windows)))
-    start = 0
-    for k, (a, b) in enumerate(windows):
-        columns[start : start + b - a, 2 * k] = 1.0
-        columns[start : start + b - a, 2 * k + 1] = np.linspace(-1.0, 1.0, b - a)
-        start += b - a
-    return columns

@@ -150,7 +150,7 @@ def _removed_row(
     where = f"record {recording.record + 1}" + (f", channel {finding.channel}" if finding.channel else "")
     error = ReadError(recording.source, where, finding.detail, REMOVED_REMEDIES[finding.reason], finding.reason)
     row = quarantine_row(error, base, "hammer", "hammer", recording.record, recording_id)
-    return row | {"measured_value": finding.value, "channels": list(finding.channels)}
+    return row | {"measured_value": finding.value, "channels": list(finding.channels) or None}
 
 
 def _model_rows(

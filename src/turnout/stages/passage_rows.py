@@ -22,6 +22,7 @@ from turnout.stages.recording_notes import noted_number, noted_rail_temperature
 
 TIME_DIGITS = 5  # of a wheel's time in seconds: a fifth of a sample at 20 kHz
 
+SUBJECTS = {"interference": "all channels", "mains_hum": "most channels"}
 REMEDIES = {
     "no_train": "Delete the file, or look why the logger was triggered",
     "clipped": "Raise the range of the channel",
@@ -82,7 +83,7 @@ def _subject(finding: Rejection) -> str:
     """The part of a record that a finding concerns: its channels, all channels, or what is uncertain, in words."""
     if finding.channels:
         return " and ".join(finding.channels)
-    return "all channels" if finding.reason in ("interference", "mains_hum") else finding.detail
+    return SUBJECTS.get(finding.reason, finding.detail)
 
 
 def passage_row(

@@ -16,6 +16,7 @@ from turnout.files import write_if_changed
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_error_correlation
 from turnout.passage.axle_patterns import Pattern
+from turnout.passage.cleaning import clean
 from turnout.passage.clusters import Clusters, fit_clusters
 from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
@@ -138,7 +139,8 @@ def _weighed_train(
         return []
     moment = started + timedelta(seconds=round(float(passage.times[0]), 6))
     train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
-    return [] if train is None else [_sensor_amplitudes(path, recording, passage, sensors_of(turnout), train)]
+    cleaned, _ = clean(recording, sensors_of(turnout))
+    return [] if train is None else [_sensor_amplitudes(path, cleaned, passage, sensors_of(turnout), train)]
 
 
 def _sensor_amplitudes(

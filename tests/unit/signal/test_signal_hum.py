@@ -1,5 +1,7 @@
 """Hum of the mains is subtracted where most channels share it; vibrations of track and train stay."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -15,19 +17,19 @@ AMPLITUDES = np.array([0.5, 0.3, 0.7, 0.4])  # m/s²
 PHASES = np.array([0.1, 1.3, -2.0, 2.6])
 
 
-def passage(rng=5, duration=4.0, start=1.2, stop=2.8):
+def passage(duration=4.0, start=1.2, stop=2.8, rate=RATE, level=20.0):
     """Noise of 0.03 m/s² and, from start to stop, wide-band vibration of 20 m/s² as under a train."""
-    rng = np.random.default_rng(rng)
-    t = np.arange(round(duration * RATE)) / RATE
+    rng = np.random.default_rng(5)
+    t = np.arange(round(duration * rate)) / rate
     train = (t > start) & (t < stop)
-    samples = 0.03 * rng.normal(size=(4, t.size)) + 20.0 * train * rng.normal(size=(4, t.size))
-    return Recording(samples, RATE, tuple(Channel(name, "acceleration") for name in NAMES), "passage"), t
+    samples = 0.03 * rng.normal(size=(4, t.size)) + level * train * rng.normal(size=(4, t.size))
+    return Recording(samples, rate, tuple(Channel(name, "acceleration") for name in NAMES), "passage"), t
 
 
-def with_line(recording, t, frequency, rows=(0, 1, 2, 3)):
+def with_line(recording, t, frequency, rows=(0, 1, 2, 3), factor=1.0):
     samples = recording.samples.copy()
     for i in rows:
-        samples[i] += AMPLITUDES[i] * np.sin(2.0 * np.pi * frequency * t + PHASES[i])
+        samples[i] += factor * AMPLITUDES[i] * np.sin(2.0 * np.pi * frequency * t + PHASES[i])
     return Recording(samples, recording.rate, recording.channels, recording.kind)
 
 
@@ -61,6 +63,85 @@ def test_an_impact_with_hum_is_as_without():
     assert np.max(np.abs(cleaned.samples - clean - noise)[1:]) < 0.03
 
 
+@pytest.mark.parametrize("rate", [500.0, 1000.0, 5000.0, 20000.0])
+@pytest.mark.parametrize("frequency", [50.0 / 3.0, 25.0, 50.0])
+@pytest.mark.parametrize("factor", [1.0, 10.0, 40.0])
+def test_loud_and_weak_hum_is_subtracted_at_every_sampling_rate(rate, frequency, factor):
+    """The least error is that of the fit to noise, 1 % of the weakest line."""
+    recording, t = passage(rate=rate)
+    hums = with_line(recording, t, frequency, factor=factor)
+    rest = without_hum(hums)[0].samples - recording.samples
+    assert np.all(np.max(np.abs(rest), axis=1) < 0.03 * factor * AMPLITUDES)
+
+
+@pytest.mark.parametrize("duration", [10.0, 180.0])
+def test_the_memory_for_a_long_record_does_not_grow_with_its_square(duration):
+    """180 s at 1 kHz are 5.8 MB of samples; quiet times of 1 s beside the train and 64 trials at a time need less."""
+    recording, t = passage(duration, 2.0, duration - 2.0, rate=1000.0)
+    hums = with_line(recording, t, 50.0)
+    tracemalloc.start()
+    cleaned, _ = without_hum(hums)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 12 * hums.samples.nbytes + 30e6
+    assert (cleaned is hums) is (duration > 20.0)  # the mains drift during a train of 176 s
+
+
+@pytest.mark.parametrize(("mode", "damping"), [(50.0, 0.03), (50.0, 0.05), (50.0, 0.08), (60.0, 0.03), (25.0, 0.08)])
+@pytest.mark.parametrize("pretrigger", [0.0, 0.025])
+def test_a_resonance_near_the_mains_is_not_subtracted(mode, damping, pretrigger):
+    """It decays by a quarter from one half of the quiet time to the other, and is not there before the impact."""
+    rate, duration = 20e3, 0.25 if mode > 30.0 else 0.5
+    t = np.arange(round(duration * rate)) / rate - pretrigger
+    since, rng = np.clip(t, 0.0, None), np.random.default_rng(3)
+    response = 150.0 * np.exp(-0.05 * 600.0 * np.pi * since) * np.sin(600.0 * np.pi * since)
+    response += 10.0 * np.exp(-damping * 2.0 * np.pi * mode * since) * np.sin(2.0 * np.pi * mode * since)
+    samples = np.stack([response, 0.5 * response, 0.2 * response]) + 0.05 * rng.normal(size=(3, t.size))
+    recording = Recording(samples, rate, tuple(Channel(name, "acceleration") for name in NAMES[:3]), "hammer")
+    assert without_hum(recording) == (recording, ())
+
+
+@pytest.mark.parametrize("duration", [4.0, 20.0, 40.0])
+@pytest.mark.parametrize("drift", [0.002, 0.005, 0.05])
+def test_mains_that_drift_leave_at_most_what_was_there(duration, drift):
+    """A line of one frequency that does not fit is not subtracted."""
+    recording, t = passage(duration, 1.2, duration - 1.2)
+    line = np.sin(2.0 * np.pi * (50.0 * t + 0.5 * drift * (t - 0.5 * duration) ** 2))
+    hums = Recording(recording.samples + np.outer(AMPLITUDES, line), RATE, recording.channels, "passage")
+    rest = without_hum(hums)[0].samples - recording.samples
+    assert np.all(np.sqrt(np.mean(rest**2, axis=1)) < 1.02 * AMPLITUDES / np.sqrt(2.0))
+
+
+def test_a_line_whose_phase_jumps_stays():
+    recording, t = passage()
+    line = np.sin(2.0 * np.pi * 50.0 * t + np.pi * (t > 2.0))
+    hums = Recording(recording.samples + np.outer(AMPLITUDES, line), RATE, recording.channels, "passage")
+    assert without_hum(hums) == (hums, ())
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.0, 4.0])
+def test_sensors_far_apart_are_all_corrected(factor):
+    """The train is loud at one sensor after the other, so that most are quiet at any time."""
+    recording, t = passage(8.0, 9.0, 9.0)
+    rng = np.random.default_rng(8)
+    samples = recording.samples + [20.0 * ((t > 1.5 + k) & (t < 2.5 + k)) * rng.normal(size=t.size) for k in range(4)]
+    far = Recording(samples, RATE, recording.channels, "passage")
+    rest = without_hum(with_line(far, t, 50.0, factor=factor))[0].samples - samples
+    assert np.all(np.max(np.abs(rest), axis=1) < 0.05 * factor * AMPLITUDES)
+
+
+@pytest.mark.parametrize(
+    ("n", "hums", "is_removed"), [(1, 1, True), (2, 1, False), (2, 2, True), (4, 2, False), (4, 3, True)]
+)
+def test_more_than_half_of_the_accelerations_must_hum(n, hums, is_removed):
+    """The hum of fewer is an effect with a name. Other quantities do not count."""
+    recording, t = passage()
+    line = with_line(recording, t, 50.0, tuple(range(hums)))
+    samples = np.vstack([line.samples[:n], recording.samples[:1]])
+    channels = (*recording.channels[:n], Channel("displacement", "displacement"))
+    assert bool(without_hum(Recording(samples, RATE, channels, "passage"))[1]) is is_removed
+
+
 @pytest.mark.parametrize(
     ("frequency", "rows"),
     [
@@ -91,7 +172,7 @@ def test_channels_without_signal_are_not_asked():
     samples = np.vstack([hums.samples, np.full(t.size, np.nan), np.zeros(t.size)])
     channels = (*hums.channels, Channel("broken", "acceleration"), Channel("dead", "acceleration"))
     cleaned, (finding,) = without_hum(Recording(samples, RATE, channels, "passage"))
-    assert "broken" not in finding.detail and np.isnan(cleaned.samples[4]).all() and not cleaned.samples[5].any()
+    assert "in 4 channels" in finding.detail and np.isnan(cleaned.samples[4]).all() and not cleaned.samples[5].any()
 
 
 def test_channels_that_repeat_one_value_stay_so_that_later_checks_find_it():
@@ -102,7 +183,7 @@ def test_channels_that_repeat_one_value_stay_so_that_later_checks_find_it():
     hums[1, 7000:7500] = hums[1, 6999]
     hums[2, -1500:] = hums[2, -1501]
     cleaned, (finding,) = without_hum(Recording(hums, RATE, recording.channels, "passage"))
-    assert [name in finding.detail for name in NAMES] == [False, False, False, True]
+    assert "in 1 channels" in finding.detail
     before, after = (
         {name: {f.reason for f in state.findings} for name, state in zip(NAMES, channel_states(r))}
         for r in (Recording(hums, RATE, recording.channels, "passage"), cleaned)
@@ -112,10 +193,10 @@ def test_channels_that_repeat_one_value_stay_so_that_later_checks_find_it():
     assert np.std(cleaned.samples[3, :5000]) < 0.04  # noise of 0.03 m/s²
 
 
-@pytest.mark.parametrize("n", [1, 30, 200])
+@pytest.mark.parametrize("n", [1, 30, 160])
 def test_a_record_that_is_too_short_stays(n):
-    """Two periods of 60 Hz take 33 ms, 167 samples; below, nothing is judged. At 200 all of it is noise."""
-    samples = np.random.default_rng(1).normal(size=(4, n))
+    """Two periods of 60 Hz take 33 ms, 167 samples; below, nothing is judged, also not a clear line."""
+    samples = np.random.default_rng(1).normal(size=(4, n)) + 50.0 * np.sin(2.0 * np.pi * 50.0 * np.arange(n) / RATE)
     recording = Recording(samples, RATE, tuple(Channel(name, "acceleration") for name in NAMES), "passage")
     assert without_hum(recording) == (recording, ())
 

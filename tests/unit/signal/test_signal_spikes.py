@@ -49,10 +49,16 @@ def test_the_peak_of_a_channel_does_not_count_its_spikes(train):
     recording, _ = with_spikes(train, 4, 5.0)
     expected = analyse(train, SENSORS, PATTERNS, settings)
     found = analyse(recording, SENSORS, PATTERNS, settings)
-    assert found.status == "partly" and [f.reason for f in found.findings] == ["spikes"]
+    assert found.status == "accepted" and [f.reason for f in found.findings] == ["spikes"]
     assert (found.n_axle, found.type.type, found.direction) == (expected.n_axle, expected.type.type, expected.direction)
     samples = clean(recording, SENSORS)[0].samples
     assert np.abs(samples[4]).max() == np.abs(train.samples[4]).max()
+
+
+def test_hum_does_not_limit_what_is_used_of_a_passage(train):
+    line = 0.3 * np.sin(2.0 * np.pi * 50.0 * np.arange(train.n_sample) / train.rate)
+    found = analyse(replace(train, samples=train.samples + line), SENSORS, PATTERNS, PassageSettings())
+    assert found.status == "accepted" and [f.reason for f in found.findings] == ["mains_hum"]
 
 
 def test_the_noise_of_a_force_between_impacts_has_no_spikes():

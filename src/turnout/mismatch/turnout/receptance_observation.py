@@ -269,8 +269,10 @@ def track_terms(terms: Sequence[PhysicsTerm], conditions: Mapping[str, Any]) -> 
     return tuple(t.under_conditions(conditions) for t in terms if t.effect_type in ("matrix", "port"))
 
 
-def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.ndarray) -> np.ndarray:
-    """Complex factor by which linear channel terms change a spectrum of a hammer test.
+def channel_factor(
+    terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.ndarray, recording_type: str
+) -> np.ndarray:
+    """Complex factor by which linear channel terms change a spectrum.
 
     Parameters
     ----------
@@ -280,6 +282,8 @@ def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.n
         The sensor.
     frequency : (n,) array
         Lines, complex for decaying signals. [Hz]
+    recording_type : str
+        "hammer" or "passage".
 
     Returns
     -------
@@ -287,8 +291,8 @@ def channel_factor(terms: Sequence[PhysicsTerm], sensor: Sensor, frequency: np.n
     """
     factor = np.ones(frequency.size, dtype=complex)
     for term in terms:
-        if isinstance(term, TransferTerm) and term.channel_name == sensor.name and "hammer" in term.recording_types:
-            factor = factor * term.transfer(frequency)
+        if isinstance(term, TransferTerm) and term.channel_name == sensor.name:
+            factor = factor * (term.transfer(frequency) if recording_type in term.recording_types else 1.0)
     return factor
 
 

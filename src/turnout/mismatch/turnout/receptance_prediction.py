@@ -175,7 +175,9 @@ class ReceptancePredictor(SiteModel):
         (n_line,) array of complex
             Recorded over true response. [-]
         """
-        factor = receptance_observation.channel_factor(terms, pair.sensor, receptance_observation.SHIFTED_LINES)
+        factor = receptance_observation.channel_factor(
+            terms, pair.sensor, receptance_observation.SHIFTED_LINES, "hammer"
+        )
         return factor * (1.0 + values.get(f"gain_{pair.channel}", 0.0))
 
     def receptance(self, values: Values, pair: FrfPair, sensitivity: ReceptanceSensitivity) -> np.ndarray:

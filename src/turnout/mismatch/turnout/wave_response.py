@@ -355,7 +355,9 @@ def channel_responses(values: Values, terms: Terms, aligned: AlignedPassage, fre
     -------
     (m, n_sensor) array of complex
     """
-    factors = [channel_factor(terms, s, frequency) * (1.0 + values[f"gain_{s.name}"]) for s in aligned.sensors]
+    factors = [
+        channel_factor(terms, s, frequency, "passage") * (1.0 + values[f"gain_{s.name}"]) for s in aligned.sensors
+    ]
     return np.column_stack(factors)
 
 
