@@ -106,7 +106,7 @@ def histories(figure, first=1, **selection):
 
 
 def all_and_last(figure):
-    """Sums over all sets of histories, and over the last ten."""
+    """Sums over all sets of histories, and over those since the thirteenth."""
     return histories(figure), histories(figure, FIRST_OF_LAST_HISTORIES)
 
 

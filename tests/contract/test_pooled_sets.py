@@ -51,7 +51,7 @@ ROWS = [
 ]
 ORDINALS = (
     "seventh eighth ninth tenth eleventh twelfth thirteenth fourteenth fifteenth sixteenth seventeenth eighteenth "
-    "nineteenth twentieth twenty-first twenty-second"
+    "nineteenth twentieth twenty-first twenty-second twenty-third twenty-fourth twenty-fifth twenty-sixth"
 ).split()
 
 
@@ -168,7 +168,9 @@ def test_the_files_hold_possible_numbers_in_the_order_of_the_sets(kind):
 def test_intervals_are_compared_at_their_stated_decimals_and_in_order():
     sums = (Sum("alarms", ("plain",)), Sum("alarms", ("crossing",)))
     assert sums[0].interval() == tuple(100.0 * x for x in clopper_pearson(*sums[0].counts()))
-    assert unexplained_intervals("a (0.0 to 2.8 %), b (0.4 to 11 %)", sums) == []
-    assert unexplained_intervals("a (to 2.8 %)", sums) == []
-    assert unexplained_intervals("a (0.1 to 2.8 %)", sums) == [("0.1", "2.8")]
-    assert unexplained_intervals("b (0.4 to 11 %), a (0.0 to 2.8 %)", sums) == [("0.0", "2.8")]
+    (low, high), other = (s.interval() for s in sums)
+    first, second = f"({low:.1f} to {high:.1f} %)", f"({other[0]:.1f} to {other[1]:.0f} %)"
+    assert unexplained_intervals(f"a {first}, b {second}", sums) == []
+    assert unexplained_intervals(f"a (to {high:.1f} %)", sums) == []
+    assert unexplained_intervals(f"a ({low + 0.1:.1f} to {high:.1f} %)", sums) == [(f"{low + 0.1:.1f}", f"{high:.1f}")]
+    assert unexplained_intervals(f"b {second}, a {first}", sums) == [(f"{low:.1f}", f"{high:.1f}")]
