@@ -86,12 +86,12 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     samples, time = recording.samples.astype(float), np.arange(recording.n_sample) / recording.rate
     of_line = _sine_and_cosine(time, line.frequency) * ((time >= line.start) & (time <= line.end))[:, None]
     amplitudes, strength = list[float](), 0.0
-    for i, share, parts in zip(rows, line.shares, line.amplitudes.T):
+    for i, share, sine_cosine in zip(rows, line.shares, line.amplitudes.T):
         if share >= HUM_SHARE and not _holds_a_value(samples[i], recording.rate):
-            amplitude = float(np.hypot(*parts))
+            amplitude = float(np.hypot(*sine_cosine))
             strength = max(strength, 2.0 * amplitude / float(np.ptp(samples[i])))
             step = converter_step(samples[i])  # later checks need the steps of the converter
-            samples[i] = step * (np.round(samples[i] / step) - np.round(of_line @ parts / step))
+            samples[i] = step * (np.round(samples[i] / step) - np.round(of_line @ sine_cosine / step))
             amplitudes.append(amplitude)
     if not amplitudes:
         return recording, ()
@@ -168,7 +168,7 @@ class _Averages:
 def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
     """The line of the mains that most channels (n_channel, n_sample) have, None without one.
 
-    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are left out.
+    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are remainder out.
     """
     averages = _Averages.of(samples, rate)
     size, everything = averages.block, [(0, averages.signals.shape[1])]
@@ -177,20 +177,25 @@ def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
     windows = _windows(is_quiet, size, averages.rate)
     if not windows or _strongest(averages, windows[:1], beside=False) is None:  # one quiet time tells most recordings
         return None
-    found = _strongest(averages, windows, beside=True)
-    if found is not None:
-        rest = averages.signals - (averages.line(everything, found[0]) @ averages.fit(windows, found[0])[0]).T
-        windows = _without_ringing(windows, _is_low_in(_levels(rest, size), is_quiet), size)
-        found = _strongest(averages, windows, beside=True)
-    if found is None:
+    strongest = _strongest(averages, windows, beside=True)
+    if strongest is not None:
+        without_line = (
+            averages.signals - (averages.line(everything, strongest[0]) @ averages.fit(windows, strongest[0])[0]).T
+        )
+        windows = _without_ringing(windows, _is_low_in(_levels(without_line, size), is_quiet), size)
+        strongest = _strongest(averages, windows, beside=True)
+    if strongest is None:
         return None
-    frequency, shares = found
+    frequency, shares = strongest
     hums, extent = shares >= HUM_SHARE, _extent(windows, is_quiet, averages)
     if extent is None or np.mean(hums) <= HUM_SHARE or not _is_steady(averages, windows, frequency, hums):
         return None
-    amplitudes, _, left = averages.fit(windows, frequency)
-    rest = averages.signals - (averages.line(everything, frequency) @ amplitudes).T
-    if np.median(np.std(left, axis=0)[hums] / np.maximum(np.std(rest, axis=1)[hums], 1e-300)) > MAX_QUIET_LEVEL:
+    amplitudes, _, remainder = averages.fit(windows, frequency)
+    without_line = averages.signals - (averages.line(everything, frequency) @ amplitudes).T
+    if (
+        np.median(np.std(remainder, axis=0)[hums] / np.maximum(np.std(without_line, axis=1)[hums], 1e-300))
+        > MAX_QUIET_LEVEL
+    ):
         return None
     return _Line(frequency, shares, amplitudes, *extent)
 
@@ -237,11 +242,11 @@ def _is_low_in(levels: np.ndarray, is_quiet: np.ndarray) -> np.ndarray:
 
 def _without_ringing(windows: Windows, is_low: np.ndarray, size: int) -> list[tuple[int, int]]:
     """Quiet times without the blocks at their start in which something still rings; one that rings throughout stays."""
-    rest = []
+    shortened = []
     for a, b in windows:
         blocks = np.flatnonzero(is_low[a // size : b // size])
-        rest.append((a + size * int(blocks[0]) if a > 0 and blocks.size else a, b))
-    return rest
+        shortened.append((a + size * int(blocks[0]) if a > 0 and blocks.size else a, b))
+    return shortened
 
 
 def _windows(is_quiet: np.ndarray, size: int, rate: float) -> list[tuple[int, int]]:
@@ -308,12 +313,12 @@ def _is_steady(averages: _Averages, windows: Windows, frequency: float, hums: np
     """
     period = averages.rate / frequency
     amplitudes, _, _ = averages.fit(windows, frequency)
-    for part in [[w] for w in windows if w[1] - w[0] >= period]:
-        signals, drift = averages.without_drift(part)
-        line = averages.line(part, frequency)
-        left = signals - (line - drift @ (drift.T @ line)) @ amplitudes
+    for window in (w for w in windows if w[1] - w[0] >= period):
+        signals, drift = averages.without_drift([window])
+        line = averages.line([window], frequency)
+        remainder = signals - (line - drift @ (drift.T @ line)) @ amplitudes
         if (
-            np.median((np.sum(left**2, axis=0) / np.maximum(np.sum(signals**2, axis=0), 1e-300))[hums])
+            np.median((np.sum(remainder**2, axis=0) / np.maximum(np.sum(signals**2, axis=0), 1e-300))[hums])
             > 1.0 - HUM_SHARE
         ):
             return False
