@@ -168,7 +168,7 @@ class _Averages:
 def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
     """The line of the mains that most channels (n_channel, n_sample) have, None without one.
 
-    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are remainder out.
+    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are left out.
     """
     averages = _Averages.of(samples, rate)
     size, everything = averages.block, [(0, averages.signals.shape[1])]
