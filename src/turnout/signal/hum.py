@@ -29,12 +29,15 @@ MAX_WINDOW, MAX_WINDOWS = 1.0, 8  # s: of a quiet time that is used, beside the 
 MAX_GAP, MAX_END = 8.0, 4.0  # s: without quiet time, between two of them and at an end; the mains drift
 MIN_PERIODS = 2.0  # of a line in all quiet times together
 STEP_TURNS, REFINEMENT = 0.1, 20  # between trial frequencies, in turns over the quiet times; parts of a step
-FREQUENCY_ERROR = 0.1  # turns: three standard errors of a line of which 10 samples have a tenth of it as noise
+MIN_FREQUENCY_ERROR, MAX_FREQUENCY_ERROR = 0.02, 0.1  # turns over the quiet times, of a line without and with noise
 CHUNK = 64  # trial frequencies at a time, which limits the memory
 LEAST_SHARE = 0.1  # of any channel, beside what still rings: with less there is no hum
 HUM_SHARE = 0.5  # least share of a channel's power in its quiet times; more than this share of the channels hum
 MAX_CHANGE = 0.2  # of a line between two halves of the quiet time, as a share of its amplitude: a line is steady
+MAX_DECAY = 0.05  # of the amplitude from one half to the other, beyond three standard errors
 MAX_QUIET_LEVEL = 0.25  # of what is left in the quiet times, as a share of the whole recording
+SMALLEST_STEP = 1e-9  # of a converter, as a share of the range of the samples
+STEEP_STEPS = 4.0  # of the converter by which a clipped signal falls within half a run
 MIN_EXTREME_RUN = 3  # equal samples at the top or bottom of a channel that count as clipped, if it has two such runs
 MIN_HELD_TIME = 0.05  # s: equal samples at an end of a recording that count as a lost sensor
 NOTABLE_STRENGTH = 0.02  # of hum, as a share of the peak: less is subtracted without a row in a table
@@ -77,6 +80,7 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
         for i, (channel, x) in enumerate(zip(recording.channels, recording.samples))
         if channel.quantity == "acceleration"
         and (names is None or channel.name in names)
+        and x.size
         and np.isfinite(x).all()
         and np.ptp(x) > 0.0
     ]
@@ -87,11 +91,11 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
     of_line = _sine_and_cosine(time, line.frequency) * ((time >= line.start) & (time <= line.end))[:, None]
     amplitudes, strength = list[float](), 0.0
     for i, share, sine_cosine in zip(rows, line.shares, line.amplitudes.T):
-        if share >= HUM_SHARE and not _holds_a_value(samples[i], recording.rate):
+        limit = recording.channels[i].limit
+        if share >= HUM_SHARE and not _holds_a_value(samples[i], recording.rate, np.inf if limit is None else limit):
             amplitude = float(np.hypot(*sine_cosine))
             strength = max(strength, 2.0 * amplitude / float(np.ptp(samples[i])))
-            step = converter_step(samples[i])  # later checks need the steps of the converter
-            samples[i] = step * (np.round(samples[i] / step) - np.round(of_line @ sine_cosine / step))
+            samples[i] = _difference(samples[i], of_line @ sine_cosine)
             amplitudes.append(amplitude)
     if not amplitudes:
         return recording, ()
@@ -272,6 +276,7 @@ def _strongest(averages: _Averages, windows: Windows, beside: bool) -> tuple[flo
     reach = MAINS_DEVIATION + (averages.rate / max(b - a for a, b in windows) if beside else 0.0)
     deviations = np.linspace(-reach, reach, 2 * int(np.ceil(reach / (STEP_TURNS * turn))) + 1)
     trials = np.concatenate([f + deviations for f in nominal])
+    trials = trials[trials > 0.5 * min(nominal)]
     shares = _shares(signals, time, drift, trials)
     k = int(np.argmax(np.sum(shares, axis=1)))
     if np.max(shares[k]) < LEAST_SHARE:
@@ -285,9 +290,22 @@ def _strongest(averages: _Averages, windows: Windows, beside: bool) -> tuple[flo
     bend = below - 2.0 * most + above  # of the parabola through three trials, whose top is the frequency
     top = float(np.clip(0.5 * (below - above) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
     frequency = float(trials[k] + top * (trials[1] - trials[0]))
-    if min(abs(frequency - f) for f in nominal) > MAINS_DEVIATION + FREQUENCY_ERROR * turn:
+    shares = _shares(signals, time, drift, np.array([frequency]))[0]
+    if min(abs(frequency - f) for f in nominal) > MAINS_DEVIATION + _error_in_turns(shares, time.size) * turn:
         return None
-    return frequency, _shares(signals, time, drift, np.array([frequency]))[0]
+    return frequency, shares
+
+
+def _error_in_turns(shares: np.ndarray, n: int) -> float:
+    r"""Three standard errors of the frequency of a line with these shares of n values, in turns over their time.
+
+    .. math:: \sigma_f T = \frac{\sqrt 6}{\pi} \frac{\sigma}{a \sqrt n}, \quad \frac{\sigma^2}{a^2} = \frac{1 - s}{2 s}
+
+    for a single quiet time (Rife and Boorstyn 1974); two that lie apart tell it better.
+    """
+    share = max(float(np.median(shares)), 1e-3)
+    error = 3.0 * np.sqrt(6.0) / np.pi * np.sqrt(max(1.0 - share, 0.0) / (2.0 * share * n))
+    return min(MIN_FREQUENCY_ERROR + error, MAX_FREQUENCY_ERROR)
 
 
 def _shares(signals: np.ndarray, time: np.ndarray, drift: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
@@ -313,21 +331,24 @@ def _is_steady(averages: _Averages, windows: Windows, frequency: float, hums: np
     """
     period = averages.rate / frequency
     amplitudes, _, _ = averages.fit(windows, frequency)
-    for window in (w for w in windows if w[1] - w[0] >= period):
+    for window in windows:
         signals, drift = averages.without_drift([window])
         line = averages.line([window], frequency)
         remainder = signals - (line - drift @ (drift.T @ line)) @ amplitudes
-        if (
-            np.median((np.sum(remainder**2, axis=0) / np.maximum(np.sum(signals**2, axis=0), 1e-300))[hums])
-            > 1.0 - HUM_SHARE
-        ):
+        shares_left = np.sum(remainder**2, axis=0) / np.maximum(np.sum(signals**2, axis=0), 1e-300)
+        is_long = window[1] - window[0] >= period  # in a shorter one, a straight line takes up a part of the line
+        if np.median(shares_left[hums]) > (1.0 - HUM_SHARE if is_long else 1.0 + HUM_SHARE):
             return False
     halves = _halves(sorted(windows))
     if min(sum(b - a for a, b in half) for half in halves) < period:
         return False
     first, second = (averages.fit(half, frequency)[0][:, hums] for half in halves)
-    change = np.linalg.norm(first - second, axis=0) / np.linalg.norm(amplitudes[:, hums], axis=0)
-    return bool(np.median(change) <= MAX_CHANGE)
+    amplitude = np.linalg.norm(amplitudes[:, hums], axis=0)
+    change = np.linalg.norm(first - second, axis=0) / amplitude
+    decay = np.abs(np.linalg.norm(first, axis=0) - np.linalg.norm(second, axis=0)) / amplitude
+    remainder = averages.fit(windows, frequency)[2]
+    error = np.sqrt(8.0 / len(remainder)) * np.std(remainder, axis=0)[hums] / amplitude  # of the decay, by white noise
+    return bool(np.median(change) <= MAX_CHANGE and np.median(decay - 3.0 * error) <= MAX_DECAY)
 
 
 def _halves(windows: Windows) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
@@ -343,14 +364,33 @@ def _halves(windows: Windows) -> tuple[list[tuple[int, int]], list[tuple[int, in
     return first, second
 
 
-def _holds_a_value(samples: np.ndarray, rate: float) -> bool:
-    """Whether a channel repeats one value where it should move: clipped, in a drop-out, or at an end."""
+def _difference(samples: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Samples less a line, on the steps of their converter, which later checks need."""
+    step = converter_step(samples)
+    if step <= SMALLEST_STEP * np.ptp(samples):
+        return samples - line
+    return samples[0] + step * (np.round((samples - samples[0]) / step) - np.round(line / step))
+
+
+def _holds_a_value(samples: np.ndarray, rate: float, limit: float) -> bool:
+    """Whether a channel repeats one value where it should move: clipped, in a drop-out, or at an end.
+
+    Clipped are values at the limit, two runs of an extreme value, or one that the signal leaves steeply on either side.
+    """
     edges = np.concatenate([[0], np.flatnonzero(np.diff(samples)) + 1, [samples.size]])
     values, lengths = samples[edges[:-1]], np.diff(edges)
-    is_long = lengths >= MIN_EXTREME_RUN
-    n_extreme = max(np.sum(is_long & (values == x)) for x in (samples.min(), samples.max()))
-    is_lost = max(lengths[0], lengths[-1]) >= MIN_HELD_TIME * rate
-    return bool(n_extreme >= 2 or is_lost or drop_outs(samples).size)
+    if np.max(np.abs(samples)) >= 0.999 * limit or max(lengths[0], lengths[-1]) >= MIN_HELD_TIME * rate:
+        return True
+    least = STEEP_STEPS * converter_step(samples)
+    for extreme in (samples.min(), samples.max()):
+        runs = np.flatnonzero((lengths >= MIN_EXTREME_RUN) & (values == extreme))
+        reach = (lengths[runs] + 1) // 2
+        before, behind = edges[runs] - reach, edges[runs + 1] - 1 + reach
+        inside = (before >= 0) & (behind < samples.size)
+        falls = np.abs(samples[np.stack([before[inside], behind[inside]])] - extreme)
+        if runs.size >= 2 or np.any(np.min(falls, axis=0) > least):
+            return True
+    return bool(drop_outs(samples).size)
 
 
 def _sine_and_cosine(time: np.ndarray, frequency: float) -> np.ndarray:
