@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.counts import count_of
 from turnout.records import Recording, Rejection
 from turnout.signal.converter import converter_step
 from turnout.signal.drop_outs import drop_outs
@@ -99,7 +100,8 @@ def without_hum(recording: Recording, names: Container[str] | None = None) -> tu
             amplitudes.append(amplitude)
     if not amplitudes:
         return recording, ()
-    text = f"line of {line.frequency:.1f} Hz subtracted in {len(amplitudes)} channels, up to {max(amplitudes):.1g} m/s²"
+    where = count_of(len(amplitudes), "channel")
+    text = f"line of {line.frequency:.1f} Hz subtracted in {where}, up to {max(amplitudes):.1g} m/s²"
     return replace(recording, samples=samples), (Rejection("mains_hum", strength, NOTABLE_STRENGTH, text),)
 
 
