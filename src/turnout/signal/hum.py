@@ -34,7 +34,6 @@ MIN_FREQUENCY_ERROR, MAX_FREQUENCY_ERROR = 0.02, 0.1  # turns over the quiet tim
 CHUNK = 64  # trial frequencies at a time, which limits the memory
 LEAST_SHARE = 0.1  # of any channel, beside what still rings: with less there is no hum
 HUM_SHARE = 0.5  # least share of a channel's power in its quiet times; more than this share of the channels hum
-MAX_CHANGE = 0.2  # of a line between two halves of the quiet time, as a share of its amplitude: a line is steady
 MAX_DECAY = 0.05  # of the amplitude from one half to the other, beyond three standard errors
 MAX_QUIET_LEVEL = 0.25  # of what is left in the quiet times, as a share of the whole recording
 SMALLEST_STEP = 1e-9  # of a converter, as a share of the range of the samples
@@ -172,24 +171,15 @@ class _Averages:
 
 
 def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
-    """The line of the mains that most channels (n_channel, n_sample) have, None without one.
-
-    What still rings after an impact, at low frequencies, is louder there than beside the line. Such times are left out.
-    """
+    """The line of the mains that most channels (n_channel, n_sample) have, None without one."""
     averages = _Averages.of(samples, rate)
-    size, everything = averages.block, [(0, averages.signals.shape[1])]
+    size = averages.block
     is_quiet = _is_low(_levels(_changes(samples), size * averages.merged))
     is_quiet &= _is_low(_levels(_changes(averages.signals), size))[: is_quiet.size]
     windows = _windows(is_quiet, size, averages.rate)
     if not windows or _strongest(averages, windows[:1], beside=False) is None:  # one quiet time tells most recordings
         return None
     strongest = _strongest(averages, windows, beside=True)
-    if strongest is not None:
-        without_line = (
-            averages.signals - (averages.line(everything, strongest[0]) @ averages.fit(windows, strongest[0])[0]).T
-        )
-        windows = _without_ringing(windows, _is_low_in(_levels(without_line, size), is_quiet), size)
-        strongest = _strongest(averages, windows, beside=True)
     if strongest is None:
         return None
     frequency, shares = strongest
@@ -197,7 +187,7 @@ def _common_line(samples: np.ndarray, rate: float) -> _Line | None:
     if extent is None or np.mean(hums) <= HUM_SHARE or not _is_steady(averages, windows, frequency, hums):
         return None
     amplitudes, _, remainder = averages.fit(windows, frequency)
-    without_line = averages.signals - (averages.line(everything, frequency) @ amplitudes).T
+    without_line = averages.signals - (averages.line([(0, averages.signals.shape[1])], frequency) @ amplitudes).T
     if (
         np.median(np.std(remainder, axis=0)[hums] / np.maximum(np.std(without_line, axis=1)[hums], 1e-300))
         > MAX_QUIET_LEVEL
@@ -237,22 +227,6 @@ def _is_low(levels: np.ndarray) -> np.ndarray:
         return np.zeros(levels.shape[1], dtype=bool)
     limits = QUIET_FACTOR * np.quantile(levels, QUIET_QUANTILE, axis=1, keepdims=True)
     return np.quantile(levels / np.maximum(limits, 1e-300), QUIET_CHANNELS, axis=0) <= 1.0
-
-
-def _is_low_in(levels: np.ndarray, is_quiet: np.ndarray) -> np.ndarray:
-    """(n_block,) which of the quiet blocks are low by levels (n_channel, n_block)."""
-    is_low = is_quiet.copy()
-    is_low[is_quiet] = _is_low(levels[:, : is_quiet.size][:, is_quiet])
-    return is_low
-
-
-def _without_ringing(windows: Windows, is_low: np.ndarray, size: int) -> list[tuple[int, int]]:
-    """Quiet times without the blocks at their start in which something still rings; one that rings throughout stays."""
-    shortened = []
-    for a, b in windows:
-        blocks = np.flatnonzero(is_low[a // size : b // size])
-        shortened.append((a + size * int(blocks[0]) if a > 0 and blocks.size else a, b))
-    return shortened
 
 
 def _windows(is_quiet: np.ndarray, size: int, rate: float) -> list[tuple[int, int]]:
@@ -346,11 +320,10 @@ def _is_steady(averages: _Averages, windows: Windows, frequency: float, hums: np
         return False
     first, second = (averages.fit(half, frequency)[0][:, hums] for half in halves)
     amplitude = np.linalg.norm(amplitudes[:, hums], axis=0)
-    change = np.linalg.norm(first - second, axis=0) / amplitude
     decay = np.abs(np.linalg.norm(first, axis=0) - np.linalg.norm(second, axis=0)) / amplitude
     remainder = averages.fit(windows, frequency)[2]
     error = np.sqrt(8.0 / len(remainder)) * np.std(remainder, axis=0)[hums] / amplitude  # of the decay, by white noise
-    return bool(np.median(change) <= MAX_CHANGE and np.median(decay - 3.0 * error) <= MAX_DECAY)
+    return bool(np.median(decay - 3.0 * error) <= MAX_DECAY)
 
 
 def _halves(windows: Windows) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
