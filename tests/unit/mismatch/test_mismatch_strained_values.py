@@ -13,7 +13,7 @@ from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.engine.strained_values import strained_value
+from turnout.mismatch.engine.strained_values import conflict_of_files, strained_value
 from turnout.physics import Parameter
 
 TIME = np.linspace(0.0, 1.0, 400)
@@ -125,3 +125,52 @@ def test_a_name_beside_a_strained_value_is_withdrawn_and_the_value_is_the_locati
     assert named.verdict.names == ("bump",)
     assert withdrawn.verdict.answer == "unknown" and "bending" in withdrawn.verdict.reason
     assert withdrawn.where.train == "railcar" and withdrawn.where.place is None
+
+
+RAIL, SLEEPER, WHEELS = (
+    Nuisance(name, "-", 0.0, 0.1, meaning=f"ln {words}", group=group)
+    for name, words, group in (
+        ("shear", "shear stiffness of the rail", "rail"),
+        ("sleeper_mass", "sleeper_mass", "track"),
+        ("wheels_railcar", "unsprung mass", "wheels"),
+    )
+)
+
+
+def conflict(*deviations):
+    """Of rail, sleepers and wheelsets that lie so many tolerances off their files."""
+    nuisances = (RAIL, SLEEPER, WHEELS)
+    values = {n.name: 0.1 * d for n, d in zip(nuisances, deviations, strict=True)}
+    return conflict_of_files(nuisances, SimpleNamespace(values=values, covariance=np.eye(3)), THRESHOLD)
+
+
+def test_files_are_in_conflict_if_two_parts_of_the_model_are_far_off():
+    """4.0² / 2 + 3.8² / 2 - 2 ln 3 = 13.0 nats, above the 12 of a name."""
+    assert conflict(0.0, 4.0, -3.8) == (
+        "sleeper mass (it differs from the file by 4.0 times its tolerance), "
+        "unsprung mass of railcar (it differs from the file by 3.8 times its tolerance)"
+    )
+
+
+@pytest.mark.parametrize(
+    "deviations",
+    [
+        (0.0, 0.0, 11.0),  # wheelsets alone: the vehicle file is wrong, and a name beside them may be right
+        (0.0, 3.4, 3.6),  # 12.3 nats of two values among three, of which the choice takes 2.2
+        (2.9, 2.9, 2.9),  # none is beyond three tolerances
+    ],
+)
+def test_one_wrong_part_or_little_conflict_leaves_a_name(deviations):
+    assert conflict(*deviations) == ""
+
+
+def test_a_name_beside_files_in_conflict_is_withdrawn():
+    """Without a lock neither value is located, and neither alone would withdraw the name."""
+    case = Beam(4.5 * TOLERANCE, group="rail", bump=0.3)
+    named = diagnose(case)
+    assert named.verdict.answer == "named"
+    case.nuisances = (case.nuisances[0], replace(case.nuisances[1], sd=0.1, group="track"))
+    shape = np.cos(31.0 * TIME)
+    case.observations = tuple(replace(o, data=o.data + 0.45 * shape) for o in case.observations)
+    withdrawn = diagnose(case).verdict
+    assert withdrawn.answer == "unknown" and "bending" in withdrawn.reason and "mass" in withdrawn.reason

@@ -134,7 +134,7 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
 
 NAME_RULES: tuple[Rule[NameEvidence], ...] = (
     Rule("strained_value_remains", lambda e: e.strained, "unknown",
-         "beside {e.score.in_words}, a value is still far from that of the file: {e.strained}", LOCATED),
+         "{e.score.in_words} leaves values that are far from their files: {e.strained}", LOCATED),
     Rule("local_change_remains", lambda e: e.local_change > e.threshold and not e.score.has_position, "unknown",
          "{e.score.in_words} does not explain why single components differ between trains and impacts", LOCATED),
     Rule("size_known_from_below", lambda e: e.score.is_unbounded, "a_or_b",

@@ -263,7 +263,7 @@ class NameEvidence:
     free_share : float
         Share of the gain on held-out recordings that unconstrained force laws reach and all names together miss.
     strained : str
-        Value that no tolerance explains, in words; "" if there is none.
+        Values that no tolerance explains, in words; "" if there are none.
     local_change : float
         Evidence that single components have another value under trains than under impacts, with all names in the fit.
         The part that errors in the shape of the names may cause is subtracted. [nats]

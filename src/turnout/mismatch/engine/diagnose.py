@@ -31,7 +31,7 @@ from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimitError
-from turnout.mismatch.engine.strained_values import strained_value
+from turnout.mismatch.engine.strained_values import conflict_of_files, strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
 from turnout.mismatch.engine.two_effects import add_second, settle_pair
@@ -254,6 +254,7 @@ def grade_names(findings: Findings) -> Findings:
     free_share = free_law_share(search, findings.base, fit)
     value = strained_value(search.case, fit, search.settings.threshold)
     strained = str(value) if value is not None and value.nuisance.at is not None else ""
+    strained = strained or conflict_of_files(search.case.nuisances, fit, search.settings.threshold)
     leaders = [v.scores[0] for v in findings.verdicts if v.scores]
     local_gain = sum(s.gain for s in leaders if s.has_position or "sensor" in s.candidate.where)
     shape_errors = THRESHOLDS.shape_error_share * local_gain
