@@ -20,6 +20,7 @@ FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames rep
 SUPPORT_SPACING = 0.6  # m between supports
 GENERAL_CHECK = "Inspect the track at this position; repeat the measurement after the work"
 FILES_CHECK = "Compare positions in the layout, the track file and the vehicle files with the site"
+OFF_FILE = "strained_value_remains"  # rule of a decision
 GENERAL_TEST = "hammer tests at the points between, and a train of another load and speed"
 
 
@@ -109,7 +110,9 @@ def recommendation(diagnosis: Diagnosis) -> str:
         tests = (effects[name].separating_test for name in verdict.names[:2] if name in effects)
         return f"Measure {next(filter(None, tests), GENERAL_TEST)}"
     if verdict.answer == "unknown":
-        return FILES_CHECK if verdict.cause == "all trains" else f"Measure {GENERAL_TEST}"
+        if verdict.cause == "all trains":
+            return FILES_CHECK
+        return f"{FILES_CHECK}; measure {GENERAL_TEST}" if OFF_FILE in verdict.trail else f"Measure {GENERAL_TEST}"
     return ""
 
 

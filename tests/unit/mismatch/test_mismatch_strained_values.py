@@ -15,6 +15,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.strained_values import conflict_of_files, strained_value
 from turnout.physics import Parameter
+from turnout.stages.finding_row import recommendation
 
 TIME = np.linspace(0.0, 1.0, 400)
 TOLERANCE, THRESHOLD = 0.1, MismatchSettings().threshold
@@ -172,5 +173,7 @@ def test_a_name_beside_files_in_conflict_is_withdrawn():
     case.nuisances = (case.nuisances[0], replace(case.nuisances[1], sd=0.1, group="track"))
     shape = np.cos(31.0 * TIME)
     case.observations = tuple(replace(o, data=o.data + 0.45 * shape) for o in case.observations)
-    withdrawn = diagnose(case).verdict
-    assert withdrawn.answer == "unknown" and "bending" in withdrawn.reason and "mass" in withdrawn.reason
+    withdrawn = diagnose(case)
+    assert withdrawn.verdict.answer == "unknown"
+    assert "bending" in withdrawn.verdict.reason and "mass" in withdrawn.verdict.reason
+    assert "vehicle files" in recommendation(withdrawn)

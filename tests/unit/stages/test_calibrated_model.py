@@ -94,6 +94,8 @@ def test_a_visit_that_differs_is_not_used_and_the_others_agree_with_the_file(mod
     history = model[0].history
     assert [s.is_used for s in history.steps] == [True, True, True, False]
     assert history.steps[-1].innovation.parameter == "pad@18.00"
+    (line,) = [line for line in model_text("t1", model[0]) if "is not used" in line]
+    assert line.endswith(f"; turnout diagnose --turnout t1 --visit {DAYS[3]} examines it alone, faults of loggers too")
     assert not model[0].deviations
     sd = {p.name: s / p.sd for p, s in zip(history.parameters, history.belief.sd)}
     assert sd["ballast_stiffness"] < 0.4 and sd["pad@18.00"] < 0.8 and sd["pad@16.20"] > sd["pad@18.00"]
