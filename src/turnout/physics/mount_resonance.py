@@ -41,7 +41,7 @@ class MountResonance(TransferTerm):
     nonlinear_in_size = True
     parameters = (
         Parameter("period", "s", 0.0, (0.0, 1 / 80.0), "period of the mounting's resonance", SOURCE, (0.002, 0.002)),
-        Parameter("quality", "-", 10.0, (1.5, 80.0), "quality factor of the resonance", SOURCE),
+        Parameter("quality", "-", 10.0, (1.5, 80.0), "quality factor of the resonance", SOURCE, has_open_ends=True),
     )
 
     @classmethod

@@ -34,7 +34,8 @@ class Parameter:
     """One parameter of a term.
 
     At ``neutral`` the term vanishes; ``bounds`` limit the plausible range; both are in ``unit``. ``meaning`` is a short
-    description, ``source`` the source of the range. ``prior`` is (mean, standard deviation) or None.
+    description, ``source`` the source of the range. ``prior`` is (mean, standard deviation) or None. ``has_open_ends``:
+    a fit that ends at a bound asks for a value beyond it, which is another effect.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     meaning: str
     source: str
     prior: tuple[float, float] | None = None
+    has_open_ends: bool = False
 
 
 class SleeperState(Protocol):

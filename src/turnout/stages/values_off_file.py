@@ -1,4 +1,4 @@
-"""Values of the whole model that a fit has moved far from the files: a tolerance can absorb an effect without any name."""
+"""Sentences on values of the whole model that a fit has moved far from the files: they may absorb an effect."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
 from turnout.mismatch.engine.two_effects import PairEvidence
 from turnout.mismatch.engine.verdict import ANSWERS, Verdict
 from turnout.mismatch.engine.verification import Verification
-from turnout.physics import Parameter
+from turnout.physics import MountResonance, Parameter
 
 TABLES = (
     "NUMERICS_RULES",
@@ -49,6 +49,14 @@ def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
     candidate = Candidate.of(family, SIZE, dict, ((1.0,),), where, **more.pop("flags", {}))
     fit = SimpleNamespace(psi=np.array([size]), psi_se=np.array([more.pop("error", 0.1)]), part=lambda _: slice(0, 1))
     return Score(candidate, gain, worst, explained, fit, **more)
+
+
+@pytest.mark.parametrize(("quality", "has_meaning"), [(1.5, False), (1.51, True), (12.0, True), (80.0, False)])
+def test_a_resonance_at_the_end_of_its_range_of_quality_is_another_effect(quality, has_meaning):
+    """A low-pass of 500 Hz in one channel was a loose mounting of quality 1.5. A period of 0 stays possible."""
+    candidate = Candidate.of("mount_resonance", MountResonance.parameters, dict, ((0.002, 5.0),), {"sensor": "A2"})
+    fit = SimpleNamespace(psi=np.array([0.0, quality]), psi_se=np.array([6e-4, 0.08]), part=lambda _: slice(0, 2))
+    assert Score(candidate, 40.0, 0.0, 1.0, fit).has_meaning is has_meaning
 
 
 def test_every_rule_has_a_unique_name_and_an_existing_page(repository):

@@ -74,12 +74,13 @@ class Score:
     def has_meaning(self) -> bool:
         """Whether every parameter has a value that is physically possible: finite, and within its bounds.
 
-        A play below 0 is none, for example.
+        A play below 0 is none, for example. A resonance of quality 1.5, the least that it can have, is a filter.
         """
         if not self.candidate.parameters:
             return True
         values, bounds = self.estimates[0], np.array([p.bounds for p in self.candidate.parameters])
         slack = THRESHOLDS.bound_slack * (bounds[:, 1] - bounds[:, 0])
+        slack = np.where([p.has_open_ends for p in self.candidate.parameters], -slack, slack)
         return bool(np.all((values >= bounds[:, 0] - slack) & (values <= bounds[:, 1] + slack)))
 
     def exemption_reason(self, settings: MismatchSettings) -> str:
