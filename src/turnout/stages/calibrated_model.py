@@ -64,6 +64,7 @@ from turnout.stages.stored_visits import (
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_notes import notes_in_words, summary_of_notes
 from turnout.stages.visit_time import day_of, years_of
+from turnout.stages.visits_unlike_others import notes_on_channels
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -318,7 +319,11 @@ def _model_of_visits(
         tuple(deviations),
         {f"{s.visit} {s.sections}": s.answer for s in stored if s.answer not in USED_ANSWERS},
         tuple(computed),
-        (*fits.notes, *summary_of_notes(note for notes in notes_by_visit.values() for note in notes)),
+        (
+            *fits.notes,
+            *notes_on_channels(turnout.id, stored),
+            *summary_of_notes(note for notes in notes_by_visit.values() for note in notes),
+        ),
         tuple(within_library(answer, without) for answer in answers),
         reservation(turnout_track),
     )

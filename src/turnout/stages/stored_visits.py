@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,12 @@ from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.large_values import fit_large_values
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.calibration import calibrated_parameters, one_of_each_group, visit_groups
+from turnout.mismatch.turnout.calibration import (
+    calibrated_parameters,
+    channel_levels,
+    one_of_each_group,
+    visit_groups,
+)
 from turnout.mismatch.turnout.further_passages import with_reserved_passages
 from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 from turnout.mismatch.turnout.relinearization import fit_again
@@ -47,8 +52,8 @@ NOSE_POSITION = "place of the kink"  # begin of the name of a parameter
 class StoredVisit:
     """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one.
 
-    ``notes`` are those of ``notes_in_words`` on the recordings of the visit. Of a visit that is not ``fitted`` yet only
-    the answer is known.
+    ``notes`` are those of ``notes_in_words`` on the recordings of the visit, ``levels`` those of ``channel_levels``.
+    Of a visit that is not ``fitted`` yet only the answer is known.
     """
 
     visit: str
@@ -58,6 +63,7 @@ class StoredVisit:
     parameters: tuple[StateParameter, ...]
     notes: tuple[tuple[str, str, bool], ...] = ()
     fitted: bool = True
+    levels: Mapping[str, float] = field(default_factory=dict)
 
 
 def folder_of(fits: str | Path) -> Path:
@@ -155,7 +161,8 @@ def store_visit(
         fit = _fit_again(case, fit, may_be_large, partners)
     fitted = FittedGroup(*with_reserved_passages(case, fit), parameters, sections, group.route)
     information = visit_groups(fitted.case, fitted.fit, sections, group.route)
-    _write_visit(folder, group, parameters, answer, about, information)
+    levels = channel_levels(fitted.case, fitted.fit)
+    _write_visit(folder, group, parameters, answer, about, information, levels)
     return replace(fitted, fit=fitted.fit.without_jacobian())
 
 
@@ -179,12 +186,13 @@ def _write_visit(
     answer: str,
     about: Mapping[str, Any],
     information: Iterable[GroupInformation] | None,
+    levels: Mapping[str, float] | None = None,
 ) -> None:
     value = {
         "version": dict(about["version"]), "visit": about["visit"], "sections": ", ".join(group.labels),
         "answer": answer, "notes": [list(note) for note in about.get("notes", ())],
         "parameters": [asdict(p) for p in parameters.values()], "fitted": information is not None,
-        "groups": packed_groups(information or ()),
+        "groups": packed_groups(information or ()), "levels": dict(levels or {}),
     }  # fmt: skip
     path = _path(folder, about["turnout"].id, about["visit"], group.labels)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -259,7 +267,8 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
         notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
         about = value["visit"], value["sections"], value["answer"]
-        stored.append(StoredVisit(*about, information, parameters, notes, value.get("fitted", True)))
+        fitted, levels = value.get("fitted", True), value.get("levels", {})
+        stored.append(StoredVisit(*about, information, parameters, notes, fitted, levels))
     return sorted(stored, key=lambda s: (s.visit, s.sections))
 
 

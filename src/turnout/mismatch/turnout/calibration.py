@@ -157,6 +157,34 @@ def visit_groups(case: TrackCase, fit: Fit, sections: str, route: str = "main") 
     )
 
 
+def channel_levels(case: TrackCase, fit: Fit) -> dict[str, float]:
+    """What a fit leaves of each channel, in hammer tests and in passages.
+
+    Parameters
+    ----------
+    case : TrackCase
+        The case that was fitted.
+    fit : Fit
+
+    Returns
+    -------
+    dict
+        "channel A2 in the hammer tests" -> mean square of its whitened residual, over all recordings. [-]
+    """
+    squares: dict[str, list[float]] = {}
+    for observation, white in zip(case.observations, fit.white):
+        aligned = case.aligned_passages.get(observation.name)
+        if aligned is None:
+            squares.setdefault(f"channel {case.frf_pairs[observation.name].channel} in the hammer tests", []).append(
+                float(np.mean(white**2))
+            )
+            continue
+        rows = np.mean(np.reshape(white, (len(aligned.sensors), -1)) ** 2, axis=1)
+        for sensor, square in zip(aligned.sensors, rows):
+            squares.setdefault(f"channel {sensor.name} in the passages", []).append(float(square))
+    return {name: float(np.mean(values)) for name, values in squares.items()}
+
+
 def one_of_each_group(case: TrackCase) -> tuple[str, ...]:
     """The first reserved passage of each group, see ``visit_groups``: others of it repeat the error of the model.
 
