@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
+from turnout.readers.inversions import is_half_turn, speaks_of_inversion
 from turnout.readers.metadata_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.precision import Interval, readings
@@ -70,7 +71,7 @@ BESIDE_DURATION = frozenset("total time length of the s sec second seconds min".
 RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
 # How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
 CONVERSION = re.compile(
-    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?!1(?![\d.,]))\d|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
+    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?:(?!1(?![\d.,]))\d|[-\u2212]\s?1(?![\d.,]|\s?[cmk]?m\b))|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
     r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:re)?scaled\b[^\d;,]{0,8}\d"
     r"|\bslope\b[^;]{1,20}\b(?:intercept|offset)\b|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
     rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
@@ -96,10 +97,13 @@ HARMLESS_UNIT = re.compile(
 CHANGED = re.compile(
     r"raw|roh\w{0,6}|brut|unscaled|unskaliert|uncalibrated|unkalibriert|counts?|imperial|customary|inv|invert\w*|invers\w*"
     r"|revers(?:ed|al)|negat(?:e|ed|ive)|flip(?:ped)?|normali[sz]\w*|normier\w*|amplified|verstarkt|amplifie|attenuated"
-    r"|multipl(?:y|ied|ier)|divided|resampled|decimated|downsampled|integrated|differentiated|binary|voltage|volts|percent"
+    r"|umgepolt|verpolt|prepolovan\w*|ompolet"
+    r"|multipl(?:y|ied|ier)|multipliz\w*|divided|resampled|decimated|downsampled|integrated|differentiated|binary|voltage|volts|percent"
 )
 INVERTED = re.compile(r"inv|invert\w*|flip\w*|negat\w*|revers\w*|raw")
-DENIED = re.compile(r"no|not|none|nein|non|nej|ingen|off|false|0|normal|without|ohne|sans|uden|never|kein\w*")
+DENIED = re.compile(
+    r"no|not|nicht|ikke|niet|none|nein|non|nej|ingen|off|false|0|normal|without|ohne|sans|uden|never|kein\w*"
+)
 CONVERTED = re.compile(
     r"scaled|skaliert|calibrated|kalibriert|converted|umgerechnet|physical|physikalisch|si|etalonne|compensated|applied|abgezogen|removed|subtracted"
     r"|angewend\w*|applique\w*"
@@ -168,6 +172,9 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     """Candidates of an entry or of a named piece of a text, by what its name explains."""
     if name in SIMULATED_CONDITIONS:
+        return
+    if is_half_turn(name, text):
+        yield Candidate(SCALE, text[:MAX_SIZE])
         return
     subject = STRONG if explained_subject(group) == STRONG else explained_subject(name)
     if subject == STRONG:
@@ -330,7 +337,8 @@ def _of_state(name: str, text: str) -> Iterator[Candidate]:
         pattern = CONVERTED if is_denied else CHANGED
         is_changed = any(map(pattern.fullmatch, names))
     else:
-        is_changed = any(map(CHANGED.fullmatch, words)) and not is_denied and len(words) <= MAX_WORDS
+        is_changed = any(map(CHANGED.fullmatch, words)) or speaks_of_inversion(text)
+        is_changed = is_changed and not is_denied and len(words) <= MAX_WORDS
     if is_changed:
         yield Candidate(SCALE, text[:MAX_SIZE])
 

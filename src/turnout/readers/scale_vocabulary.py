@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from turnout.readers.inversions import INVERSION, leaves_sign
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit, words_of
 
@@ -34,7 +35,14 @@ POSSIBLE_FACTOR = re.compile(
     r"|^polynom|normali[sz]|normier|^quantum$|^verst$|^amp$|^masss?tab$|^multiply$"
 )
 # Words of an amplifier, and what makes them a setting or a limit.
-STRONG_FACTOR = re.compile(r"^gains?$|verstark|forstaerk|forstark|amplific|attenuat|guadagn|gananc")
+STRONG_FACTOR = re.compile(
+    r"^gains?$|verstark|forstaerk|forstark|amplific|attenuat|guadagn|gananc|zesilen|wzmocn|versterk|^ganho|vahvist"
+)
+# The amplifier itself, whose value is its model, and what a gain is given in: only a number counts.
+AMPLIFIER = re.compile(
+    r"verstarker|forstaerker|forstarker|amplificat(?:eu|or|ad)|versterker|wzmacniacz|zesilovac|attenuator"
+)
+BESIDE_GAIN = re.compile(r"unit|einheit|range|bereich|step|stufe|name|stage|table|label|comment|info|model|^id$|source")
 OTHER_GAIN = re.compile(
     r"trigg|control|mode|type|auto|date|datum|number|^n[or]$|max|min|limit|version|error|file|serial"
 )
@@ -48,9 +56,6 @@ POSSIBLE_OFFSET = re.compile(
 STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?|quant\w*|eu|unit|div")
 LEVEL = re.compile(r"dampfung|correct|korrekt|correz")  # a scale if its value is a level in dB
 CORRECTION = re.compile(r"correct|korrekt|correz")
-INVERSION = re.compile(
-    r"polari[td]\w*|invert\w*|invers\w*|neg(?:ative?)?|vorzeichen|sign|signe|segno|signo|fortegn|flipped|reversed|negated|negiert"
-)
 PREFIX = re.compile(r"(?:unit|einheit\w*|si)?(?:prefix|vorsatz|prefixe|prefisso|prefijo|praefiks)")
 EXPONENT = re.compile(r"(?:scale|unit|decimal)?exponent\d*|zehnerpotenz|poweroften")
 # What a number is converted to: "adc_to_volt", "ToSI".
@@ -79,7 +84,6 @@ PREFIX_VALUES = {
     "k": 1e3, "kilo": 1e3, "m": 1e-3, "milli": 1e-3, "µ": 1e-6, "u": 1e-6, "micro": 1e-6, "mikro": 1e-6, "mega": 1e6,
     "n": 1e-9, "nano": 1e-9, "giga": 1e9, "c": 1e-2, "centi": 1e-2, "d": 1e-1, "deci": 1e-1, "da": 10.0, "h": 100.0,
 }  # fmt: skip
-INVERTED = frozenset("- -1 -1.0 true yes ja oui si on 1 1.0 flipped".split())
 FILL_WORDS = frozenset(
     "fillvalue missingvalue nodata nodatavalue invalidvalue novalue nanvalue fehlwert ersatzwert "
     "valeurmanquante manglendevaerdi valoremancante valorfaltante".split()
@@ -113,7 +117,7 @@ def plain_word(name: str) -> str:
     ('scalefactor', 'verstarkung')
     """
     letters = unicodedata.normalize("NFKD", re.sub(r"[\[(].*?[\])]", "", name).lower())
-    return re.sub(r"[^a-z0-9]", "", letters.replace("æ", "ae").replace("ø", "o"))
+    return re.sub(r"[^a-z0-9]", "", letters.replace("æ", "ae").replace("ø", "o").replace("ł", "l"))
 
 
 def is_scale_name(name: str) -> bool:
@@ -172,7 +176,9 @@ def scale_meaning(name: str) -> str:
         return POSSIBLY_FACTOR if is_step else ""
     is_correction = any(CORRECTION.match(word) for word in words)
     if any(STRONG_FACTOR.search(word) for word in words):
-        return "" if any(OTHER_GAIN.search(word) for word in words) else POSSIBLY_FACTOR
+        if any(OTHER_GAIN.search(word) for word in words):
+            return ""
+        return POSSIBLY_FACTOR if any(AMPLIFIER.search(w) or BESIDE_GAIN.search(w) for w in words) else FACTOR
     if any(OTHER_SCALE.search(word) for word in words) or is_of_drawing(name) or subject_of(name) == STRONG:
         return ""
     if any(word in ("file", "name") for word in words) or (SCREEN_SCALE <= set(words) or "horizontal" in words):
@@ -306,17 +312,19 @@ def value_of_word(meaning: str, value: object) -> float | None:
     Returns
     -------
     float or None
-        1 for a value that changes nothing or is not understood; None for any other meaning of scale.
+        1 for a value that changes nothing; -1 for any other under a name of an inversion, 1 for one that is not
+        understood under that of a prefix or an exponent; None for any other meaning of scale.
 
     Examples
     --------
-    >>> value_of_word("inversion", "Invertiert"), value_of_word("prefix", "k"), value_of_word("exponent", -3)
-    (-1.0, 1000.0, 0.001)
+    >>> [value_of_word("inversion", value) for value in ("Verpolt", "nicht invertiert", "rail", 0)]
+    [-1.0, 1.0, -1.0, 1.0]
+    >>> value_of_word("prefix", "k"), value_of_word("exponent", -3)
+    (1000.0, 0.001)
     """
     text = str(value.decode("utf-8", "replace") if isinstance(value, bytes) else value).strip()
     if meaning == INVERSIONS:
-        word = text.casefold().rstrip(".")
-        return -1.0 if word in INVERTED or word.startswith(("inv", "neg", "rev", "umgek")) else 1.0
+        return 1.0 if leaves_sign(text) else -1.0
     if meaning == PREFIXES:
         return 1e6 if text == "M" else PREFIX_VALUES.get(text.casefold().replace("\u03bc", "µ"), 1.0)
     if meaning == LEVELS:

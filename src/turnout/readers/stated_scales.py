@@ -197,6 +197,13 @@ def _scale_values(value: Any) -> list[float | str]:
 NO_SCALE = PLACEHOLDERS | {"unity", "linear", "off", "1:1", "1/1"}
 
 
+# "x1", "1 (auto)", "0 dB, fixed"
+FACTOR_OF_ONE = re.compile(
+    r"(?:[x×]\s?1|1(?:[.,]0+)?\s?[x×])(?:\s?[,(\[][^\d]*)?|(?:1(?:[.,]0+)?|0(?:[.,]0+)?\s?dB)\s?[,(\[][^\d]*",
+    re.IGNORECASE,
+)
+
+
 def _scales_of_text(text: str) -> list[float | str]:
     """Scales of a text: one number with its unit, or a list of these; pieces that are not understood stay texts."""
     pieces = text.strip().strip(";").split(";")
@@ -207,7 +214,7 @@ def _scales_of_text(text: str) -> list[float | str]:
 
 def _scale_of_piece(text: str) -> float | str:
     """The number of a scale; the text itself if it is not understood, nan if it says that there is none."""
-    if text.casefold() in NO_SCALE or says_no_scale(text):
+    if text.casefold() in NO_SCALE or says_no_scale(text) or FACTOR_OF_ONE.fullmatch(text):
         return math.nan
     parts = number_and_unit(text)
     if parts is None:
