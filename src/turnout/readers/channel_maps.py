@@ -14,7 +14,7 @@ from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_quantities import quantity_entries
-from turnout.readers.stated_sensitivities import sensitivity_entries
+from turnout.readers.stated_sensitivities import states_sensitivity
 from turnout.readers.stated_units import key_of_units
 from turnout.readers.time_axes import is_axis_name
 from turnout.records import Channel, RawChannel
@@ -282,7 +282,7 @@ class Assignments:
     def _stated_of(self, record: RawRecord) -> tuple:
         """What the entries of a record state about units, quantities, sensitivities and sensors."""
         sensitivities: tuple[str, ...] = ()
-        if self._has_sensitivity and sensitivity_entries(record.entries):
+        if self._has_sensitivity and states_sensitivity(record.entries):
             sensitivities = tuple(f"{entry.place}: {entry.name}: {entry.value}" for entry in record.entries)
         quantities = tuple((e.place, e.name, str(e.value)) for e in quantity_entries(record.entries))
         sensors = tuple((e.place, e.name, str(e.value)) for e in describing_entries(record.entries, self.channels))

@@ -7,9 +7,12 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import CONDITION_QUANTITIES, TEMPERATURES
 from turnout.readers.rate_statements import PLACEHOLDERS
+from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import number_and_unit
 from turnout.readers.stated_units import known_unit
@@ -44,7 +47,31 @@ def with_converted_conditions(record: RawRecord) -> RawRecord:
     stated = {n: v for n, v in {**of_entries, **record.conditions}.items() if n in CONDITION_QUANTITIES}
     numbers = {name: _number_in_unit(name, value, record.entries) for name, value in stated.items()}
     converted = {name: number for name, number in numbers.items() if number is not None}
+    converted |= {n: x for n, x in _temperatures_in_other_words(record.entries).items() if n not in stated}
     return replace(record, conditions={**record.conditions, **converted}) if converted else record
+
+
+def _temperatures_in_other_words(entries: Sequence[Entry]) -> dict[str, float]:
+    """Temperatures [°C] under names such as "Schienentemperatur", if all entries about one of them agree."""
+    numbers: dict[str, set[float | None]] = {}
+    for entry in entries:
+        if (name := condition_of_entry(entry)) in TEMPERATURES:
+            value = f"{entry.value} {_unit_in_name(entry.name)}" if _is_bare(entry.value) else entry.value
+            numbers.setdefault(name, set()).add(_number_in_unit(name, value, ()))
+    return {name: x for name, stated in numbers.items() if len(stated) == 1 and (x := next(iter(stated))) is not None}
+
+
+def _is_bare(value: Any) -> bool:
+    """Whether a value is a number without a unit."""
+    stated = number_and_unit(str(value))
+    return stated is not None and not stated[1]
+
+
+def _unit_in_name(name: str) -> str:
+    """The unit of a temperature in brackets or behind its name: "rail_temperature_f"; "" without one."""
+    in_brackets = re.search(r"[\[(](.+)[\])]\s*$", name)
+    unit = in_brackets[1] if in_brackets else re.split(r"[\s_]", name.strip())[-1]
+    return unit if TEMPERATURE_UNIT.fullmatch(unit.strip()) else ""
 
 
 def _number_in_unit(name: str, value: Any, entries: Sequence[Entry]) -> float | None:
@@ -95,3 +122,84 @@ def unread_conditions(conditions: Mapping[str, Any], entries: Sequence[Entry]) -
     return {
         name: text for name, text in texts.items() if re.search(r"\w", text) and text.casefold() not in PLACEHOLDERS
     }
+
+
+RANGES = {**dict.fromkeys(TEMPERATURES, (-60.0, 90.0)), "speed": (-200.0, 200.0)}  # °C of any climate; m/s of any train
+
+
+def is_impossible(name: str, value: Any) -> bool:
+    """Whether a condition can be no measured value: a code for a missing number, such as -999.
+
+    Parameters
+    ----------
+    name : str
+        Name of the condition.
+    value : any
+        Its value; a temperature in °C, a speed in m/s.
+
+    Returns
+    -------
+    bool
+        False for a text, and for conditions without a quantity.
+
+    Examples
+    --------
+    >>> is_impossible("rail_temperature", -999.0), is_impossible("rail_temperature", 61.5), is_impossible("track", 999)
+    (True, False, False)
+    """
+    if name not in RANGES or isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        return False
+    low, high = RANGES[name]
+    return bool(np.isfinite(value)) and not low <= value <= high
+
+
+# Words for the conditions in other names, without case, accents and separators.
+TEMPERATURE_WORD = r"(?:temp|tepl|lampotil|homers)"
+BESIDE_TEMPERATURE = {
+    "rail_temperature": r"(?:rail|schiene|skinne|voie|kolejnic|szyn|spoor|carril|rotaia|kisko)",
+    "air_temperature": r"(?:air|luft|lucht|vzduch|powietrz|aria|aire|ilma)",
+}
+SPEED_WORD = r"speed|geschwind|vitesse|hastigh|rychlost|predkosc|velocidad|velocita|snelheid|nopeus"
+OTHER_CONDITION = re.compile(
+    r"neutral|verspann|stress|limit|max|min|alarm|sensor|unit|einheit|coef|koef|comp|komp|source|serial|date|channel|kanal"
+    r"|line|strecke|wind(?!ig)|sound|schall|wave|welle|zulass|permit|design|disk|fan|motor|playback|sampl|tape"
+)
+NAMES_OF_CONDITIONS = {
+    name: re.compile(f"{beside}.{{0,12}}{TEMPERATURE_WORD}|{TEMPERATURE_WORD}.{{0,12}}{beside}")
+    for name, beside in BESIDE_TEMPERATURE.items()
+} | {"speed": re.compile(SPEED_WORD)}
+
+
+@lru_cache(maxsize=4096)
+def _condition_in_other_words(name: str) -> str:
+    """The condition of which a name speaks in other words, "Schienentemperatur"; "" for none, and for its own name."""
+    word = plain_word(name)
+    if _plain(name) in CONDITION_QUANTITIES or re.search("[:=]", name) or OTHER_CONDITION.search(word):
+        return ""
+    return next((condition for condition, pattern in NAMES_OF_CONDITIONS.items() if pattern.search(word)), "")
+
+
+def condition_of_entry(entry: Entry) -> str:
+    """The condition that an entry may state under another name than the one that is read.
+
+    Parameters
+    ----------
+    entry : Entry
+        Entry of the metadata.
+
+    Returns
+    -------
+    str
+        "" if its name speaks of none, or its value is no number in a unit of it.
+
+    Examples
+    --------
+    >>> condition_of_entry(Entry("head", "Schienentemperatur", "12,5 °C"))
+    'rail_temperature'
+    """
+    name = "" if entry.is_piece else _condition_in_other_words(entry.name)
+    if not name or isinstance(entry.value, bool):
+        return ""
+    is_number = isinstance(entry.value, (int, float, np.number))
+    is_stated = is_number or (isinstance(entry.value, str) and number_and_unit(entry.value) is not None)
+    return name if is_stated else ""

@@ -31,7 +31,7 @@ from turnout.readers.metadata_names import (
 )
 from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.scale_vocabulary import is_scale_name, scale_meaning, value_of_word
-from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
+from turnout.readers.source import CONDITIONS, COPY_AGAIN, HEAD_SIZE, Source
 
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
@@ -141,7 +141,8 @@ def _complete_head(
     for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
     names = ["" if i in stated else name for i, name in enumerate(names)]
-    return Head({**notes, **scales}, names, units, offset, separator, entries, written, conflicts)
+    conditions = _conditions(text_lines, separator, names)
+    return Head({**conditions, **notes, **scales}, names, units, offset, separator, entries, written, conflicts)
 
 
 def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str] | None:
@@ -169,8 +170,25 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
     if plain_name in TIMES_OF_START and len(re.findall(r"\d+", value)) > 1 and not is_number(value):
         return plain_name, value  # "13 May 2026 10:00" is no number with a unit
     if plain_name in CONDITION_QUANTITIES:
-        return plain_name, f"{value} {match[2] or ''}".strip()
+        return plain_name, _value_of_condition(plain_name, value, match[2] or "")
     return plain_name if is_note else name, _value(f"{value} {match[2]}" if match[2] else value)
+
+
+def _conditions(lines: Sequence[str], separator: str, names: Sequence[str]) -> dict[str, float | str]:
+    """Conditions of the lines without a #, "speed: 80 km/h"; a name of a column is none."""
+    conditions: dict[str, float | str] = {}
+    for match in filter(None, (HEAD_LINE.match(line.strip()) for line in lines)):
+        value = match[3].strip(separator + " ")
+        name = _plain(match[1].strip())
+        if name in CONDITIONS and match[1].strip() not in names and value and not re.search(r"[;\t]", value):
+            conditions[name] = _value_of_condition(name, value, match[2] or "")
+    return conditions
+
+
+def _value_of_condition(name: str, value: str, unit: str) -> float | str:
+    """A condition with the unit in brackets behind its name: a text if it has a quantity, else a number if possible."""
+    text = f"{value} {unit}".strip()
+    return text if name in CONDITION_QUANTITIES else _value(text)
 
 
 STATEMENT = re.compile(r"[^\d\W][^=]*=\s*[+-]?\d.*")  # in place of a name, above cells that are empty
@@ -264,10 +282,14 @@ WORDS_REMEDY = "Export this column as numbers, states such as TRUE and FALSE as 
 
 
 def _states_scale(name: str, value: str) -> bool:
-    """Whether a line states a scale: such a word, and a value that begins with a number or is a word for one."""
+    """Whether a line states a scale: such a word, and a value that begins with a number or is a word for one.
+
+    Words for each column, "Polarity;normal;inverted", are an entry of its own.
+    """
     if not is_scale_name(name):
         return False
-    return re.match(r"[+-]?[.,]?\d", value) is not None or value_of_word(scale_meaning(name), value) not in (None, 1.0)
+    is_word = not re.search(r"[;\t]", value) and value_of_word(scale_meaning(name), value) not in (None, 1.0)
+    return is_word or re.match(r"[+-]?[.,]?\d", value) is not None
 
 
 def _plain(name: str) -> str:

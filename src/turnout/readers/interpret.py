@@ -16,8 +16,9 @@ from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistic
 from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.channel_units import undecided_error
+from turnout.readers.entry_check import EntryCheck
 from turnout.readers.lazy import Column
-from turnout.readers.lost_entries import is_single, lost_entry_errors
+from turnout.readers.lost_entries import lost_entry_errors, usable_conditions
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
@@ -28,7 +29,6 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile,
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.time_axes import all_statements, is_count_or_time
-from turnout.readers.unexplained_entries import EntryCheck
 from turnout.records import LongRecording, RawDescription, Recording
 
 MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
@@ -127,8 +127,10 @@ def convert_records(
     errors.extend(simultaneous.values())
     errors.extend(_count_errors(raw, description, source))
     errors.extend(raw.remarks)
-    errors.extend(lost_entry_errors(raw.records, source))
+    stated = [entry_check.without_checked(r) if isinstance(r, RawRecord) else r for r in raw.records]
+    errors.extend(lost_entry_errors(stated, source))
     unread = {k: r.unread_start for k, r in enumerate(raw.records) if isinstance(r, RawRecord) and r.unread_start}
+    unread = {k: text for k, text in unread.items() if not entry_check.is_checked(text)}
     kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
     errors.extend(start_errors(kept, unread, description.time_zone, source))
     errors.extend(zone_errors(raw.records, description.time_zone, source))
@@ -276,7 +278,7 @@ class _Conversion:
             "source": source.name,
             "record": k,
             "started_at": started_at,
-            "conditions": MappingProxyType({n: v for n, v in record.conditions.items() if is_single(v)}),
+            "conditions": MappingProxyType(usable_conditions(record.conditions)),
         }
         of_rate = rate_remark(statements, rate, where, source)
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)

@@ -5,21 +5,25 @@ entry that most records of a file have and some lack, and a name that nearly equ
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from turnout.errors import ReadError
-from turnout.readers.condition_units import unread_conditions
-from turnout.readers.metadata_names import START_NAMES, TEMPERATURES
+from turnout.readers.condition_units import condition_of_entry, is_impossible, unread_conditions
+from turnout.readers.metadata_names import CONDITION_QUANTITIES, START_NAMES, TEMPERATURES
+from turnout.readers.rate_statements import PLACEHOLDERS
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawRecord, Source
 
 MIN_NAME_SIZE = 5  # characters: shorter names resemble many
 START = "start time"
 UNIT_REMEDY = "Write it as '12.5 °C', or as a number in °C"
 SPEED_REMEDY = "Write it as '120 km/h', or as a number in m/s"
+OTHER_NAME_REMEDY = (
+    "Let the logger call it '{}'; if it means something else, name it in the layout, 'checked_entries: {}'"
+)
 REMEDY = "Copy the file again; if it is whole, correct the entry in the logger's settings"
 
 
@@ -41,9 +45,13 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
     read = [(k, record, _names(record)) for k, record in enumerate(records) if isinstance(record, RawRecord)]
     if not read:
         return
+    impossible: dict[str, int] = {}  # first record with one
     arrays: dict[str, int] = {}  # first record with one
     for k, record, _ in read:
         for name, value in record.conditions.items():
+            if is_impossible(name, value) and impossible.setdefault(name, k) == k:
+                problem = f"its {name} is {value:g}, which no {'train has' if name == 'speed' else 'rail or air has'}"
+                yield _error(f"record {k + 1}", name, f"{problem}: it may be a code for a missing number", source)
             if not is_single(value) and arrays.setdefault(name, k) == k:
                 problem = f"its {name} is {len(value)} different values, and not one for each record"
                 yield _error(f"record {k + 1}", name, problem, source)
@@ -65,12 +73,14 @@ def lost_entry_errors(records: Sequence[RawRecord | ReadError], source: Source) 
     _, first, names = read[0]
     for entry in {entry.name: entry for entry in first.entries}.values():
         condition = similar_name(entry.name)
+        other_words = "" if condition else condition_of_entry(entry)
+        condition = condition or other_words
         if condition and condition not in names and condition not in reported:
             reported.add(condition)
-            problem = (
-                f"{entry.name[:60]!r} in {entry.place[:80]} is nearly the name of the {condition}, which is missing"
-            )
-            yield _error("the file", condition, problem, source)
+            likeness = "may mean" if other_words else "is nearly the name of"
+            problem = f"{entry.name[:60]!r} in {entry.place[:80]} {likeness} the {condition}, which is missing"
+            remedy = OTHER_NAME_REMEDY.format(condition, entry.name[:60]) if other_words else REMEDY
+            yield _error("the file", condition, problem, source, remedy)
 
 
 def is_single(value: Any) -> bool:
@@ -84,9 +94,33 @@ def is_single(value: Any) -> bool:
     Returns
     -------
     bool
-        False for a condition that is reported and not used.
     """
     return not isinstance(value, (list, tuple, np.ndarray))
+
+
+def usable_conditions(conditions: Mapping[str, Any]) -> dict[str, Any]:
+    """The conditions of a record without those that are reported and not used.
+
+    Parameters
+    ----------
+    conditions : mapping of str to any
+        Conditions of a record.
+
+    Returns
+    -------
+    dict of str to any
+        Without lists, without values that no rail, air or train has, and without "n/a" in place of a number.
+    """
+    return {
+        name: value
+        for name, value in conditions.items()
+        if is_single(value) and not is_impossible(name, value) and not _is_no_number(name, value)
+    }
+
+
+def _is_no_number(name: str, value: Any) -> bool:
+    """Whether a text stands for a condition with a quantity that was not measured."""
+    return name in CONDITION_QUANTITIES and isinstance(value, str) and value.strip().casefold() in PLACEHOLDERS
 
 
 CONTROL_CHARACTER = re.compile(rb"[\x00-\x08\x0e-\x19\x1b-\x1f]")

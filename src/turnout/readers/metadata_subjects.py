@@ -15,6 +15,9 @@ from turnout.readers.rate_units import words_of
 STRONG, WEAK, NONE = 2, 1, 0
 MIN_STEM = 4  # letters: a shorter one is part of too many other words
 
+# Sensitivity of a sensor, of which ``stated_sensitivities`` compares the value.
+SENSITIVITY_STEMS = r"sensitiv|empfind|sensibi|gevoelig|folsom|citliv|czu[l\u0142]|kanslig|herkkyy|erzekeny|hassasiyet"
+
 # Stems (English, German, French, Danish, Swedish, Dutch, Spanish, Italian, Czech, Polish); "$" is the end of a word.
 STRONG_STEMS = (
     # identity, people, places, software, devices
@@ -53,8 +56,8 @@ STRONG_STEMS = (
     r"|skewness|leq$|quality factor|guete|gute|safety|sicherheit|contact|kontakt|rise|anstieg|montee|subida"
     r"|salita|stigtid|hold|timeout|delay|verzog|retard|retraso|laten|pretrig|posttrig|vorlauf|nachlauf"
     r"|vorgesch|retr[yi]|max\w* (?:sampl|rate|freq)|peak (?:time|freq)|alarm|overload|uberst|clip|linearit"
-    r"|nonlin|transverse|tolera|uncert|unsicher|accura|error|fehler|crosstalk|cmrr|thd|sensitiv|empfind"
-    r"|sensibil|gevoelig|folsom|citliv|czul|carrier|trager|porteus|portador|modulat|mains|netz|powerline"
+    r"|nonlin|transverse|tolera|uncert|unsicher|accura|error|fehler|crosstalk|cmrr|thd|"
+    rf"{SENSITIVITY_STEMS}|carrier|trager|porteus|portador|modulat|mains|netz|powerline"
     r"|power line|response|excit|anreg|tone$|sweep range|decay|abkling"
     r"|(?:data|file|block|header|byte|index) ?offset|full ?scale(?! ?count)"
     r"|calibration (?:period|interval|due)|time ?(?:const|offset|scale)|start ?offset|span\b(?! of)|time ?zone"

@@ -2,20 +2,39 @@
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from turnout.readers.entries import Entry
-from turnout.readers.entry_owners import owners_of, spaced_words
+from turnout.readers.entry_owners import container_of, named_channels, owners_of, spaced_words
+from turnout.readers.metadata_subjects import SENSITIVITY_STEMS
+from turnout.readers.rate_statements import PLACEHOLDERS
 from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME
+from turnout.records import RawChannel
 from turnout.units import to_si
 
-SENSITIVITY = re.compile(r"sensitiv|empfindlich|sensibi|folsom|gevoelig")
-# What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger.
-BESIDE_SENSITIVITY = re.compile(r"trigger|seuil|freq|toler|temp|date|datum|uncertain|unsicher|deviation|abweich")
+SENSITIVITY = re.compile(SENSITIVITY_STEMS)
+# What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger,
+# its origin, that across the axis.
+BESIDE_SENSITIVITY = re.compile(
+    r"trigger|seuil|freq|toler|temp|date|datum|uncertain|unsicher|deviation|abweich|unit|einheit|source|certif|zertif"
+    r"|directi|richtung|axis|achse|type|transvers|cross|quer|class"
+)
+NUMBER = r"[+-]?(?:\d+(?:[.,]\d+)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+ELECTRICAL = r"(?:[mnµ\u03bcu]?V|[pn]?C|counts?)(?![^\W\d_])"
+MECHANICAL = r"(?:\([^()]*\)|[^\W\d_](?:[\w²³⁻¹·*^/-]|\.(?=\w))*)"
+PER = r"\s?(?:/|\b(?:per|pro|par|je|pr\.?|por|na)\b)\s?"
+BESIDE_VOLTS = r"(?:\s?(?:rms|pk|peak))?"
+RATIO = rf"(?:{ELECTRICAL}{BESIDE_VOLTS}{PER}{MECHANICAL}|{MECHANICAL}{PER}{ELECTRICAL})"
+# A number with the unit of a sensitivity anywhere in a text: "ca. 100 mV/g @ 160 Hz", "mV/g 100", "100 (mV/g)".
+NUMBER_AND_RATIO = re.compile(rf"(?<![\w.,])({NUMBER})\s?[\[(]?\s?({RATIO})")
+RATIO_AND_NUMBER = re.compile(rf"(?<![\w/])({RATIO})[\])]?[\s:=]+({NUMBER})(?![\w/])")
+ENGINEERING_UNIT = re.compile(r"/\s?(?:EU|units?)$", re.IGNORECASE)  # that of the channel
+MAX_TEXT = 1000  # characters of a text that are searched
 # Words beside that of the sensitivity that speak of no sensor in particular, without case and accents.
 GENERAL_WORDS = frozenset(
     "sensor sensors transducer channel channels kanal kanale capteur aufnehmer sensitivity nominal calibrated "
@@ -125,34 +144,167 @@ def sensitivity_problem(
     True
     """
     entries = list(entries)
-    compared: list[Entry] = []
-    for entry in sensitivity_entries(entries):
-        owners = owners_of(entry, entries, names)
-        if isinstance(entry.value, list) and len(entry.value) == len(names) > 1:  # one for each channel
-            entry, owners = replace(entry, value=entry.value[index]), frozenset((index,))
-        if owners and index not in owners:
-            continue
-        for number, own_unit in _sensitivities(entry):
-            agrees = _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)
-            if agrees:
-                return ""
-            if agrees is False:
-                compared.append(entry)
-    if not compared:
+    compared = [
+        (bool(owners), agrees, entry)
+        for entry, owners, stated in _stated_of_channel(entries, names, index)
+        for number, own_unit in stated
+        if (agrees := _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)) is not None
+    ]
+    of_channel = [statement for statement in compared if statement[0]] or compared
+    if not of_channel or any(agrees for _, agrees, _ in of_channel):
         return ""
-    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for entry in compared[:3]))
+    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for _, _, entry in of_channel[:3]))
     return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
 
 
-def _sensitivities(entry: Entry) -> list[tuple[float, str]]:
-    """Numbers of an entry with their unit: behind the number, else in brackets behind the name, else ""."""
+def uncompared_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[Entry]:
+    """Entries about the sensitivity of a sensor that cannot be compared with that of any channel of the layout.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    channels : sequence of RawChannel
+        Channels of the layout; only those with a sensitivity count, and whose unit does not end with "!".
+
+    Yields
+    ------
+    Entry
+        None that speaks of another sensor, or that has no value.
+    """
+    wanted = [(i, c) for c in channels if c.sensitivity and (i := _row_of(record, c)) is not None]
+    if not wanted or not states_sensitivity(record.entries):
+        return
+    unclear: dict[int, Entry] = {}
+    compared: set[int] = set()
+    for i, channel in wanted:
+        for entry, owners, stated in _stated_of_channel(record.entries, record.names, i):
+            is_overruled = (channel.unit or "").endswith("!") or bool(sensitivities_in_text(entry.name))
+            if is_overruled or any(_is_compared(x, unit, channel, bool(owners), entry) for x, unit in stated):
+                compared.add(id(entry))
+            elif owners or (is_sensitivity_name(entry.name) and _is_general(entry.name, channel.quantity)):
+                is_other = any(_sensitivity_scale(quantity, x, unit) for x, unit in stated for quantity in SENSOR_WORDS)
+                unclear |= {} if is_other and not owners else {id(entry): entry}
+    yield from (entry for key, entry in unclear.items() if key not in compared)
+
+
+def _is_compared(number: float, unit: str, channel: RawChannel, is_own: bool, entry: Entry) -> bool:
+    """Whether a stated sensitivity can be compared with that of a channel of the layout."""
+    in_layout = channel.sensitivity or 1.0, channel.sensitivity_unit, channel.quantity
+    return _agrees(number, unit, *in_layout, is_own, entry) is not None
+
+
+def _row_of(record: RawRecord, channel: RawChannel) -> int | None:
+    """Row of a channel of the layout among those of the file."""
+    rows = (i for i, name in enumerate(record.names) if channel.source in (i, name, *_aliases(record, i)))
+    return next(rows, None)
+
+
+def _aliases(record: RawRecord, i: int) -> tuple[str, ...]:
+    return record.aliases[i] if i < len(record.aliases) else ()
+
+
+def states_sensitivity(entries: Iterable[Entry]) -> bool:
+    """Whether an entry of the metadata states the sensitivity of a sensor, by its name or in its text.
+
+    Parameters
+    ----------
+    entries : iterable of Entry
+        Metadata of a record.
+
+    Returns
+    -------
+    bool
+    """
+    return any(is_sensitivity_name(entry.name) or _ratios_beside(entry) for entry in entries)
+
+
+def _stated_of_channel(
+    entries: Sequence[Entry], names: Sequence[str], index: int
+) -> Iterator[tuple[Entry, frozenset[int], list[tuple[float, str]]]]:
+    """Each entry about a sensitivity that may be of a channel, with its owners and its numbers with their units."""
+    for entry in entries:
+        is_named = is_sensitivity_name(entry.name)
+        if not is_named and not _ratios_beside(entry):
+            continue
+        if is_named and isinstance(entry.value, str) and entry.value.strip().casefold() in PLACEHOLDERS:
+            continue
+        owners = owners_of(entry, entries, names)
+        if not owners and not is_named:
+            owners = named_channels(entry.value, names)
+        if isinstance(entry.value, list) and len(entry.value) == len(names) > 1:  # one for each channel
+            entry, owners = replace(entry, value=entry.value[index]), frozenset((index,))
+        if not owners or index in owners:
+            yield entry, owners, _sensitivities(entry, entries)
+
+
+def _ratios_beside(entry: Entry) -> tuple[tuple[float, str], ...]:
+    """Sensitivities in the text of an entry under another name, as "Sensor: IEPE, 100 mV/g"; none in counts."""
+    if entry.is_piece or not isinstance(entry.value, str) or BESIDE_SENSITIVITY.search(plain_word(entry.name)):
+        return ()
+    return tuple((x, unit) for x, unit in sensitivities_in_text(entry.value) if not COUNTED.search(unit))
+
+
+COUNTED = re.compile(r"counts?\b|lsb|bit|digit|div|pixel", re.IGNORECASE)
+
+
+@lru_cache(maxsize=4096)
+def sensitivities_in_text(text: str) -> tuple[tuple[float, str], ...]:
+    """Numbers with the unit of a sensitivity anywhere in a text.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry.
+
+    Returns
+    -------
+    tuple of (float, str)
+        Each number other than 0 and its unit, which need not be known.
+
+    Examples
+    --------
+    >>> [sensitivities_in_text(text) for text in ("ca. 100 mV/g @ 160 Hz", "mV/g: 98,7", "5 V")]
+    [((100.0, 'mV/g'),), ((98.7, 'mV/g'),), ()]
+    """
+    if "V" not in text and "C" not in text and "count" not in text:
+        return ()
+    pairs = NUMBER_AND_RATIO.findall(text[:MAX_TEXT])
+    pairs = pairs or [(number, ratio) for ratio, number in RATIO_AND_NUMBER.findall(text[:MAX_TEXT])]
+    numbers = [(float(number.replace(",", ".")), _plain_ratio(ratio)) for number, ratio in pairs]
+    return tuple((number, ratio) for number, ratio in numbers if number)
+
+
+def _plain_ratio(ratio: str) -> str:
+    """The unit of a sensitivity with a slash: "mV/g" of "mV per g" and "mV rms/g"."""
+    return re.sub(rf"{BESIDE_VOLTS}{PER}", "/", ratio, count=1).strip()
+
+
+def _sensitivities(entry: Entry, entries: Sequence[Entry]) -> list[tuple[float, str]]:
+    """Numbers of an entry with their unit: beside the number, else in or behind the name, else ""."""
+    if isinstance(entry.value, str) and (pairs := sensitivities_in_text(entry.value)):
+        return list(pairs)
     in_name = re.search(r"[\[(](.+)[\])]\s*$", entry.name)
-    unit = in_name[1] if in_name else ""
+    if ratio := re.search(RATIO, entry.name.replace("_", " ")):  # "sensitivity_mV_per_g"
+        unit = _plain_ratio(ratio[0])
+    else:
+        unit = in_name[1] if in_name else _unit_beside(entry, entries)
+    unit = "" if ENGINEERING_UNIT.search(unit) else unit
     parts = number_and_unit(entry.value) if isinstance(entry.value, str) else None
     if parts and re.match(r"[^\d\s.,;+-]", parts[1]):
-        return [(parts[0], parts[1].replace(" per ", "/"))] if parts[0] else []
+        return [(parts[0], parts[1])] if parts[0] else []
     numbers = finite_numbers(entry.value)
     return [] if numbers is None else [(float(x), unit) for x in numbers if x]
+
+
+def _unit_beside(entry: Entry, entries: Sequence[Entry]) -> str:
+    """The unit that another entry states for a sensitivity: "sensitivity_unit" beside "sensitivity"."""
+    for other in entries:
+        words = spaced_words(other.name)
+        is_of_unit = words.startswith(spaced_words(entry.name)) and re.search(r"unit|einheit", words) is not None
+        if is_of_unit and isinstance(other.value, str) and container_of(other) == container_of(entry):
+            return other.value.strip()
+    return ""
 
 
 def _agrees(
