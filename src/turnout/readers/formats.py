@@ -17,6 +17,7 @@ from turnout.readers.stated_scales import with_named_factors
 from turnout.readers.stated_sensitivities import with_named_sensitivities
 from turnout.readers.stated_units import with_stated_units
 from turnout.readers.stated_zones import with_stated_zone
+from turnout.readers.unread_starts import with_unread_starts
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -57,6 +58,7 @@ class Format:
         records = tuple(with_converted_conditions(r) if isinstance(r, RawRecord) else r for r in records)
         records = with_stated_starts(records)
         records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)
+        records = with_unread_starts(records)
         if len(records) == 1:
             records = tuple(with_stated_duration(r) if isinstance(r, RawRecord) else r for r in records)
         return replace(raw, records=records)

@@ -29,6 +29,9 @@ CLOCK_ALONE = re.compile(
     r"(\d{1,2}:\d{2})(:\d{2}(?:[.,]\d{1,12})?)?((?: ?[AaPp]\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?)"
     rf"(?: \(?(?:{ABBREVIATION.pattern})\)?)?"
 )
+DATE_ALONE_WORD = re.compile(r"^data$")  # a date only if the value is one
+# A time of day with other marks, under a name that speaks of one: "14.05.30", "14h05m30s".
+OTHER_CLOCK = re.compile(r"([01]?\d|2[0-3])(?:[h.]([0-5]\d)[m.]([0-5]\d(?:[.,]\d{1,12})?)s?|\s?h\s?([0-5]\d))")
 BARE_WORDS = frozenset(("date", "dato", "datum", "fecha", "time", "zeit"))
 
 
@@ -76,7 +79,7 @@ def may_state_start(name: str) -> bool:
         False for the time of another event.
     """
     words = words_of(name)
-    is_part = any(DATE_WORD.search(word) or TIME_WORD.search(word) for word in words)
+    is_part = any(DATE_WORD.search(w) or TIME_WORD.search(w) or DATE_ALONE_WORD.search(w) for w in words)
     return is_start_name(name) or (is_part and not any(OTHER.search(word) for word in words))
 
 
@@ -123,9 +126,18 @@ def _with_joined_start(record: RawRecord) -> RawRecord:
 
 def _texts(entries: Sequence[Entry], is_wanted: Callable[[str], bool]) -> dict[str, str]:
     """Text -> name of the entries whose text is wanted; those of a start count more than a bare "Date"."""
-    wanted = [(text, e.name) for e in entries if is_wanted(text := str(e.value).strip())]
+    wanted = [(text, e.name) for e in entries if is_wanted(text := _plain_part(e))]
     explicit = [(text, name) for text, name in wanted if _is_explicit(name)]
     return dict(explicit or wanted)
+
+
+def _plain_part(entry: Entry) -> str:
+    """The value of an entry; a time of day with colons, a date without blanks."""
+    text = re.sub(r"(?<=\d\.)\s(?=\d)", "", str(entry.value).strip())
+    words = words_of(entry.name)
+    is_of_day = any(DATE_WORD.search(word) or DATE_ALONE_WORD.search(word) for word in words)
+    clock = OTHER_CLOCK.fullmatch(text) if any(map(TIME_WORD.search, words)) and not is_of_day else None
+    return f"{clock[1]}:{clock[2] or clock[4]}:{clock[3] or '00'}" if clock else text
 
 
 def _is_explicit(name: str) -> bool:

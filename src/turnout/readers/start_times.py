@@ -141,6 +141,12 @@ SHORT_DATE = re.compile(r"\d{1,2}(?:[-/]\d{1,2}[-/]\d{2,4}|\.\d{1,2}\.\d{2})(?!\
 ORDER_REMEDY = (
     "Let the logger write the year with four digits in front, YYYY-MM-DD: in this date its order is not stated"
 )
+DATE_OF_UFF = re.compile(r"\d{1,2}-[^\W\d]+\.?-\d{2,4}")
+MONTH_REMEDY = "Write the month in English, as in 13-May-26 10:00:00"
+NAME_REMEDY = (
+    "If it is the start, let the logger call it 'start_time', as in 'start_time: 2026-05-13 10:20:30'; if it is not, "
+    "name it in the layout, 'checked_entries', and give the campaign or the time in the file's name"
+)
 COUNT_REMEDY = (
     "State its origin in the name or the unit, such as 'days since 1899-12-30', or give the campaign or the time in "
     "the file's name"
@@ -276,6 +282,10 @@ def start_errors(
             remedy = OBJECT_REMEDY
         elif text.endswith("?"):
             remedy = COUNT_REMEDY
+        elif DATE_OF_UFF.match(text):
+            remedy = MONTH_REMEDY
+        elif ": " in text:
+            remedy = NAME_REMEDY
         yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:

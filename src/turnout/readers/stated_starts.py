@@ -18,19 +18,23 @@ from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, sta
 
 START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
+    r"|pomiar|zaznam|mereni|misuraz|rejestrac|nagran"
     r"|acqui|erfass|optag|maling|timestamp|zeitstempel|horodat|datetime|^date$|^dato$|^datum$|^time$|^zeit$|^fecha$"
 )
 BEGIN = re.compile(r"start|begin|begyn|debut|inici|inizi|zacat")  # of these alone
 # Times of other events, and what is written about the recording.
 OTHER = re.compile(
     r"end|stop|fin$|slut|calib|kalib|etalonn|tarat|export|creat|erstell|modif|chang|saved|print|servic|install|version"
-    r"|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
+    r"|build|compil|revis|due|valid|last|letzt|next|file|datei|software|firmware|config|import|convert|upload"
     r"|^not[ae]s?$|notiz|remar[kq]|comment|komment|bemerk|bemaerk|anmerk|anmark|opmerk|poznam|descri|beschreib"
+    r"|tisk|vytis|udskr|gedruckt|imprim|uloz|zapis|gespeich|speicher|guardad|salvat|opgesl|konec|koniec|^fine$|einde"
     r"|maint|wartung|^tamp|stopf|grind|schleif|repair|repar|replac|ersetz|renew|erneuer"
 )
 OF_BEGIN = frozenset("of the der de la du del og at on".split())
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
-TIME_WORD = re.compile(r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|started|begun|recorded")
+TIME_WORD = re.compile(
+    r"time|zeit|heure|temps|tid|tijd|hora$|ora$|cas$|clock|uhr|klok|godzin|hodin|orari|started|begun|recorded"
+)
 MAX_UNREAD = 120  # characters of a start that cannot be read
 MAX_PRE_TRIGGER = 3600.0  # s
 MAX_ZONE_DIFFERENCE = timedelta(hours=26)  # two zones on both sides of the date line

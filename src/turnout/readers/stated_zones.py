@@ -15,17 +15,34 @@ from turnout.readers.source import RawRecord
 from turnout.readers.stated_starts import is_start_name, times_of_entry
 from turnout.readers.time_texts import parse_time
 
-ZONE_NAME = re.compile(r"timezone|zeitzone|tidszone|tijdzone|fuseauhoraire|fusoorario|zonahoraria|tz|(?:utc|gmt)offset")
+ZONE_NAME = re.compile(
+    r"timezone|zeitzone|tidszone|tijdzone|fuseauhoraire|fusoorario|zonahoraria|fusohorario|strefaczasowa|casovepasmo"
+    r"|casovapasmo|aikavyohyke|idozona|tz|(?:utc|gmt)offset"
+)
 NO_ZONE = frozenset(("", "-", "none", "n/a", "?", "unknown", "null", "local", "naive"))
 OFFSET = re.compile(r"(?:UTC|GMT)? ?([+-])(\d{1,2})(?::?(\d{2}))?")
-SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST"}
+SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST", "SEČ": "CET", "SELČ": "CEST"}
 # Abbreviations that a name may hold; which offset they mean depends on the day and on the country.
-ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC)\b")
+ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC|SEL?Č)\b")
+# An abbreviation or an offset that is a zone under any name; WEST is a direction, too.
+ZONE_ALONE = re.compile(r"(?!WEST$)(?:UTC|GMT|(?:UTC|GMT)? ?[+-]\d{1,2}:\d{2}|(?:UTC|GMT) ?[+-]\d{1,2})")
+# Words for the two states of a clock that is put forward in summer, without accents.
+SUMMER = re.compile(
+    r"\b(?:dst|daylight (?:saving|time)s?|summer ?time|sommerzeit|sommertid|zomertijd|letni cas|czas letni|ora legale"
+    r"|heure d ete|hor(?:a|ario) de verano)\b"
+)
+WINTER = re.compile(
+    r"\b(?:winter ?time|winterzeit|normalzeit|vintertid|wintertijd|zimni cas|czas zimowy|ora solare|heure d hiver"
+    r"|hor(?:a|ario) de invierno)\b"
+)
+DENIALS = frozenset("off no false none not non nein nej nee ne nie aus 0 disabled inactive".split())
 STAMP_AND_ZONE = re.compile(
     r"(.*\d(?: ?[AaPp]\.?[Mm]\.?)?)(?: ?[\[(]| )([A-Z]{2,5}(?: ?[+-]\d{1,2}(?::?\d{2})?)?|[A-Z]\w+/[\w/]+)[\])]?"
 )
 UTC_OFFSET = re.compile(r"(?:UTC|GMT) ?[+-]\d{1,2}(?::?\d{2})?(?!\d)", re.IGNORECASE)
 IN_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
+OR = " or "  # between zones that a file states
+MAX_SHOWN = 120  # characters of them
 LARGEST_OFFSET = 14  # h
 QUARTER = 15  # min: offsets of zones are its multiples
 
@@ -49,11 +66,10 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
     in_names = [text for name in _names_of_start(record) if (text := zone_in_name(name))]
     texts = list(dict.fromkeys(in_names or _zone_texts(record.entries)))
     zones = {zone for text in texts if (zone := zone_of(text))}
-    if not texts:
-        return record
-    if len(zones) != 1 or len(texts) > 1:
-        return replace(record, unread_zone=" or ".join(texts)[:60])
-    return replace(record, started_at=record.started_at.replace(tzinfo=zones.pop()))
+    if len(zones) == 1 and len(texts) == 1:
+        return replace(record, started_at=record.started_at.replace(tzinfo=zones.pop()))
+    texts += dict.fromkeys(_season_texts(record.entries))
+    return replace(record, unread_zone=OR.join(texts)[:MAX_SHOWN]) if texts else record
 
 
 def _with_zone_of_stamp(record: RawRecord) -> RawRecord:
@@ -108,12 +124,59 @@ def zone_in_name(name: str) -> str:
 
 
 def _zone_texts(entries: tuple[Entry, ...]) -> Iterator[str]:
+    """Zones of entries under such a name, and under any other whose whole value is an abbreviation or an offset."""
     for entry in entries:
-        if not isinstance(entry.value, (str, int, float, np.number)) or not _is_zone_name(entry.name):
+        if not isinstance(entry.value, (str, int, float, np.number)):
             continue
         text = " ".join(str(entry.value).split())
-        if text.casefold() not in NO_ZONE:
+        is_named = _is_zone_name(entry.name) and text.casefold() not in NO_ZONE
+        if is_named or (isinstance(entry.value, str) and not entry.is_piece and _is_zone_alone(text)):
             yield text
+
+
+def _is_zone_alone(text: str) -> bool:
+    return bool(ZONE_ALONE.fullmatch(text) or (text != "WEST" and ABBREVIATION.fullmatch(text)))
+
+
+def _season_texts(entries: tuple[Entry, ...]) -> Iterator[str]:
+    """Entries that say whether the clock shows summer or winter time, "DST: off"."""
+    for entry in entries:
+        if isinstance(entry.value, (str, int, np.bool_)) and not entry.is_piece:
+            text = f"{entry.name}: {entry.value}"
+            if is_summer_time(text) is not None:
+                yield text
+
+
+@lru_cache(maxsize=4096)
+def is_summer_time(text: str) -> bool | None:
+    """Whether a text says that the clock shows summer time.
+
+    Parameters
+    ----------
+    text : str
+        Name and value of an entry.
+
+    Returns
+    -------
+    bool or None
+        None for a text that speaks of neither, or of a temperature in summer and the like.
+
+    Examples
+    --------
+    >>> [is_summer_time(text) for text in ("DST: off", "Sommerzeit: ja", "Clock: winter time", "Site: summer")]
+    [False, True, False, None]
+    """
+    if len(text) > MAX_SEASON_TEXT:
+        return None
+    spaced = " ".join(words_of(text.replace(": 0", ": no")))
+    is_summer, is_winter = bool(SUMMER.search(spaced)), bool(WINTER.search(spaced))
+    if is_summer == is_winter:
+        return None
+    is_denied = not DENIALS.isdisjoint(spaced.split())
+    return is_summer != is_denied
+
+
+MAX_SEASON_TEXT = 60  # characters
 
 
 @lru_cache(maxsize=4096)
@@ -175,7 +238,7 @@ def is_zone_of(text: str, stamp: datetime, time_zone: str) -> bool:
     Parameters
     ----------
     text : str
-        Abbreviation such as "CEST".
+        Abbreviation such as "CEST", or an entry about summer time.
     stamp : datetime
         Time without a zone.
     time_zone : str
@@ -191,8 +254,10 @@ def is_zone_of(text: str, stamp: datetime, time_zone: str) -> bool:
     >>> is_zone_of("MESZ", datetime(2026, 5, 13), "Europe/Zurich"), is_zone_of("MEZ", datetime(2026, 5, 13), "UTC")
     (True, False)
     """
-    name = stamp.replace(tzinfo=ZoneInfo(time_zone)).tzname()
-    return SAME_ABBREVIATIONS.get(text.upper(), text.upper()) == name
+    local = stamp.replace(tzinfo=ZoneInfo(time_zone))
+    if (is_summer := is_summer_time(text)) is not None:
+        return is_summer == bool(local.dst())
+    return SAME_ABBREVIATIONS.get(text.upper(), text.upper()) == local.tzname()
 
 
 def zone_problem(record: RawRecord, time_zone: str) -> str:
@@ -210,6 +275,8 @@ def zone_problem(record: RawRecord, time_zone: str) -> str:
     str
         One sentence without its full stop.
     """
-    if not record.unread_zone or not record.started_at or is_zone_of(record.unread_zone, record.started_at, time_zone):
+    if not record.unread_zone or not record.started_at:
+        return ""
+    if all(is_zone_of(text, record.started_at, time_zone) for text in record.unread_zone.split(OR)):
         return ""
     return f"its time zone {record.unread_zone!r} cannot be read: that of the layout is used, {time_zone}"

@@ -224,7 +224,7 @@ def _with_dashes(match: re.Match[str]) -> str:
 def parse_uff_time(text: str) -> datetime | None:
     """Time in ID line 3 of a Universal File, DD-MMM-YY HH:MM:SS.
 
-    Two-digit years from 70 on are 1970 to 1999.
+    Two-digit years from 70 on are 1970 to 1999. The month may be in another language.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def parse_uff_time(text: str) -> datetime | None:
         day, month, year = date.split("-")
         hour, minute, second = clock.split(":")
         years = int(year) + (0 if len(year) == 4 else 1900 if int(year) >= 70 else 2000)
-        start = datetime(years, MONTHS[month[:3].lower()], int(day), int(hour), int(minute))
+        start = datetime(years, MONTHS.get(month[:3].lower()) or month_of(month), int(day), int(hour), int(minute))
         return start + timedelta(seconds=float(second))
     except (ValueError, KeyError, OverflowError):
         return None

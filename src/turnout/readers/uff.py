@@ -19,7 +19,7 @@ from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, S
 from turnout.readers.stated_quantities import DEFINED_NAME
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.stated_units import is_meaningless, known_unit
-from turnout.readers.time_texts import is_unread_uff_time, parse_uff_time
+from turnout.readers.time_texts import is_unread_uff_time, parse_time, parse_uff_time
 from turnout.readers.timing import check_simultaneous
 from turnout.readers.uff_datasets import FileUnits, UffDataset, file_units, read_datasets
 from turnout.readers.uff_pairing import DIRECTIONS, PAIRING_REMEDY, ChannelKey, Pairing, channel_name, pair_sets
@@ -195,13 +195,14 @@ def _record(pairing: Pairing, k: int, stated_units: FileUnits | None, source: So
         check_simultaneous(names, steps, starts, f"record {k + 1} of {n}", source)
     except ReadError as error:
         return error
+    started_at = parse_uff_time(first.ids[2]) or parse_time(first.ids[2])
     return RawRecord(
         names=names,
         samples=[s.data for s in sets],
         entries=(*_entries(sets), *_texts(sets), *_quantities(sets, names), *_directions(sets, names)),
         units=tuple(_unit(s.labels[1], stated_units) for s in sets),
-        started_at=parse_uff_time(first.ids[2]),
-        unread_start=first.ids[2] if is_unread_uff_time(first.ids[2]) else "",
+        started_at=started_at,
+        unread_start=first.ids[2] if started_at is None and is_unread_uff_time(first.ids[2]) else "",
         conditions=_conditions(first.ids[3]),
         time=None if first.x is None else first.x * _seconds_per_x(first),
         is_time_in_seconds=True,

@@ -1,0 +1,92 @@
+"""Dates with a time of day in a file of which no start was read: one of them may be the start, so they are reported."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from turnout.errors import ReadError
+from turnout.readers.entries import Entry
+from turnout.readers.rate_units import words_of
+from turnout.readers.source import RawRecord
+from turnout.readers.stated_starts import OTHER
+
+YEAR = r"(?:19|20)\d{2}"
+DATE = (
+    rf"(?:{YEAR}[-./]\s?\d{{1,2}}[-./]\s?\d{{1,2}}|\d{{1,2}}[-./]\s?\d{{1,2}}[-./]\s?(?:{YEAR}|\d{{2}})"
+    rf"|\d{{1,2}}\.?[ -](?:de )?[^\W\d]{{3,}}\.?[ -](?:de )?{YEAR}|[^\W\d]{{3,}}\.? \d{{1,2}},? {YEAR})"
+)
+CLOCK = r"\d{1,2}(?::\d{2}(?::\d{2})?|\s?h\s?\d{2}|\.\d{2}\.\d{2})"
+MOMENT = re.compile(
+    rf"(?<![\d.,]){DATE}(?!\d)\D{{1,12}}{CLOCK}(?!\d)|(?<![\d.,]){CLOCK}\D{{1,12}}{DATE}(?!\d)"
+    rf"|(?<!\d){YEAR}(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])[T _-](?:[01]\d|2[0-3])[0-5]\d"
+)
+DAY_ALONE, CLOCK_ALONE = (
+    re.compile(DATE),
+    re.compile(rf"{CLOCK}(?:\s?m\s?\d{{2}}\s?s?)?(?:[.,]\d+)?(?:\s?(?:[AaPp][Mm]|Uhr|h))?"),
+)
+MAX_TEXT = 200  # characters of a text that is searched
+MAX_SHOWN = 60  # characters of an entry in the message
+
+
+def with_unread_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRecord | ReadError, ...]:
+    """The records with the text of a date and a time of day as their unread start, if none of them has a start.
+
+    Parameters
+    ----------
+    records : sequence of RawRecord or ReadError
+        The records of a file, with the starts that were read.
+
+    Returns
+    -------
+    tuple of (RawRecord or ReadError)
+        The same records if one has a start or an unread one, or if nothing in the file may be one.
+    """
+    intact = [record for record in records if isinstance(record, RawRecord)]
+    if any(record.started_at or record.unread_start for record in intact):
+        return tuple(records)
+    return tuple(
+        replace(record, unread_start=text)
+        if isinstance(record, RawRecord) and (text := possible_start(record))
+        else record
+        for record in records
+    )
+
+
+def possible_start(record: RawRecord) -> str:
+    """Entry of a record that may state its start under a name that is not known.
+
+    Parameters
+    ----------
+    record : RawRecord
+        A record without a start.
+
+    Returns
+    -------
+    str
+        Name and value of the first with a date and a time of day, else of two of which one is a date and one a time of
+        day; "" if each is about another event, such as an export, a calibration or the end.
+    """
+    entries = [e for e in record.entries if isinstance(e.value, str) and not e.is_piece and not _is_of_other(e.name)]
+    if moment := next(_moments(entries), ""):
+        return moment
+    days = [entry for entry in entries if DAY_ALONE.fullmatch(entry.value.strip())]
+    clocks = [e for e in entries if CLOCK_ALONE.fullmatch(e.value.strip()) and not DAY_ALONE.fullmatch(e.value.strip())]
+    clocks = clocks or [e for e in days[1:] if CLOCK_ALONE.fullmatch(e.value.strip())]
+    return f"{_shown(days[0])}; {_shown(clocks[0])}" if days and clocks else ""
+
+
+def _moments(entries: Sequence[Entry]) -> Iterator[str]:
+    """Entries with a date and a time of day of which no word before it speaks of another event."""
+    for entry in entries:
+        text = entry.value[:MAX_TEXT]
+        match = MOMENT.search(text)
+        if match and not _is_of_other(text[: match.start()]):
+            yield _shown(entry)
+
+
+def _shown(entry: Entry) -> str:
+    return f"{entry.name}: {entry.value.strip()[:MAX_SHOWN]}"
+
+
+def _is_of_other(text: str) -> bool:
+    return any(OTHER.search(word) for word in words_of(text))

@@ -1,0 +1,132 @@
+"""Starts and time zones in words that are not known: the start is read or reported, never lost without a word."""
+
+from datetime import datetime
+
+import numpy as np
+import pytest
+
+from turnout.readers import read
+from turnout.readers.time_texts import parse_uff_time
+from turnout.records import RawChannel, RawDescription
+
+START = datetime(2024, 5, 13, 14, 5, 30)  # in summer
+
+
+def outcome(tmp_path, head, time_zone="UTC", checked=()):
+    """(start in UTC, errors)."""
+    rows = "".join(f"{f:.4f};{r:.4f}\n" for f, r in np.random.default_rng(5).normal(size=(200, 2)))
+    (tmp_path / "a.csv").write_text(f"{head}\nforce;rail\n{rows}", encoding="utf-8")
+    channels = RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="m/s²")
+    description = RawDescription(channels, rate=20000.0, time_zone=time_zone, checked_entries=checked)
+    result = read("a.csv", tmp_path, description)
+    return result.recordings[0].started_at, result.errors
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *[
+            "Data: 13.05.2024\nGodzina: 14:05:30",
+            "Datum: 13.05.2024\nUhrzeit: 14.05.30",
+            "Datum: 13. 5. 2024\nČas: 14:05:30",
+        ],
+        *[
+            "Date: 13/05/2024\nHeure: 14h05m30s",
+            "Dato: 13-05-2024\nKlokkeslæt: 14.05.30",
+            "Data: 13/05/2024\nOra: 14:05:30",
+        ],
+        *["Pomiar: 2024-05-13 14:05:30", "Záznam: 13.05.2024 14:05:30"],
+    ],
+)
+def test_day_and_time_of_day_in_other_languages_are_joined(head, tmp_path):
+    assert outcome(tmp_path, head) == (START, ())
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *[
+            "13.05.2024 14:05:30",
+            "2024-05-13T14:05:30.000Z",
+            "Start: 13. května 2024 14:05:30",
+            "Mérés: 2024.05.13. 14:05:30",
+        ],
+        *[
+            "Ölçüm: 13.05.2024 14:05",
+            "Mittaus alkoi 13.5.2024 14:05:30",
+            "Hubi: 2024-05-13\nSaa: 14:05:30",
+            "Sitzung 20240513_140530",
+        ],
+    ],
+)
+def test_a_date_with_a_time_of_day_that_is_not_understood_is_quoted(head, tmp_path):
+    start, (error,) = outcome(tmp_path, head)
+    assert start is None and error.reason == "start_unknown" and head.split(": ")[-1].split()[0] in error.problem
+    assert "start_time" in error.remedy
+
+
+def test_an_entry_that_the_layout_declares_checked_is_no_start(tmp_path):
+    assert outcome(tmp_path, "Ölçüm: 13.05.2024 14:05", checked=("Ölçüm",)) == (None, ())
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *["Calibrated: 2023-01-01 00:00:00", "Exportiert am 01.06.2024 08:00:00", "Vytištěno: 01.06.2024 08:00:00"],
+        *[
+            "Uloženo: 01.06.2024 08:00:00",
+            "Udskrevet: 01.06.2024 08:00",
+            "Ende: 2024-05-13 14:05:35",
+            "Koniec: 2024-05-13 14:05:35",
+        ],
+        *["Firmware 2.1.3 of 2019", "Position: 12.05.20", "Next service: 2025-01-01 00:00:00"],
+    ],
+)
+def test_the_time_of_another_event_is_not_reported(head, tmp_path):
+    assert outcome(tmp_path, head) == (None, ())
+
+
+def test_another_date_beside_a_start_is_not_reported(tmp_path):
+    assert outcome(tmp_path, "Start: 2024-05-13 14:05:30\nMérés: 2024.05.13. 14:05:30") == (START, ())
+
+
+@pytest.mark.parametrize("zone", ["CEST", "SELČ", "MESZ", "EEST"])
+@pytest.mark.parametrize("name", ["Strefa czasowa", "Časové pásmo", "Klokke", "Saat dilimi"])
+def test_a_zone_counts_whatever_its_name(name, zone, tmp_path):
+    start, (error,) = outcome(tmp_path, f"Start: 2024-05-13 14:05:30\n{name}: {zone}")
+    assert start == START and error.reason == "start_unknown" and zone in error.problem
+    if zone != "EEST":
+        assert outcome(tmp_path, f"Start: 2024-05-13 14:05:30\n{name}: {zone}", "Europe/Prague")[1] == ()
+
+
+@pytest.mark.parametrize("offset", ["+02:00", "UTC+2", "UTC+02:00"])
+def test_an_offset_counts_whatever_its_name(offset, tmp_path):
+    assert outcome(tmp_path, f"Start: 2024-05-13 14:05:30\nSaat dilimi: {offset}") == (
+        datetime(2024, 5, 13, 12, 5, 30),
+        (),
+    )
+
+
+@pytest.mark.parametrize(
+    ("entry", "is_summer"),
+    [
+        *[("DST: off", False), ("DST: 0", False), ("Clock: winter time", False), ("Zimní čas: ano", False)],
+        *[("DST: on", True), ("Sommerzeit: ja", True), ("Letní čas: ano", True), ("Horloge: heure d'été", True)],
+        *[("Summer time: no", False), ("Sommerzeit: nein", False)],
+    ],
+)
+def test_summer_time_is_compared_with_the_zone_of_the_layout(entry, is_summer, tmp_path):
+    for stamp, is_of_summer in (("2024-05-13 14:05:30", True), ("2024-01-13 14:05:30", False)):
+        errors = outcome(tmp_path, f"Start: {stamp}\n{entry}", "Europe/Berlin")[1]
+        assert [error.reason for error in errors] == ([] if is_summer == is_of_summer else ["start_unknown"])
+
+
+@pytest.mark.parametrize("entry", ["Direction: WEST", "Weather: daylight", "Site: summer", "Train: EC"])
+def test_what_is_no_zone_is_not_reported(entry, tmp_path):
+    assert outcome(tmp_path, f"Start: 2024-05-13 14:05:30\n{entry}") == (START, ())
+
+
+def test_a_month_of_another_language_in_a_universal_file_is_read():
+    assert parse_uff_time("13-Mai-26 10:00:00") == datetime(2026, 5, 13, 10)
+    assert parse_uff_time("13-Dez-25 10:00:00") == datetime(2025, 12, 13, 10)
+    assert parse_uff_time("13-Foo-25 10:00:00") is None
