@@ -1,14 +1,14 @@
 """Entries of the lines of a text file above and below its numbers."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
-from turnout.readers.entries import COLON, FREE_TEXT, Entry, entries_of_text
+from turnout.readers.entries import COLON, FREE_TEXT, Entry, decoded_json, entries_of, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
@@ -52,6 +52,9 @@ def entries_of_lines(
         place = f"line {first_line + i}"
         text = line.strip().lstrip("#%*/!'\" ").strip()
         if not text or is_line_of_names(cells, names):
+            continue
+        if isinstance(mapping := decoded_json(text), Mapping):  # '# {"units": {"force": "kN"}}'
+            yield from entries_of(mapping, place)
             continue
         filled = cells if cells[0] else cells[1:]
         statements = [HEAD_LINE.match(cell) for cell in filled if re.search("[:=]", cell)]

@@ -132,7 +132,7 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
             value = value[()]
         if isinstance(value, (str, bytes)):
             text = decode_text(value) if isinstance(value, bytes) else value
-            value = _decode_json(text)
+            value = decoded_json(text)
         if isinstance(value, Mapping):
             yield from entries_of(value, path)
         elif isinstance(value, (list, tuple)) and any(isinstance(v, Mapping) for v in value):
@@ -143,8 +143,19 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
             yield Entry(path, name, value)
 
 
-def _decode_json(text: str) -> Any:
-    """The mapping or list that a text holds as JSON, else the text."""
+def decoded_json(text: str) -> Any:
+    """What a text holds as JSON.
+
+    Parameters
+    ----------
+    text : str
+        Value of an entry, or a comment.
+
+    Returns
+    -------
+    any
+        A mapping or a list, else the same text.
+    """
     if not text.lstrip().startswith(("{", "[")):
         return text
     try:
