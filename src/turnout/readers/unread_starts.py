@@ -72,7 +72,7 @@ def possible_start(record: RawRecord) -> str:
     days = [entry for entry in entries if DAY_ALONE.fullmatch(entry.value.strip())]
     clocks = [e for e in entries if CLOCK_ALONE.fullmatch(e.value.strip()) and not DAY_ALONE.fullmatch(e.value.strip())]
     clocks = clocks or [e for e in days[1:] if CLOCK_ALONE.fullmatch(e.value.strip())]
-    return f"{_shown(days[0])}; {_shown(clocks[0])}" if days and clocks else ""
+    return f"{_quotation(days[0])}; {_quotation(clocks[0])}" if days and clocks else ""
 
 
 def _moments(entries: Sequence[Entry]) -> Iterator[str]:
@@ -81,10 +81,10 @@ def _moments(entries: Sequence[Entry]) -> Iterator[str]:
         text = entry.value[:MAX_TEXT]
         match = MOMENT.search(text)
         if match and not _is_of_other(text[: match.start()]):
-            yield _shown(entry)
+            yield _quotation(entry)
 
 
-def _shown(entry: Entry) -> str:
+def _quotation(entry: Entry) -> str:
     return f"{entry.name}: {entry.value.strip()[:MAX_SHOWN]}"
 
 
