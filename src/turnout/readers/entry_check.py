@@ -44,7 +44,7 @@ class EntryCheck:
 
     def __init__(self, description: RawDescription, source: Source):
         self.source = source
-        self._checked = frozenset(name.strip().casefold() for name in description.checked_entries)
+        self.checked = frozenset(name.strip().casefold() for name in description.checked_entries)
         units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
         self._is_hammer_test = description.kind == "hammer"
         self._channels = [c for c in description.channels if c.quantity != IGNORED]
@@ -67,7 +67,7 @@ class EntryCheck:
         -------
         bool
         """
-        return text.partition(": ")[0].strip().casefold() in self._checked
+        return text.partition(": ")[0].strip().casefold() in self.checked
 
     def without_checked(self, record: RawRecord) -> RawRecord:
         """The record without the entries that the layout declares checked: they state nothing about it.
@@ -82,9 +82,9 @@ class EntryCheck:
         RawRecord
             The same record if there are none.
         """
-        if not self._checked:
+        if not self.checked:
             return record
-        entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self._checked)
+        entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self.checked)
         return record if len(entries) == len(record.entries) else replace(record, entries=entries)
 
     def remarks(
@@ -154,7 +154,7 @@ class EntryCheck:
         """Remark on each response that was measured against an axis, while the layout has the sign +1 for it."""
         for i, name, text in opposite_directions(record, self._channels):
             channel = record.names[i]
-            if (channel, text) in self._reported or name.strip().casefold() in self._checked:
+            if (channel, text) in self._reported or name.strip().casefold() in self.checked:
                 continue
             self._reported.add((channel, text))
             statement = f"its direction is {text!r} by its name" if name == channel else f"its {name!r} is {text!r}"

@@ -23,6 +23,7 @@ from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_vocabulary import CERTAIN
+from turnout.readers.record_borders import border_errors
 from turnout.readers.repeated_blocks import repeated_block
 from turnout.readers.simultaneous_records import add_shared, shared_channels, simultaneous_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
@@ -258,6 +259,8 @@ class _Conversion:
         if problem := delay_problem(record, sorted(sensor_rows), rate):
             raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
+        checked = self.entry_check.checked
+        of_borders = list(border_errors(record, sensor_rows, checked, rate, where, source))
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
         block_reader = BlockReader(record, channel_maps, where, source, source.state())
@@ -283,7 +286,7 @@ class _Conversion:
         of_rate = rate_remark(statements, rate, where, source)
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
-        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_entries]
+        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_entries]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors

@@ -261,11 +261,22 @@ def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Sou
     names = names or [str(i) for i in range(rows)]
     units = units if len(units) == rows else [units[0] if len(units) == 1 else ""] * rows
     record = _raw_record(names, list(block), units, facts, k, n)
+    record = replace(record, counters=_vectors_of_whole_numbers(facts.variables, block.shape[1]))
     axes = {} if record.time is not None else _axes(facts.variables, block.shape[1])
     if not axes:
         return record
     name, axis = next(iter(axes.items()))  # each variable of samples beside a matrix is no channel of it
     return replace(record, time=np.asarray(axis, dtype=float), time_label=name)
+
+
+def _vectors_of_whole_numbers(variables: Mapping[str, Any], n_sample: int) -> dict[str, np.ndarray]:
+    """The vectors beside a matrix with a whole number for each sample."""
+    return {
+        name: value
+        for name, value in variables.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.shape == (n_sample,)
+        if (value == np.rint(value)).all()
+    }
 
 
 def _axes(variables: Mapping[str, Any], n_sample: int) -> dict[str, np.ndarray]:

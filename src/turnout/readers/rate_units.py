@@ -29,10 +29,40 @@ TIME_UNITS = {
     **dict.fromkeys(("h", "hr", "hrs", "hour", "hours", "stunden"), Fraction(3600)),
     **dict.fromkeys(("d", "day", "days", "tage"), Fraction(86400)),
 }
+# Beginnings of the same words in further languages, with what may follow: "milisekundy", "millisecondi", "msecs"
+TIME_STEMS = (
+    (re.compile(r"(?:mill?i|m)ss?e[ckg][a-z]*"), Fraction(1, 10**3)),
+    (re.compile(r"(?:mi[ck]ro|[µu])ss?e[ckg][a-z]*"), Fraction(1, 10**6)),
+    (re.compile(r"(?:nano|n)ss?e[ckg][a-z]*"), Fraction(1, 10**9)),
+)
 PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}
 RATE_UNIT = re.compile(r"(k|m|g)?(?:hz|hertz|sps)")
 
 CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))  # letters of units in Russian
+
+
+@lru_cache(maxsize=4096)
+def seconds_of(word: str) -> Fraction | None:
+    """Seconds of one unit of time.
+
+    Parameters
+    ----------
+    word : str
+        The unit in lower case, without accents.
+
+    Returns
+    -------
+    Fraction or None
+        None for a word that is no unit of time.
+
+    Examples
+    --------
+    >>> seconds_of("ms"), seconds_of("milisekundy"), seconds_of("mm")
+    (Fraction(1, 1000), Fraction(1, 1000), None)
+    """
+    if word in TIME_UNITS:
+        return TIME_UNITS[word]
+    return next((scale for stem, scale in TIME_STEMS if stem.fullmatch(word)), None)
 
 
 @dataclass(frozen=True)
@@ -68,8 +98,8 @@ def rate_unit(text: str) -> RateUnit | None:
     plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
     if match := RATE_UNIT.fullmatch(plain):
         return RateUnit(False, PREFIXES[match[1] or ""], plain.endswith("sps"))
-    if plain in TIME_UNITS:
-        return RateUnit(True, TIME_UNITS[plain])
+    if seconds := seconds_of(plain):
+        return RateUnit(True, seconds)
     if re.fullmatch(r"(?:1? ?/ ?s(?:ec)?|s\^?-1|s⁻¹)", plain):
         return RateUnit(False, Fraction(1))
     parts = UNIT_PER.split(plain)
@@ -80,8 +110,8 @@ def rate_unit(text: str) -> RateUnit | None:
         for prefix, scale in PREFIXES.items():
             if over.startswith(prefix) and SAMPLES.fullmatch(over[len(prefix) :].strip()):
                 return RateUnit(False, scale, True)
-    if SAMPLES.fullmatch(under) and over in TIME_UNITS:
-        return RateUnit(True, TIME_UNITS[over], True)
+    if SAMPLES.fullmatch(under) and (seconds := seconds_of(over)):
+        return RateUnit(True, seconds, True)
     return None
 
 

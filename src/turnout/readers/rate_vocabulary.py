@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
-from turnout.readers.rate_units import PER, SAMPLES, SECONDS, TIME_UNITS, RateUnit, rate_unit, words_of
+from turnout.readers.rate_units import PER, SAMPLES, SECONDS, RateUnit, rate_unit, seconds_of, words_of
 
 SAMPLING = re.compile(
     r"samp|smpl?|abtast|tastrate|echantill|muestr|campion|bemonster|aftast|scan|acq|adqui|erfass|prove"
@@ -355,7 +355,7 @@ def is_time_name(name: str) -> bool:
     """
     if name.strip() == "T":
         return False
-    words = [word for word in words_of(name) if word not in TIME_UNITS or word == "t"]
+    words = [word for word in words_of(name) if seconds_of(word) is None or word == "t"]
     words = [
         word for word in words if word not in ("rel", "relative", "abs", "absolute", "sample", "utc", "stamp", "x")
     ]

@@ -44,8 +44,9 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
     """Name of the column that numbers the records.
 
     Under another name than "record" it has whole numbers that never fall, in blocks of one length but for the last:
-    a force, or a flag that is set at the contact, may have such a name as well. A number of one impact alone, as
-    "Impact No", is constant.
+    a force, or a flag that is set at the contact, may have such a name as well. Blocks of any length count under a
+    name that says "number", as "Impact No"; that of one impact alone is constant. Columns under names that are not
+    known are examined by their form (``record_borders``).
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def record_column(columns: Mapping[str, Column], source: Source) -> str | None:
         if _is_record(name) and not np.isfinite(numbers).all():
             raise source.error(f"column {name!r}", "it does not number every row", COPY_AGAIN)
         is_single = _is_number(name) and len(numbers) > 0 and bool((numbers == np.rint(numbers[0])).all())
-        if _is_record(name) or is_single or _numbers_blocks(numbers):
+        if _is_record(name) or is_single or _numbers_blocks(numbers, _is_number(name)):
             return name
     return None
 
@@ -97,10 +98,13 @@ def _signed_numbers(numbers: Column) -> np.ndarray:
     return values.astype(np.int64) if values.dtype.kind == "u" else values
 
 
-def _numbers_blocks(numbers: np.ndarray) -> bool:
+def _numbers_blocks(numbers: np.ndarray, is_number: bool) -> bool:
+    """Whether whole numbers never fall, in blocks of one length but for the last; of any length under ``is_number``."""
     if not np.isfinite(numbers).all() or (numbers != np.rint(numbers)).any() or (np.diff(numbers) < 0).any():
         return False
     lengths = np.diff([0, *(np.flatnonzero(np.diff(numbers)) + 1), len(numbers)])
+    if is_number:
+        return len(lengths) > 1 and lengths[:-1].min() > 1
     return len(lengths) > 1 and lengths[0] > 1 and len(set(lengths[:-1])) == 1 and lengths[-1] <= lengths[0]
 
 

@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator, Sequence, Set
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
 from turnout.readers.rate_statements import Statement, statements_of, time_statement
-from turnout.readers.rate_units import TIME_UNITS, rate_unit, words_of
+from turnout.readers.rate_units import hertz_of, rate_unit, seconds_of, words_of
 from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
+from turnout.readers.stated_units import known_unit
 from turnout.readers.time_numbers import unit_of_axis
 from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 
@@ -138,9 +140,39 @@ def is_axis_name(name: str, unit: str) -> bool:
     bool
         False if its unit is known and is no unit of time.
     """
-    known = rate_unit(unit)
-    has_other_unit = unit.strip().casefold() not in MEANINGLESS_UNITS and (known is None or not known.is_step)
-    return (is_time_name(name) or name.startswith("__index_level_")) and not has_other_unit
+    return (is_time_name(name) or name.startswith("__index_level_")) and not is_unit_of_no_time(unit)
+
+
+# Units of other quantities than time, beside those of sensors and of frequencies, that a column beside them may have.
+OTHER_UNITS = frozenset("km cm ° deg rad mrad A mA bar mbar hPa dB kg".split())
+
+
+@lru_cache(maxsize=4096)
+def is_unit_of_no_time(unit: str) -> bool:
+    """Whether a unit is known and is one of another quantity than time.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of a column as it is written, "" if not stated.
+
+    Returns
+    -------
+    bool
+        False for a unit of time, and for one that is not known: it may be one of time in any language.
+
+    Examples
+    --------
+    >>> [is_unit_of_no_time(unit) for unit in ("°C", "Hz", "ms", "ezredmp", "")]
+    [True, True, False, False, False]
+    """
+    plain = unit.strip()
+    if plain.casefold() in MEANINGLESS_UNITS:
+        return False
+    of_rate = rate_unit(plain)
+    if of_rate is not None:
+        return not of_rate.is_step
+    return known_unit(plain) is not None or hertz_of(plain) is not None or plain.strip("[]() ") in OTHER_UNITS
 
 
 def _time_column(record: RawRecord) -> tuple[str, np.ndarray, bool, int]:
@@ -169,11 +201,10 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
             if (stamps != stamps[0]).any():
                 yield f"column {name!r}", seconds_since_first(stamps), True, CERTAIN
             continue
-        known = rate_unit(unit) or next((rate_unit(w) for w in words_of(name)[1:][-1:] if w in TIME_UNITS), None)
-        is_time_unit = known is not None and known.is_step
-        has_other_unit = unit.strip().casefold() not in MEANINGLESS_UNITS and not is_time_unit
-        if has_other_unit:
+        if is_unit_of_no_time(unit):
             continue
+        known = rate_unit(unit) or next((rate_unit(w) for w in words_of(name)[1:][-1:] if seconds_of(w)), None)
+        is_time_unit = known is not None and known.is_step
         by_name = is_time_name(name)
         if not by_name and not rises_evenly(column[:HEAD_SIZE]):
             continue
@@ -181,7 +212,9 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         scale = known.scale if is_time_unit and known else unit_of_count or 1
         is_in_seconds = is_time_unit or unit_of_count is not None
         certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
-        place = f"column {name!r}" if by_name or is_time_unit else f"column {name!r}, which rises evenly"
+        is_unknown = not is_time_unit and unit.strip().casefold() not in MEANINGLESS_UNITS
+        place = f"column {name!r} in the unknown unit {unit!r}" if is_unknown else f"column {name!r}"
+        place = place if by_name or is_time_unit else f"{place}, which rises evenly"
         yield place, np.asarray(column[:], dtype=float) * float(scale), is_in_seconds, certainty
 
 

@@ -124,9 +124,10 @@ def test_a_jump_of_a_counter_is_an_error_and_its_restart_is_accepted(gap, tmp_pa
     (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
     reason, message = reason_of(tmp_path, "a.csv", ignored)
     assert reason == "truncated" and "samples are missing" in message and str(gap - 1) in message
-    for count in (np.arange(N), np.arange(N) % 256, 1 + np.arange(N) % 1000):
+    for count, reasons in ((np.arange(N), []), (np.arange(N) % 256, []), (1 + np.arange(N) % 1000, ["entry_unknown"])):
         (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
-        assert read("a.csv", tmp_path, ignored).errors == ()
+        result = read("a.csv", tmp_path, ignored)
+        assert len(result.recordings) == 1 and [e.reason for e in result.errors] == reasons
 
 
 @pytest.mark.parametrize("row", ["0.5;OVER", "0.5;(0.4)", "0.5;---.--", "0.5;#"])
