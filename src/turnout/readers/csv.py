@@ -2,7 +2,8 @@
 
 What is recognised:
 
-* separators: comma, semicolon, tab, ``|`` or blanks; a decimal comma where the separator is not a comma;
+* separators: comma, semicolon, tab, ``|`` or blanks, also with tabs among them; a decimal comma where the separator
+  is not a comma;
 * head lines with or without ``#``: ``rate`` or ``dt`` and what ``rate_vocabulary`` recognises, ``started_at``,
   ``n_records``, ``n_samples``, conditions, and the words of other languages listed in ``named_arrays``;
 * units in brackets after the names ("force [N]", "force (N)"), behind a slash, a comma or "in" where most names have
@@ -20,7 +21,7 @@ many decimals as all others.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from mmap import mmap
@@ -44,6 +45,7 @@ from turnout.readers.start_columns import start_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
 from turnout.readers.texts import decode_text, wide_encoding
+from turnout.readers.thousands_marks import ambiguous_marks
 
 
 def read_raw(source: Source) -> RawFile:
@@ -91,7 +93,8 @@ def read_raw(source: Source) -> RawFile:
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head.notes, source)
     first = start_in_cells(first_cells(data, offset, separator), names)
-    records = tuple(_records(columns, head, time, facts, source, first))
+    marks = ambiguous_marks(columns, data, offset, separator)
+    records = tuple(_records(columns, head, time, facts, source, first, marks))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
 
 
@@ -155,8 +158,8 @@ MIN_DECIMALS = 2  # of numbers printed to as many digits as they need: by chance
 
 
 def _with_single_blanks(rows: bytes) -> bytes:
-    """Rows with one blank between two words and none at either end."""
-    rows = re.sub(rb" +", b" ", rows).replace(b"\n ", b"\n")
+    """Rows with one blank in place of the blanks and tabs between two words, and none at either end."""
+    rows = re.sub(rb"[ \t]+", b" ", rows).replace(b"\n ", b"\n")
     return rows.replace(b" \n", b"\n").replace(b" \r\n", b"\r\n").strip(b" ")
 
 
@@ -220,6 +223,7 @@ def _records(
     facts: Metadata,
     source: Source,
     first: tuple[datetime | None, str],
+    marks: Mapping[int, str],
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
     names, units, entries = head.names, head.units, head.entries
@@ -270,6 +274,7 @@ def _records(
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
             aliases=tuple((head.written[i],) for i in selected),
+            marked_numbers={k: marks[i] for k, i in enumerate(selected) if i in marks},
             undecided=undecided,
             unit_conflicts=unit_conflicts,
             time_label="" if time is None else _label(names, units, time),

@@ -10,9 +10,10 @@ from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
 from turnout.readers.entries import COLON, FREE_TEXT, Entry, decoded_json, entries_of, entries_of_text
 from turnout.readers.exponential_windows import is_window_name
+from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
-from turnout.readers.rate_units import rate_unit
+from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.scale_vocabulary import is_of_drawing, is_scale_name
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
@@ -86,6 +87,10 @@ def entries_of_lines(
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0], cells[1:])]  # one for each column
+        elif len(cells) > 2 and _has_time_for_each(cells, names):
+            entries = [
+                Entry(place, cells[0].strip(":= "), DECIMAL_COMMA.sub(r"\1.", cell)) for cell in cells[1:] if cell
+            ]
         elif len(cells) > 2 and _has_value_for_each(cells, names):
             entries = [Entry(place, cells[0], [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
         elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
@@ -131,6 +136,18 @@ def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
 
 NO_VALUE = re.compile(r"[-–—]*|n\.?/?a\.?|none|keine?", re.IGNORECASE)  # a cell of a channel without one
 DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d)")
+
+
+DURATION = re.compile("durat|dauer|duree|durac|varighed|looptijd|record_length")
+
+
+def _has_time_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line has a rate, step, duration or number of samples for each column, or for each but the first."""
+    name, values = cells[0].strip(":= "), [cell for cell in cells[1:] if cell]
+    words = "_".join(words_of(name))
+    is_of_time = is_rate_name(name) or DURATION.search(words) or words in SAMPLE_COUNT_NAMES
+    is_for_each = len(cells) - 1 in (len(names), len(names) - 1) and len(values) > 1
+    return bool(is_of_time and is_for_each and all(re.match(r"[+-]?[.,]?\d", value) for value in values))
 
 
 def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:

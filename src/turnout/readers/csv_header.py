@@ -200,13 +200,13 @@ N_ROWS_OF_WORDS = 5  # lines: numbers between blanks may be in a head, too, but 
 
 
 def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
-    """Whether a line and those behind it are rows of as many numbers between blanks, without another separator."""
+    """Whether a line and those behind it are rows of as many numbers between blanks or tabs, without other marks."""
     end = position
     rows: list[list[str]] = []
     while len(rows) < N_ROWS_OF_WORDS and end < len(data):
         start, end = end, (data.find(b"\n", end) + 1) or len(data)
         line = decode_line(data[start:end])
-        rows.append([] if any(s in line for s in SEPARATORS) else cells_of(line, BLANK))
+        rows.append([] if ";" in line or "|" in line else cells_of(line, BLANK))
     return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and is_row(row) for row in rows)
 
 
@@ -233,7 +233,7 @@ def _check_row_above(
     if len(row) != len(cells) or not any(numbers) or is_label:
         return
     if any(len(text) == len(cells) and not any(map(is_number, text)) for text in texts[:-1]):
-        word = next(cell for cell, is_of_number in zip(row, numbers) if cell and not is_of_number)
+        word = next((cell for cell, is_of_number in zip(row, numbers) if not is_of_number), "")
         problem = f"{word[:60]!r} is no number, in the first row of samples"
         raise source.error(f"line {len(lines)}", problem, NO_ROW_REMEDY)
 

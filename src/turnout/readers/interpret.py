@@ -29,6 +29,7 @@ from turnout.readers.simultaneous_records import add_shared, shared_channels, si
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
+from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements, is_count_or_time
 from turnout.records import LongRecording, RawDescription, Recording
 
@@ -260,6 +261,7 @@ class _Conversion:
             raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
         checked = self.entry_check.checked
+        of_marks = list(mark_errors(record, _units_in_use(record, channel_maps, description), where, source))
         of_borders = list(border_errors(record, sensor_rows, checked, rate, where, source))
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
@@ -286,10 +288,18 @@ class _Conversion:
         of_rate = rate_remark(statements, rate, where, source)
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
-        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_entries]
+        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+def _units_in_use(
+    record: RawRecord, channel_maps: Sequence[ChannelMapping], description: RawDescription
+) -> dict[int, str]:
+    """Units of the channels that are read, by their numbers: of the layout, else of the file."""
+    stated = {channel.name: (channel.unit or "").removesuffix("!") for channel in description.channels}
+    return {m.index: stated.get(m.channel.name) or record.units[m.index] for m in channel_maps}
 
 
 REPEAT_REMEDY = (

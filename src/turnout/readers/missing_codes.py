@@ -12,6 +12,7 @@ from turnout.readers.source import BLOCK_SIZE
 HIGHEST_CODES = (2.0**15 - 1, 2.0**23 - 1, 2.0**31 - 1)
 # Nulls of well logs; codes of converters; fill value of masked arrays.
 OTHER_CODES = (999.25, 2.0**15, 2.0**23, 2.0**31, 1e20, *HIGHEST_CODES)
+CODE_TOLERANCE = 1e-7  # relative: of a number in single precision
 MIN_NINES = 3  # before the decimal point: 99 and 99.9 are common measured values
 MIN_NINES_OF_NEGATIVE = 2  # before the decimal point, as in -99.99, under the conditions of ``count_alone``
 MIN_NINES_OF_SINGLE = 4  # in all: -99.9 is a measured value in 1 of 1000 records, where it does not repeat
@@ -34,13 +35,16 @@ def missing_code(value: float) -> float | None:
     --------
     >>> [missing_code(value) for value in (-9999.0000001, 99999.9, -32768.0, 65535.0, 9998.0, 99.0, -99.99)]
     [-9999.0, 99999.9, -32768.0, None, None, None, -99.99]
+    >>> missing_code(2.0**31 - 1) == 2**31 - 1, missing_code(2.0**31) == 2**31
+    (True, True)
     """
     size = abs(float(value))
     text = f"{size:.7g}"
     digits, _, decimals = text.partition(".")
     if len(digits) >= (MIN_NINES_OF_NEGATIVE if value < 0 else MIN_NINES) and set(digits + decimals) == {"9"}:
         return math.copysign(float(text), value)
-    return next((math.copysign(code, value) for code in OTHER_CODES if math.isclose(size, code, rel_tol=1e-7)), None)
+    nearest = min(OTHER_CODES, key=lambda code: abs(size - code))
+    return math.copysign(nearest, value) if math.isclose(size, nearest, rel_tol=CODE_TOLERANCE) else None
 
 
 def count_alone(column: Column, code: float) -> int:
@@ -72,6 +76,8 @@ def count_alone(column: Column, code: float) -> int:
     >>> count_alone(np.array([0.0, 2.0, -99.99, 1.0]), -99.99), count_alone(np.array([0.0, -40.0, -99.99]), -99.99)
     (1, 0)
     """
+    if not _is_representable(code, column.dtype):
+        return 0
     count, smallest_jump, largest_step, lowest, lowest_beside = 0, np.inf, 0.0, np.inf, np.inf
     are_whole = True
     for block in _overlapping_blocks(column):
@@ -94,6 +100,14 @@ def count_alone(column: Column, code: float) -> int:
         n_nines = f"{code:.7g}".count("9")
         return count if lowest_beside > lowest and (count > 1 or n_nines >= MIN_NINES_OF_SINGLE) else 0
     return count
+
+
+def _is_representable(code: float, dtype: np.dtype) -> bool:
+    """Whether a type of numbers has a code: 2^31 in 32 bits with a sign would be -2^31."""
+    if dtype.kind not in "iu":
+        return True
+    limits = np.iinfo(dtype)
+    return code == math.floor(code) and limits.min <= int(code) <= limits.max
 
 
 def _overlapping_blocks(column: Column) -> Iterator[np.ndarray]:

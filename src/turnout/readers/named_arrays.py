@@ -14,7 +14,7 @@ What is recognised (names in any case, except ``t``):
   2. a structure or group that holds the other variables, or several, each a record, or each a channel
      (``turnout.readers.channel_groups``);
   3. one array: (record, channel, sample), (channel, sample) or (sample, channel). The channel axis is the one with
-     the number of channels, the longer axis is that of the samples;
+     the number of channels, the longest axis is that of the samples; ``dims`` may state the axes (``array_axes``);
   4. a matrix for each channel, with a row for each record (``turnout.readers.channel_matrices``);
   5. vectors of equal length, each a channel with the name of its variable.
 """
@@ -27,6 +27,7 @@ import numpy as np
 
 from turnout.counts import first_texts
 from turnout.errors import ReadError
+from turnout.readers.array_axes import with_records_first
 from turnout.readers.array_metadata import Alphabetical, Metadata, list_of_texts
 from turnout.readers.array_names import (
     channel_names,
@@ -221,13 +222,13 @@ def _group_records(
             "the file", f"several arrays could be the samples: {candidates}", "Export one array or one per record"
         )
     for name, array in blocks_by_name.items():
-        blocks = array if array.ndim == 3 else [array]
-        if array.ndim == 3 and len(names := channel_names(facts)) and array.shape[1] != len(names):
-            raise source.error(f"variable {name!r}", f"{array.shape} samples do not match {len(names)} channels")
-        if array.ndim == 3 and array.shape[0] > array.shape[2]:  # MATLAB: (sample, channel, record)
-            blocks = array.transpose(2, 1, 0)
+        where = f"variable {name!r}"
+        is_of_records = array.ndim == 3
+        blocks = (
+            with_records_first(array, len(channel_names(facts)), facts, where, source) if is_of_records else [array]
+        )
         count = (k, n) if array.ndim == 2 else (0, len(blocks))
-        return [_record(b, facts, count[0] + i, count[1], f"variable {name!r}", source) for i, b in enumerate(blocks)]
+        return [_record(b, facts, count[0] + i, count[1], where, source) for i, b in enumerate(blocks)]
     channels = vectors(variables)
     if not channels:
         return []

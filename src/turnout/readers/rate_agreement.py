@@ -172,7 +172,10 @@ def _check_axes(statements: Sequence[Statement], interval: Interval, where: str,
                 f"{statement.place} may be a time axis of {statement.usual.rate:.9g} samples per unit of time, which "
             )
             problem += f"is {interval.rate:.9g} Hz in no unit"
-            remedy = "Correct the rate in the layout; if the column is no time, give it the unit of its quantity in the layout"
+            remedy = (
+                "Correct the rate in the layout; if the column is no time, give it the unit of its quantity in the "
+                "layout"
+            )
             raise source.error(where, problem, remedy, reason="wrong_rate")
 
 

@@ -30,8 +30,8 @@ from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings
+from turnout.readers.tdms_abscissas import check_steps, seconds_of_abscissa, unit_of_abscissa
 from turnout.readers.time_texts import parse_time
-from turnout.readers.timing import check_simultaneous, start_offsets
 
 nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
 BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in
@@ -72,7 +72,9 @@ class _FirstValues(TdmsReader):
                     )
                     self.problems.setdefault(path, (problem, "scale_unknown"))
                 if name == "wf_start_time" and isinstance(value, TdmsTimestamp):
-                    self._compare_start(path, value.as_datetime64(), n_before, first.get("wf_increment", 0.0))
+                    step = first.get("wf_increment", 0.0)
+                    step = step * seconds_of_abscissa(first) if isinstance(step, float) else step
+                    self._compare_start(path, value.as_datetime64(), n_before, step)
         super()._update_object_properties(segment_object_properties)
         self._counts = {path: metadata.num_values for path, metadata in self.object_metadata.items()}
 
@@ -205,7 +207,8 @@ def _varying_numbers(names: Sequence[str]) -> tuple[tuple[int, ...], ...]:
 def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float, Any]:
     """Number of samples, step [s] and start of a channel, 0 and None if not stated."""
     facts = Metadata(channel.properties, source)
-    return len(channel), facts.number(("wf_increment",)) or 0.0, facts.record_value(("wf_start_time",), 0, 1)
+    step = (facts.number(("wf_increment",)) or 0.0) * seconds_of_abscissa(channel.properties)
+    return len(channel), step, facts.record_value(("wf_start_time",), 0, 1)
 
 
 def _in_utc(value: Any) -> Any:
@@ -297,7 +300,7 @@ def _complete_record(
         if channel.path in problems:
             problem, reason = problems[channel.path]
             raise source.error(f"{where}, channel {channel.name!r}", problem, ONE_WRITE_REMEDY, reason)
-    _check_steps(channels, where, source)
+    check_steps(channels, where, source)
     samples = [_scaled_numbers(c, where, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
     undecided = {
@@ -355,21 +358,9 @@ def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mappin
     places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
     for place, values in places:
         for entry in entries_of({name: _in_utc(value) for name, value in values.items()}, ""):
-            is_step = entry.name == "wf_increment"
-            yield Entry(f"{place}: {entry.name}", entry.name, entry.value, is_defined=is_step)
-
-
-def _check_steps(channels: Sequence[nptdms.TdmsChannel], where: str, source: Source) -> None:
-    """ReadError if steps or starts of the channels that state a step differ, or of all if none does.
-
-    A channel begins at its time stamp plus ``wf_start_offset``.
-    """
-    channels = [c for c in channels if "wf_increment" in c.properties] or channels
-    facts = [Metadata(c.properties, source) for c in channels]
-    steps = [f.number(("wf_increment",)) or 0.0 for f in facts]
-    stamps = start_offsets([parse_time(f.record_value(("wf_start_time",), 0, 1)) for f in facts])
-    starts = [stamp + (f.number(("wf_start_offset",)) or 0.0) for stamp, f in zip(stamps, facts)]
-    check_simultaneous([c.name for c in channels], steps, starts, where, source)
+            is_step, unit = entry.name == "wf_increment", unit_of_abscissa(values)
+            name = f"{entry.name} [{unit}]" if is_step and unit else entry.name
+            yield Entry(f"{place}: {entry.name}", name, entry.value, is_defined=is_step)
 
 
 def _scaled_numbers(channel: nptdms.TdmsChannel, where: str, source: Source) -> Column:

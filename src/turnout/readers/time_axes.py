@@ -246,14 +246,23 @@ def is_count_or_time(column: Column) -> bool:
 MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measures nothing
 
 
+REVERSE_REMEDY = (
+    "Sort the rows by this column and export them again; if it is no time and no count, give it the unit of its "
+    "quantity in the layout"
+)
+
+
 def _check_counters(record: RawRecord, measured: Set[int], where: str, source: Source) -> None:
-    """ReadError if a column that counts the samples leaves one out, or shows that they are in another order.
+    """ReadError if a column that counts the samples leaves one out, or shows that they are in another or reverse order.
 
     A counter that begins again is no gap: it counts within a record, or has reached its largest number.
     """
     for i, (name, column) in enumerate(zip(record.names, record.samples)):
         if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
             continue
+        if not is_unit_of_no_time(record.units[i]) and _is_on_line(-np.asarray(column[:HEAD_SIZE], dtype=float)):
+            problem = f"column {name!r} falls evenly from its first sample on: the samples may be in reverse order"
+            raise source.error(where, problem, REVERSE_REMEDY, "clock_backwards")
         if _counts_in_disorder(column):
             problem = f"the samples are not in the order in which column {name!r} counts them"
             raise source.error(where, problem, "Sort the rows by this column and export them again", "clock_backwards")

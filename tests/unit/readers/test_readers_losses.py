@@ -130,6 +130,37 @@ def test_a_jump_of_a_counter_is_an_error_and_its_restart_is_accepted(gap, tmp_pa
         assert len(result.recordings) == 1 and [e.reason for e in result.errors] == reasons
 
 
+@pytest.mark.parametrize("name, unit", [("n", ""), ("qwxz", ""), ("qwxz", "qwx"), ("Čas", "ms")])
+@pytest.mark.parametrize("step", [1.0, 0.05])
+def test_a_count_or_an_axis_that_falls_evenly_is_an_error(name, unit, step, tmp_path):
+    """Formerly, samples with the newest first were read against the time."""
+    ignored = RawDescription((*CHANNELS, RawChannel("n", name, "ignored")), rate=20000.0)
+    head = f"{name} [{unit}];force [N];rail [m/s²]" if unit else f"{name};force [N];rail [m/s²]"
+    falling = 7.0 + step * np.arange(N)[::-1]
+    (tmp_path / "a.csv").write_text(text_of(map("{:.9g};{}".format, falling, rows_of()), head), encoding="utf-8")
+    assert reason_of(tmp_path, "a.csv", ignored)[0] == "clock_backwards"
+    (tmp_path / "a.csv").write_text(
+        text_of(map("{:.9g};{}".format, falling, rows_of()), "n [°C];force [N];rail [m/s²]"), encoding="utf-8"
+    )
+    fallen = RawDescription((*CHANNELS, RawChannel("n", "n", "ignored")), rate=20000.0)
+    assert read("a.csv", tmp_path, fallen).errors == ()
+
+
+@pytest.mark.parametrize("code", [2**31 - 1, -(2**31 - 1), 2**31, -(2**31), 2**23 - 1, 2**15, -9999])
+def test_each_code_of_a_converter_is_found_among_numbers_with_decimals(code, tmp_path):
+    rail = RAIL.copy()
+    rail[700] = code
+    (tmp_path / "a.csv").write_text(text_of(f"{a:.5f};{b:.12g}" for a, b in zip(FORCE, rail)))
+    reason, message = reason_of(tmp_path, "a.csv")
+    assert reason == "not_finite" and "1 of " in message
+
+
+def test_a_code_that_a_type_of_numbers_does_not_have_is_not_counted():
+    column = np.array([5, -(2**31), 7, 3], dtype=np.int32)
+    assert count_alone(column, 2.0**31) == 0 and count_alone(column, -(2.0**31)) == 1
+    assert count_alone(np.array([5, 99999, 7], dtype=np.int32), 99999.9) == 0
+
+
 @pytest.mark.parametrize("row", ["0.5;OVER", "0.5;(0.4)", "0.5;---.--", "0.5;#"])
 def test_a_cell_without_a_number_in_the_first_row_is_an_error(row, tmp_path):
     (tmp_path / "a.csv").write_text(text_of([row, *rows_of()]))

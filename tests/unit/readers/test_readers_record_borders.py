@@ -93,8 +93,9 @@ def test_a_flag_or_a_counter_does_not_cost_a_record(format, name, tmp_path):
 
 
 AMBIGUOUS = {
-    "0 and 1 in like parts": np.repeat([0, 1], [900, N - 900]), "two sections": np.repeat([1, 2, 1, 2], [400, 450, 460, 460]),
-    "counts to 1000": 1 + np.arange(N) % 1000, "held values": np.repeat([21, 25, 22, 24, 20], N // 5),
+    "0 and 1 in like parts": np.repeat([0, 1], [900, N - 900]), "counts to 1000": 1 + np.arange(N) % 1000,
+    "two sections": np.repeat([1, 2, 1, 2], [400, 450, 460, 460]),
+    "held values": np.repeat([21, 25, 22, 24, 20], N // 5),
 }  # fmt: skip
 
 

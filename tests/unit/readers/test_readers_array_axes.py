@@ -1,0 +1,68 @@
+"""Axes of an array of three dimensions: which of them is that of the records, the channels and the samples."""
+
+import numpy as np
+import pytest
+import scipy.io
+
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE, N = 2e4, 300
+SENSORS = (
+    RawChannel("force", "force", "force", unit="N"),
+    RawChannel("rail", "rail", "acceleration", unit="m/s²"),
+)
+AXES = ("record", "channel", "sample")
+ORDERS = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
+
+
+def samples_of(n_record):
+    """(record, channel, sample) array."""
+    return np.random.default_rng(14).normal(size=(n_record, 2, N)) * [[900.0], [30.0]]
+
+
+def outcome(folder, array, dims=None, format="npz", sensors=SENSORS, **variables):
+    variables = {"data": array, "fs": RATE, **variables} | ({} if dims is None else {"dims": dims})
+    if format == "npz":
+        np.savez(folder / "a.npz", **variables)
+    else:
+        scipy.io.savemat(folder / "a.mat", variables)
+    return read(f"a.{format}", folder, RawDescription(sensors, rate=RATE))
+
+
+@pytest.mark.parametrize("format", ["npz", "mat"])
+@pytest.mark.parametrize("n_record", [1, 3, 5])
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_number_of_channels_and_the_longest_axis_decide(order, n_record, format, tmp_path):
+    samples = samples_of(n_record)
+    result = outcome(tmp_path, samples.transpose(order), format=format, channels=["force", "rail"])
+    assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_as_many_records_as_channels_are_rejected_unless_the_file_states_the_axes(order, tmp_path):
+    """Formerly, force of impacts 1 and 2 could become force and rail of impact 1."""
+    samples = samples_of(2)
+    array = samples.transpose(order)
+    with pytest.raises(Exception, match=r"nothing says which axis is that of the records.*dims"):
+        outcome(tmp_path, array, channels=["force", "rail"])
+    for words in (AXES, ("impacts", "Kanal", "time"), ("hit no", "Channels", "samples")):
+        stated = [words[i] for i in order]
+        for dims in (stated, ",".join(stated)):
+            result = outcome(tmp_path, array, dims, channels=["force", "rail"])
+            assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples]
+
+
+def test_stated_axes_that_contradict_the_names_of_the_channels_are_rejected(tmp_path):
+    with pytest.raises(Exception, match="it has 3 channels, and 2 have a name"):
+        outcome(tmp_path, samples_of(3), ("channel", "record", "sample"), channels=["force", "rail"])
+
+
+def test_without_names_of_channels_the_records_come_first(tmp_path):
+    sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
+    samples = samples_of(4)
+    for array in (samples, samples.transpose(2, 1, 0)):
+        result = outcome(tmp_path, array, sensors=sensors)
+        assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples]
+    with pytest.raises(Exception, match="nothing says which axis"):
+        outcome(tmp_path, samples_of(2), sensors=sensors)

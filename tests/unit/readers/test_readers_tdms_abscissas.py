@@ -1,0 +1,59 @@
+"""Unit and quantity of the abscissa of waveforms in TDMS files."""
+
+import nptdms
+import numpy as np
+import pytest
+
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE, N = 25600.0, 400
+SAMPLES = np.random.default_rng(13).normal(size=(2, N)) * [[900.0], [30.0]]
+SENSORS = (
+    RawChannel("force", "force", "force", unit="N"),
+    RawChannel("rail", "rail", "acceleration", unit="m/s²"),
+)
+
+
+def outcome(folder, first, second=None, rate=None):
+    """Rates of the recordings, and the message of each error."""
+    with nptdms.TdmsWriter(str(folder / "a.tdms")) as writer:
+        properties = first, first if second is None else second
+        channels = zip(("force", "rail"), SAMPLES, properties)
+        writer.write_segment([nptdms.ChannelObject("g", *channel) for channel in channels])
+    result = read("a.tdms", folder, RawDescription(SENSORS, rate=rate))
+    return [r.rate for r in result.recordings], [str(e) for e in result.errors]
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit"),
+    [(1.0, "s"), (1.0, ""), (1.0, "Sec"), (1e3, "ms"), (1e3, "milisekundy"), (1e6, "µs"), (1e9, "ns"), (1 / 60, "min")],
+)
+def test_the_unit_of_the_abscissa_scales_the_step(scale, unit, tmp_path):
+    waveform = {"wf_increment": scale / RATE, "wf_xunit_string": unit, "wf_xname": "Time"}
+    rates, errors = outcome(tmp_path, waveform)
+    assert rates == pytest.approx([RATE], rel=1e-9) and not errors
+    assert outcome(tmp_path, waveform, rate=RATE)[0] == [RATE]
+    rates, errors = outcome(tmp_path, waveform, rate=20000.0)
+    assert not rates and "instead of 20000 Hz" in errors[0]
+
+
+def test_steps_in_two_units_are_compared_in_seconds(tmp_path):
+    in_seconds = {"wf_increment": 1 / RATE, "wf_xunit_string": "s"}
+    in_ms = {"wf_increment": 1e3 / RATE, "wf_xunit_string": "ms"}
+    assert outcome(tmp_path, in_seconds, in_ms, RATE) == ([RATE], [])
+    rates, errors = outcome(tmp_path, in_ms, {**in_ms, "wf_start_offset": 1.0}, RATE)
+    assert not rates and errors
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("Frequency", "Hz"), ("", "Hz"), ("Frequenz", ""), ("Weg", "m"), ("qwxz", "rpm"), ("", "kHz")]
+)
+def test_samples_over_another_quantity_than_time_are_rejected(name, unit, tmp_path):
+    rates, errors = outcome(tmp_path, {"wf_increment": 10.0, "wf_xname": name, "wf_xunit_string": unit}, rate=100.0)
+    assert not rates and "and not over the time" in errors[0]
+
+
+def test_a_step_in_an_unknown_unit_is_rejected(tmp_path):
+    rates, errors = outcome(tmp_path, {"wf_increment": 1e3 / RATE, "wf_xunit_string": "qwxz"}, rate=RATE)
+    assert not rates and "the unit 'qwxz' of its step is not known" in errors[0]
