@@ -18,7 +18,7 @@ from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
-MAX_JUMPS = 1  # gaps among the first samples: with more a column rises too unevenly for a time axis
+MAX_JUMP_SHARE = 0.02  # gaps per step among the first samples: with more a column rises too unevenly for a time axis
 MAX_RATE_DIFFERENCE = 1e-3  # relative: axes of other rates have other units or contradict each other
 MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
 
@@ -306,7 +306,7 @@ def rises_evenly(head: np.ndarray) -> bool:
 
 
 def _is_on_line(samples: np.ndarray) -> bool:
-    """Whether samples lie on a rising line; one jump may be in it."""
+    """Whether samples lie on a rising line; one jump may be in it, and a few in many samples."""
     samples = np.asarray(samples, dtype=float)
     if len(samples) < MIN_AXIS_SIZE or not np.isfinite(samples).all():
         return False
@@ -316,7 +316,9 @@ def _is_on_line(samples: np.ndarray) -> bool:
     step = float(np.median(steps))
     line = samples[0] + (samples[-1] - samples[0]) * np.arange(len(samples)) / (len(samples) - 1)
     n_jump = np.count_nonzero(np.abs(steps - step) > 0.5 * step)
-    return bool(np.abs(samples - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= MAX_JUMPS)
+    return bool(
+        np.abs(samples - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= max(1, MAX_JUMP_SHARE * len(steps))
+    )
 
 
 def _constant_columns(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:

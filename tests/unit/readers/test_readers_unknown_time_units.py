@@ -74,10 +74,10 @@ def test_a_unit_of_the_layout_says_that_a_column_is_no_time(tmp_path):
     assert outcome(tmp_path / "a.csv", "qwx", "qwxz", 1e3 * TIME, 20000.0, layout_unit="m")[0] == [20000.0]
 
 
-@pytest.mark.parametrize("unit", ["qwxz", "ms (rel.)"])
-def test_a_gap_in_an_axis_of_an_unknown_unit_is_an_error(unit, tmp_path):
-    axis = 1e3 * TIME
-    axis[300:] += 17 * 1e3 / RATE
+@pytest.mark.parametrize("unit", ["qwxz", "ms (rel.)", ""])
+@pytest.mark.parametrize("n_gap", [1, 2, 5])
+def test_a_gap_in_an_axis_of_an_unknown_unit_is_an_error(n_gap, unit, tmp_path):
+    axis = 1e3 * (TIME + np.searchsorted(100 * np.arange(1, n_gap + 1), np.arange(N), side="right") * 17 / RATE)
     assert outcome(tmp_path / "a.csv", "qwx", unit, axis, RATE)[:2] == ([], ["truncated"])
 
 
