@@ -208,9 +208,11 @@ def test_a_jump_of_the_time_by_half_a_step_or_more_is_reported_as_missing_sample
         (1.5 * np.arange(N), True),
         (TIME * RATE / 25600.0, True),
         ((np.arange(N) + 30 * (np.arange(N) >= 200)) / 25600.0, True),  # an axis may have one gap
-        ((np.arange(N) + 30 * (np.arange(N) >= 200) + 30 * (np.arange(N) >= 300)) / 25600.0, False),
+        ((np.arange(N) + 30 * (np.arange(N) >= 200) + 30 * (np.arange(N) >= 300)) / 25600.0, True),
+        ((np.arange(N) + 30 * (np.arange(N) // 20)) / 25600.0, False),  # a gap in each 20 steps
         (np.arange(1.0, N + 1.0) ** 2, False),  # rises too unevenly
-        (-TIME, False),
+        (-TIME, True),  # the newest sample may be the first one
+        (-(TIME**2), False),
     ],
 )
 def test_an_evenly_rising_column_is_compared_with_the_rate_even_if_it_is_ignored(tmp_path, column, is_axis):

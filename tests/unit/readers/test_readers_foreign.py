@@ -54,10 +54,14 @@ def test_a_matlab_matrix_of_columns_with_fs_is_read(by_index, tmp_path):
 def test_a_matlab_matrix_in_three_dimensions_is_read(by_index, tmp_path):
     """(sample, channel, record): users of MATLAB stack impacts in this way."""
     volts = np.column_stack([FORCE * 0.23e-3, RAIL * 87.9e-3 / 9.80665])
-    scipy.io.savemat(tmp_path / "a.mat", {"y": np.stack([volts, 2 * volts], axis=2), "dt": 1 / RATE})
-    first, second = read("a.mat", tmp_path, by_index).recordings
+    scipy.io.savemat(tmp_path / "a.mat", {"y": np.stack([volts, 2 * volts, 3 * volts], axis=2), "dt": 1 / RATE})
+    first, second, third = read("a.mat", tmp_path, by_index).recordings
     assert_both(first)
     np.testing.assert_allclose(second.signal("rail"), 2 * RAIL, rtol=1e-14)
+    np.testing.assert_allclose(third.signal("rail"), 3 * RAIL, rtol=1e-14)
+    scipy.io.savemat(tmp_path / "b.mat", {"y": np.stack([volts, 2 * volts], axis=2), "dt": 1 / RATE})
+    with pytest.raises(ReadError, match="nothing says which axis is that of the records and of the channels"):
+        read("b.mat", tmp_path, by_index)
 
 
 def test_matlab_structures_are_read(by_name, tmp_path):
