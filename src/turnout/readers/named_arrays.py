@@ -50,6 +50,7 @@ from turnout.readers.metadata_names import (
     UNIT_NAMES,
 )
 from turnout.readers.metadata_subjects import STRONG, subject_of
+from turnout.readers.record_columns import are_texts, numbers_of_texts
 from turnout.readers.recording_versions import check_groups
 from turnout.readers.sample_variables import Attributes, holds_samples, matrices, vectors
 from turnout.readers.signal_structures import with_signal_structures
@@ -262,7 +263,8 @@ def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Sou
     names = names or [str(i) for i in range(rows)]
     units = units if len(units) == rows else [units[0] if len(units) == 1 else ""] * rows
     record = _raw_record(names, list(block), units, facts, k, n)
-    record = replace(record, counters=_vectors_of_whole_numbers(facts.variables, block.shape[1]))
+    counters = _vectors_of_whole_numbers(facts.variables, block.shape[1])
+    record = replace(record, counters={**record.counters, **counters})
     axes = {} if record.time is not None else _axes(facts.variables, block.shape[1])
     if not axes:
         return record
@@ -301,6 +303,11 @@ def _raw_record(
         for name, value in facts.variables.items()
         if isinstance(value, np.ndarray) and value.dtype.kind in "mM" and value.shape == (len(samples[0]),)
     }
+    texts = {
+        name: numbers_of_texts(value)
+        for name, value in facts.variables.items()
+        if isinstance(value, np.ndarray) and value.shape == (len(samples[0]),) and are_texts(value)
+    }
     return RawRecord(
         names=tuple(names),
         samples=samples,
@@ -317,6 +324,7 @@ def _raw_record(
         time_label=facts.label_of(TIME_NAMES),
         undecided=_undecided_scales(names, facts),
         not_numbers=_not_numbers(facts.variables),
+        counters=texts,
     )
 
 

@@ -22,7 +22,14 @@ from turnout.readers.declared_sizes import check_parquet
 from turnout.readers.entries import entries_of
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, START_NAMES, TIME_NAMES
-from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
+from turnout.readers.record_columns import (
+    are_texts,
+    may_number_records,
+    missing_record,
+    numbers_of_texts,
+    record_column,
+    spans_of_records,
+)
 from turnout.readers.sample_variables import is_flag_series
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
@@ -76,6 +83,7 @@ def read_raw(source: Source) -> RawFile:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
     others = {name: x.dtype for name, x in columns.items() if x.dtype.kind not in "fiumM"}
+    texts = {name: numbers_of_texts(x) for name, x in columns.items() if isinstance(x, np.ndarray) and are_texts(x)}
     not_numbers = {name: f"{kind_of(dtype)}, no real numbers" for name, dtype in others.items()}
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     stamped = [name for name, x in columns.items() if x.dtype.kind == "M"]
@@ -112,6 +120,7 @@ def read_raw(source: Source) -> RawFile:
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
                 not_numbers=not_numbers,
+                counters={name: numbers[span] for name, numbers in texts.items()},
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES), remarks)

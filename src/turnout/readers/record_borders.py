@@ -52,7 +52,7 @@ def border_errors(
     """
     columns = [(f"column {n!r}", n, u, x) for n, u, x in zip(record.names, record.units, record.samples)]
     columns = [column for i, column in enumerate(columns) if i not in measured]
-    columns += [(f"variable {name!r}", name, "", values) for name, values in record.counters.items()]
+    columns += [(f"{name!r}", name, "", values) for name, values in record.counters.items()]
     for place, name, unit, column in columns:
         is_count = unit.strip().casefold() in ("count", "counts")
         if name.strip().casefold() in checked or (is_unit_of_no_time(unit) and not is_count):

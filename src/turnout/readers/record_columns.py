@@ -8,9 +8,11 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.channel_maps import kind_of
+from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.lazy import Column
 from turnout.readers.record_numbers import with_missing
 from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.texts import decode_text
 
 RECORD_NAME = re.compile(
     r"(?:record|rec|segment|impact|hit|shot|schlag|coup)"
@@ -139,6 +141,48 @@ def spans_of_records(numbers: Column | None, n_row: int) -> list[slice | None]:
         return [*spans]
     span_of = dict(zip(map(int, numbers_of_spans), spans))
     return [span_of.get(number) for number in with_missing(span_of)]
+
+
+def numbers_of_texts(texts: np.ndarray) -> np.ndarray:
+    """A number for each text of a column, in the order in which the texts appear.
+
+    Parameters
+    ----------
+    texts : (n,) array of str
+        A column of texts.
+
+    Returns
+    -------
+    (n,) array of int
+        Equal texts have equal numbers.
+
+    Examples
+    --------
+    >>> numbers_of_texts(np.array(["hit 1", "hit 1", "hit 2", "hit 1"]))
+    array([0, 0, 1, 0])
+    """
+    numbers: dict[str, int] = {}
+    return np.array([numbers.setdefault(str(text), len(numbers)) for text in texts], dtype=int)
+
+
+def are_texts(column: Column) -> bool:
+    """Whether a column holds texts other than dates and times of day.
+
+    Parameters
+    ----------
+    column : (n,) Column
+        A column as it is in the file.
+
+    Returns
+    -------
+    bool
+        False for an empty column.
+    """
+    if column.dtype.kind not in "OUST" or not len(column):
+        return False
+    first = column[:1][0]
+    first = decode_text(first) if isinstance(first, bytes) else first
+    return isinstance(first, str) and not is_clock_or_date(first)
 
 
 def missing_record(k: int, n: int, source: Source) -> ReadError:

@@ -229,7 +229,7 @@ class RawRecord:
     seconds unless ``is_time_in_seconds`` is False: then its unit is not stated; ``time_label`` is its name, with the
     unit as it is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which
     axes of time stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
-    ``counters`` are vectors of whole numbers, one for each sample, that are no channels, by name.
+    ``counters`` are whole numbers that are no channels, one for each sample, by name: equal texts have equal numbers.
     ``marked_numbers`` are cells with a mark that may be one for thousands, by the index of the channel.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied;
     ``unit_conflicts`` are statements about units of channels that contradict each other, by index. ``not_numbers`` are

@@ -130,4 +130,17 @@ def test_a_vector_beside_a_matrix_that_numbers_the_records_is_reported(tmp_path)
         np.savez(tmp_path / "a.npz", data=matrix, channels=["force", "rail"], fs=RATE, qwxz=vector)
         result = read("a.npz", tmp_path, RawDescription(SENSORS, rate=RATE))
         assert len(result.recordings) == n_record
-        assert n_record or "variable 'qwxz' changes 2 times" in str(result.errors[0])
+        assert n_record or "'qwxz' changes 2 times" in str(result.errors[0])
+
+
+@pytest.mark.parametrize("format", ["parquet", "npz"])
+def test_texts_that_change_in_blocks_are_reported_and_flags_are_not(format, tmp_path):
+    for texts, n_record in (
+        (("qw 1", "qw 2", "qw 3"), 0),
+        (("off", "on", "off"), 1),
+        (("10:00:01", "10:00:02", "10:00:03"), 1),
+    ):
+        write_file(tmp_path / f"a.{format}", "qwxz", np.repeat(texts, LENGTHS))
+        result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=RATE))
+        assert len(result.recordings) == n_record
+        assert n_record or "'qwxz' changes 2 times, from 0 to 2" in str(result.errors[0])
