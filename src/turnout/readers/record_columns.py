@@ -177,6 +177,11 @@ def are_texts(column: Column) -> bool:
     -------
     bool
         False for an empty column.
+
+    Examples
+    --------
+    >>> are_texts(np.array(["hit 1", "hit 2"])), are_texts(np.array(["10:00:01", "10:00:02"])), are_texts(np.arange(3))
+    (True, False, False)
     """
     if column.dtype.kind not in "OUST" or not len(column):
         return False

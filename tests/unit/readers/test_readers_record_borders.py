@@ -129,7 +129,7 @@ def test_a_vector_beside_a_matrix_that_numbers_the_records_is_reported(tmp_path)
     for vector, n_record in ((np.repeat([1, 2, 3], LENGTHS), 0), (np.zeros(N, dtype=int), 1)):
         np.savez(tmp_path / "a.npz", data=matrix, channels=["force", "rail"], fs=RATE, qwxz=vector)
         result = read("a.npz", tmp_path, RawDescription(SENSORS, rate=RATE))
-        assert len(result.recordings) == n_record
+        assert len(result.recordings) == n_record and len(result.errors) == 1 - n_record
         assert n_record or "'qwxz' changes 2 times" in str(result.errors[0])
 
 
@@ -142,5 +142,5 @@ def test_texts_that_change_in_blocks_are_reported_and_flags_are_not(format, tmp_
     ):
         write_file(tmp_path / f"a.{format}", "qwxz", np.repeat(texts, LENGTHS))
         result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=RATE))
-        assert len(result.recordings) == n_record
+        assert len(result.recordings) == n_record and len(result.errors) == 1 - n_record
         assert n_record or "'qwxz' changes 2 times, from 0 to 2" in str(result.errors[0])
