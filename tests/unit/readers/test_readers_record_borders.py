@@ -138,7 +138,7 @@ def test_texts_that_change_in_blocks_are_reported_and_flags_are_not(format, tmp_
     for texts, n_record in (
         (("qw 1", "qw 2", "qw 3"), 0),
         (("off", "on", "off"), 1),
-        (("10:00:01", "10:00:02", "10:00:03"), 1),
+        (("qw", "qw", "qw"), 1),
     ):
         write_file(tmp_path / f"a.{format}", "qwxz", np.repeat(texts, LENGTHS))
         result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=RATE))
