@@ -132,8 +132,8 @@ def _form_of_blocks(values: np.ndarray, rate: float) -> tuple[str, bool] | None:
         return (text, False) if is_halved else None
     if (numbers[0] >= MIN_EPOCH or edges.size > 1) and _are_whole_times(steps, lengths, rate):
         return None if numbers[0] >= MIN_EPOCH else (text, False)
-    if (steps > 0).all() or (steps < 0).all():
-        return text, True
+    if (steps > 0).all() or (steps < 0).all():  # from 0 or 1 on by ones: no temperature or load in whole numbers
+        return text, min(numbers[0], numbers[-1]) in (0.0, 1.0) and bool((np.abs(steps) == 1.0).all())
     begins_again = bool(((steps == 1.0) | (numbers[1:] == numbers[0])).all())
     are_alike = len(set(lengths[:-1].tolist())) == 1
     return (text, False) if begins_again or are_alike else None

@@ -52,8 +52,8 @@ def outcome(path, name, column, unit="", layout_unit=None, checked=()):
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet", "npz", "mat", "h5", "tdms"])
-@pytest.mark.parametrize("numbers", [(1, 2, 3), (0, 1, 2), (9, 8, 7), (101, 214, 388)])
-def test_a_column_that_changes_in_blocks_is_reported_under_any_name(format, numbers, tmp_path):
+@pytest.mark.parametrize("numbers", [(1, 2, 3), (0, 1, 2), (3, 2, 1)])
+def test_a_column_that_counts_in_blocks_is_refused_under_any_name(format, numbers, tmp_path):
     column = np.repeat(numbers, LENGTHS).astype(float)
     lengths, reasons, messages = outcome(tmp_path / f"a.{format}", "qwxz", column)
     assert (lengths, reasons) == ([], ["wrong_length"])
@@ -93,6 +93,8 @@ def test_a_flag_or_a_counter_does_not_cost_a_record(format, name, tmp_path):
 
 
 AMBIGUOUS = {
+    "numbers from 7 on, or degrees": np.repeat([7, 8, 9], LENGTHS), "falling": np.repeat([9, 8, 7], LENGTHS),
+    "numbers in wide steps": np.repeat([101, 214, 388], LENGTHS),
     "0 and 1 in like parts": np.repeat([0, 1], [900, N - 900]), "counts to 1000": 1 + np.arange(N) % 1000,
     "two sections": np.repeat([1, 2, 1, 2], [400, 450, 460, 460]),
     "held values": np.repeat([21, 25, 22, 24, 20], N // 5),
@@ -107,7 +109,7 @@ def test_a_form_that_leaves_it_open_is_a_remark(name, tmp_path):
 
 def test_the_layout_or_a_unit_can_say_that_a_column_numbers_nothing(tmp_path):
     column = np.repeat([20, 21, 22], LENGTHS)
-    assert outcome(tmp_path / "a.csv", "qwxz", column)[0] == []
+    assert outcome(tmp_path / "a.csv", "qwxz", column)[1] == ["entry_unknown"]
     assert outcome(tmp_path / "a.csv", "qwxz", column, unit="°C")[:2] == ([N], [])
     assert outcome(tmp_path / "a.csv", "qwxz", column, layout_unit="°C")[:2] == ([N], [])
     assert outcome(tmp_path / "a.csv", "qwxz", column, checked=("QWXZ",))[:2] == ([N], [])
