@@ -53,7 +53,7 @@ def outcome(path, name, column, unit="", layout_unit=None, checked=()):
 
 @pytest.mark.parametrize("format", ["csv", "parquet", "npz", "mat", "h5", "tdms"])
 @pytest.mark.parametrize("numbers", [(1, 2, 3), (0, 1, 2), (3, 2, 1)])
-def test_a_column_that_counts_in_blocks_is_refused_under_any_name(format, numbers, tmp_path):
+def test_a_column_that_counts_in_blocks_is_an_error_under_any_name(format, numbers, tmp_path):
     column = np.repeat(numbers, LENGTHS).astype(float)
     lengths, reasons, messages = outcome(tmp_path / f"a.{format}", "qwxz", column)
     assert (lengths, reasons) == ([], ["wrong_length"])
