@@ -1,6 +1,7 @@
 """Write docs/api.md, the reference of the public names of ``turnout``, from their docstrings, and its figure.
 
 Run ``python -m turnout.api.reference_page docs`` to update both; a test compares the page.
+``python -m turnout.api.reference_page --example OT_1.uff`` writes the file that the example reads.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ defaults of `config/config.yaml`. A result prints in one line; recordings, recep
 which draws with matplotlib and returns the axes. A record, a channel or an impact that cannot be used is a result with
 a reason ([reasons](reasons.md)), not an exception. An exception states file, place, problem and remedy.
 
-Five lines lead from a file of a hammer test to modes with error bars and a figure:
+Five lines lead from a file of a hammer test to modes with error bars and a figure.
+`python -m turnout.api.reference_page --example OT_1.uff` writes a simulated file to try them:
 
 ```python
 {example}
@@ -166,6 +168,8 @@ def draw_figure(path: Path) -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1] == "--example":
+        sys.exit(print(write_example_file(Path(sys.argv[2]))))
     docs = Path(sys.argv[1])
     (docs / "api.md").write_text(page(), encoding="utf-8")
     draw_figure(docs / "gallery" / "modes.png")

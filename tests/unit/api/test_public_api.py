@@ -123,7 +123,17 @@ def test_the_five_lines_compute_modes_with_standard_errors_and_a_figure_from_a_f
     readme = (repository / "README.md").read_text(encoding="utf-8")
     assert f">>> impacts\n{impacts!r}\n" in readme
     printed = readme.split(">>> model\n")[1].split("\n")[0]
-    assert re.sub(r"\d+(\.\d+)?", "#", printed) == re.sub(r"\d+(\.\d+)?", "#", repr(model))
+    number = r"\d+(?:\.\d+)?"
+    assert re.sub(number, "#", printed) == re.sub(number, "#", repr(model))
+    values, expected = ([float(n) for n in re.findall(number, text)] for text in (printed, repr(model)))
+    assert values == pytest.approx(expected, abs=1.0)  # Hz: the last digits differ from processor to processor
+
+
+def test_the_command_of_the_readme_writes_the_file_of_the_five_lines(example, repository, tmp_path):
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    words = re.search(r"a simulated file to try: `python (-m .*?)`", readme)[1].split()
+    subprocess.run([sys.executable, *words], cwd=tmp_path, check=True)
+    assert (tmp_path / "OT_1.uff").read_bytes() == (example[0] / "OT_1.uff").read_bytes()
 
 
 def test_the_modes_equal_those_of_the_nightly_run(example):
