@@ -1,8 +1,10 @@
-"""Values of the demonstration that two pages contain are the same on both pages."""
+"""Values of the demonstration that pages contain agree with each other and with the text made from them."""
 
 import re
 
 import pytest
+from benchmarks.passage_demonstration import text
+from benchmarks.trend_demonstration import MARKS
 
 # (page, pattern of its values, page that a run of the demonstration writes, pattern of the same values there)
 REPEATED = {
@@ -52,3 +54,22 @@ def test_a_repeated_value_is_that_of_the_run(what, repository):
     expected = re.search(original, (repository / "docs" / origin).read_text(encoding="utf-8"))
     assert found and expected, what
     assert sorted(found.groups()) == sorted(expected.groups())
+
+
+def test_the_scores_of_trains_are_as_their_program_writes_them(repository):
+    """Counts in sentences follow from the tables, and no line was edited by hand."""
+    page = (repository / "docs" / "passages.md").read_text(encoding="utf-8")
+    block = page.split(MARKS[0] + "\n")[1].split("\n" + MARKS[1])[0]
+    sentence = re.sub("`.*?`", "", block.split("\n")[0])
+    n, explained, no_impulse, accepted = map(int, re.findall(r"\d+", sentence))
+    counts = {"null_explains": explained, "not_an_impulse": no_impulse, "accepted": accepted}
+    assert sum(counts.values()) == n
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in block.splitlines() if line[0:2] == "| "]
+    fits = [(c[0], c[1], *map(float, c[2:5]), int(c[5])) for c in cells if len(c) == 6 and c[0] != "section"]
+    number = r"[+-][\d.]+"
+    effects = [
+        (c[0], *(tuple(map(float, re.findall(number, cell))) for cell in c[1:]))
+        for c in cells if len(c) == 3 and c[0] != "section"
+    ]  # fmt: skip
+    assert len(fits) == len(effects) == 6
+    assert text(counts, fits, effects) == block
