@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 from benchmarks.trend_demonstration import write
-
 from turnout.registry.database import open_registry
 from turnout.report.paper_tables import paper_tables
 
