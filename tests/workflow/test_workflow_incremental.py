@@ -159,7 +159,7 @@ def test_truncated_work_files_are_restored_without_a_computation(fleet):
     [
         ("turnout=T00004", "unknown option 'turnout'. Did you mean 'turnouts'?"),
         ("turnouts=T0004", "no turnout 'T0004'. Did you mean 'T00004'?"),
-        ("day=tomorrow", "day: 'tomorrow' is no day of the calendar. Write YYYY-MM-DD"),
+        ("day=tomorrow", "day: 'tomorrow'. Write YYYY-MM-DD"),
         ("strict=perhaps", "strict: 'perhaps'. Write true or false"),
     ],
 )

@@ -12,7 +12,15 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_figure, add_former, add_turnout, add_work, check_output_files
+from turnout.cli.options import (
+    add_configuration,
+    add_figure,
+    add_former,
+    add_raw,
+    add_turnout,
+    add_work,
+    check_output_files,
+)
 from turnout.constants import KMH, Z95
 
 if TYPE_CHECKING:
@@ -47,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", help="passage recording, in any format that is read")
     add_turnout(parser, "id of the turnout, for its sensors and models")
     add_configuration(parser)
+    add_raw(parser)
     add_work(parser, "folder of the last run (%(default)s)")
     parser.add_argument("--no-fit", action="store_true", help="only find the train, fit no model")
     add_figure(parser, "draw panels of the first train into this HTML file")
@@ -66,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from pathlib import Path
 
     from turnout.config import load_configuration
     from turnout.errors import REMARK_REASONS, ReadError
@@ -73,12 +83,14 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.layout_reading import grouped_errors
     from turnout.stages.passage import trains_in
     from turnout.stages.passage_context import passage_context
-    from turnout.stages.raw_files import require_file
+    from turnout.stages.requested_units import passage_file
 
     check_output_files(args, "--figure")
-    turnout = load_configuration(args.configuration).turnout(args.turnout)
+    configuration = load_configuration(args.configuration)
+    turnout = configuration.turnout(args.turnout)
     description = turnout.require_passages().description
-    path = require_file(args.file).resolve()  # a link may lead anywhere
+    folders = {name: row.raw for name, row in configuration.rows.items()}
+    path = passage_file(args.file, turnout, Path(args.raw), folders).resolve()  # a link may lead anywhere
     settings = turnout.settings["passage"]
     result = read(path.name, path.parent, description, settings.longest)
     remarks = [e for e in result.errors if isinstance(e, ReadError) and e.reason in REMARK_REASONS]

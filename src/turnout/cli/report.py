@@ -56,12 +56,14 @@ def _day(text: str | None) -> str | None:
     """The requested day, None without one; ConfigError if it is invalid."""
     from datetime import date
 
+    from turnout.config.events import day_problem
     from turnout.errors import ConfigError
 
-    try:
-        return date.fromisoformat(text).isoformat() if text else None
-    except ValueError:
-        raise ConfigError("--day", "date", repr(text), "Write YYYY-MM-DD") from None
+    if not text:
+        return None
+    if problem := day_problem(text):
+        raise ConfigError("--day", "date", f"{text!r}{problem[0]}", problem[1])
+    return date.fromisoformat(text).isoformat()
 
 
 def _older_day_hint(registry: str) -> str:

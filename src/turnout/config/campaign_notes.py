@@ -9,7 +9,7 @@ from pathlib import Path
 
 from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
-from turnout.config.events import parse_utc, time_problem
+from turnout.config.events import day_problem, parse_utc, time_problem
 from turnout.config.frozen_mapping import Frozen
 from turnout.config.schema import decimal_point_hint
 from turnout.config.turnout import Campaign, TurnoutConfig
@@ -188,10 +188,9 @@ def _error(place: Place, problem: str, remedy: str, reason: str = "unreadable") 
 
 
 def _campaign(cells: Mapping) -> Campaign:
-    try:
-        date = day.fromisoformat(cells["campaign"]).isoformat()
-    except ValueError:
-        raise _CellError("campaign", f"campaign is {cells['campaign']!r}", "Write its day as YYYY-MM-DD") from None
+    if wrong_day := day_problem(cells["campaign"]):
+        raise _CellError("campaign", f"campaign is {cells['campaign']!r}{wrong_day[0]}", wrong_day[1])
+    date = day.fromisoformat(cells["campaign"]).isoformat()
     text = cells["started_at_utc"]
     if time_error := time_problem(text):
         raise _CellError("started_at_utc", f"started_at_utc is {text!r}{time_error[0]}", time_error[1])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,7 @@ RESETS = {
 }
 FIRST_YEAR = 1900  # an earlier date of work is taken for a mistake
 MAX_LEAD_TIME = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
+DAY_LENGTH = len("2026-04-02")
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
 
@@ -197,12 +199,45 @@ def time_problem(text: str) -> tuple[str, str] | None:
     --------
     >>> time_problem("2026-04-02") is None, time_problem("2.4.2026")
     (True, ('', 'Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC'))
+    >>> time_problem("2026-02-30T09:00")
+    (', which is no day of the calendar', 'Write a day that exists')
     """
     try:
         time = parse_utc(text)
     except ValueError:
-        return "", "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC"
+        problem = day_problem(text[:DAY_LENGTH]) if text[DAY_LENGTH : DAY_LENGTH + 1] in ("", "T", " ") else None
+        return problem if problem and problem[0] else ("", "Write YYYY-MM-DD or YYYY-MM-DDTHH:MM in UTC")
     return (", with a time zone", "Write the time in UTC, without a zone") if time.tzinfo else None
+
+
+def day_problem(text: str) -> tuple[str, str] | None:
+    """Error of a text that is no day, such as 2026-02-30.
+
+    Parameters
+    ----------
+    text : str
+        Text of a cell or an option.
+
+    Returns
+    -------
+    tuple of (str, str) or None
+        Addition to the problem, and remedy; None for a day of the calendar.
+
+    Examples
+    --------
+    >>> day_problem("2026-02-28") is None, day_problem("2026-02-30"), day_problem("28.2.2026")
+    (True, (', which is no day of the calendar', 'Write a day that exists'), ('', 'Write YYYY-MM-DD'))
+    """
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        is_written_right = re.fullmatch(r"\d{4}-\d{2}-\d{2}", text, re.ASCII) is not None
+        return (
+            (", which is no day of the calendar", "Write a day that exists")
+            if is_written_right
+            else ("", "Write YYYY-MM-DD")
+        )
+    return None
 
 
 def parse_utc(text: str) -> datetime:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.config.events import day_problem
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import ChangeEffect, Event, StateParameter, VisitInformation
 from turnout.mismatch.calibrated.answers_of_change import free_shape
@@ -101,10 +102,11 @@ def changes_of(entries: Iterable[ParameterSet]) -> tuple[AcceptedChange, ...]:
         term = str(entry["term"])
         if term not in GROUPS:
             raise SimulationError(f"{where}: no change of {term!r} can be accepted; {', '.join(sorted(GROUPS))} can.")
-        try:
-            since, until = (years_of(str(entry[key])) for key in (SINCE, "until"))
-        except ValueError as error:
-            raise SimulationError(f"{where}: {error}; write YYYY-MM-DD.") from None
+        for key in (SINCE, "until"):
+            text = str(entry[key])
+            if problem := day_problem(text if len(text) > len("2026-04") else f"{text}-15"):
+                raise SimulationError(f"{where}: {key} is {text!r}{problem[0]}. {problem[1]}.")
+        since, until = (years_of(str(entry[key])) for key in (SINCE, "until"))
         first, last = entry.number("first", "m"), entry.number("last", "m")
         if until <= since or last < first:
             raise SimulationError(f"{where}: the end lies before the beginning.")

@@ -25,7 +25,7 @@ from turnout.stages.calibrate import calibrate_to_files, resolve_track
 from turnout.stages.parameter_ranges import improbable_in_files
 from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
-from turnout.stages.raw_files import require_file
+from turnout.stages.requested_units import passage_file
 from turnout.stages.track_files import files_of_track, files_of_vehicle
 from turnout.workflow.scan import scan
 
@@ -132,8 +132,11 @@ def compare_passage(
     ConfigError
         No train, an unknown type without ``vehicle``, or an unknown sensor.
     """
-    turnout = with_raw(load_configuration(configuration).turnout(turnout_id), Path(raw))
-    recording, passage = _recorded_train(require_file(file), turnout)
+    every = load_configuration(configuration)
+    turnout = with_raw(every.turnout(turnout_id), Path(raw))
+    turnout.require_passages()
+    path = passage_file(file, turnout, Path(raw), {name: row.raw for name, row in every.rows.items()})
+    recording, passage = _recorded_train(path, turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
     vehicle = vehicle or _vehicle_of_type(passage, file)
     train = _vehicle(vehicle, load, passage, file)
@@ -169,8 +172,11 @@ def _chosen_sensors(
     names: Sequence[str], passage: Passage, sensors: Sequence[PassageSensor], file: str | Path
 ) -> list[PassageSensor]:
     by_name = {s.name: s for s in sensors if s.name in passage.at_sensor}
-    unknown = [name for name in names if name not in by_name]
-    if unknown:
+    all_names = [s.name for s in sensors]
+    if unknown := [name for name in names if name not in all_names]:
+        observation = f"no sensor {' and '.join(map(repr, unknown))}"
+        raise ConfigError("--sensors", "sensor", observation, f"The turnout has {', '.join(all_names)}")
+    if unknown := [name for name in names if name not in by_name]:
         remedy = f"Choose from {', '.join(by_name)}"
         raise ConfigError("--sensors", "sensor", f"{', '.join(unknown)}: did not record the train of {file}", remedy)
     return [by_name[name] for name in names or by_name]

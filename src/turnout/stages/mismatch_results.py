@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from turnout.config import load_configuration, with_raw
+from turnout.counts import first_texts
 from turnout.errors import SimulationError
 from turnout.files import write_text
 from turnout.fingerprint import fingerprint
@@ -59,6 +60,7 @@ class ProgressBar(Protocol):
         """
 
 
+MAX_NAMED_VISITS = 12  # of those that an error lists
 ALL_VISITS = "all"  # every visit in one case: effects of temperature or time need several
 
 
@@ -131,7 +133,8 @@ def _visit(
     if requested == ALL_VISITS:
         return list(by_visit)[-1], [unit for members in by_visit.values() for unit in members]
     if requested not in by_visit:
-        raise SimulationError(f"{turnout_id} has no visit {requested!r}; there are {', '.join(list(by_visit)[-12:])}.")
+        newest = first_texts(list(by_visit)[::-1], MAX_NAMED_VISITS, others="earlier ones")
+        raise SimulationError(f"{turnout_id} has no visit {requested!r}; its visits are, newest first, {newest}.")
     return requested, by_visit[requested]
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 from turnout.config import TurnoutConfig
+from turnout.config.events import day_problem
 from turnout.config.filename_pattern import compile_pattern
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, ReadError
@@ -45,8 +46,8 @@ def check_request(turnout: TurnoutConfig, section: str | None, campaign: str | N
             "turnout hammer", "--section", f"{section!r} is no section of {turnout.id}", suggestion(section, labels)
         )
     if campaign is not None and not _is_day(campaign):
-        remedy = "Write the day of the campaign as YYYY-MM-DD"
-        raise ConfigError("turnout hammer", "--campaign", f"{campaign!r} is no day of the calendar", remedy)
+        addition, remedy = day_problem(campaign) or ("", "Write YYYY-MM-DD")
+        raise ConfigError("turnout hammer", "--campaign", f"{campaign!r}{addition}", remedy)
 
 
 def _is_day(text: str) -> bool:

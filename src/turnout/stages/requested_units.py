@@ -90,6 +90,42 @@ def requested_units(
     return requests
 
 
+def passage_file(file: str | Path, turnout: TurnoutConfig, raw_root: Path, folders: Mapping[str, str]) -> Path:
+    """The recording of a passage that a person names, in the raw folder of the turnout or anywhere else.
+
+    Parameters
+    ----------
+    file : path
+        The file.
+    turnout : TurnoutConfig
+        Configuration of the turnout.
+    raw_root : path
+        Folder that holds those of the turnouts; it need not exist.
+    folders : mapping
+        Raw folder of every turnout by its id.
+
+    Returns
+    -------
+    Path
+        The same path.
+
+    Raises
+    ------
+    ConfigError
+        The file is of a hammer test or of another turnout.
+    ReadError
+        A path that is no file.
+    """
+    path = require_file(file)
+    scan_result = _NightlyScan(turnout, raw_root, [])
+    scan_result.check_turnout(path, folders)
+    unit, _ = scan_result.units.get(os.path.realpath(path), (None, ""))
+    if unit is not None and unit.kind != "passage":
+        remedy = f"Use turnout hammer {path} --turnout {turnout.id}"
+        raise ConfigError(path, "file name", "is that of a hammer test, not of a passage", remedy)
+    return path
+
+
 class _NightlyScan:
     """Scan of the turnout's raw folder, as in the nightly run: (unit, path) and problems by real path."""
 
@@ -145,7 +181,7 @@ class _NightlyScan:
             The unit is a passage.
         """
         if unit.kind != "hammer":
-            command = f"Use turnout passage {names.pop()} --turnout {unit.turnout}"
+            command = f"Use turnout passage {self.raw_root / names.pop()} --turnout {unit.turnout}"
             raise ConfigError(unit.files[0][0], "file name", "is that of a passage, not of a hammer test", command)
         further = [path.rsplit("/", 1)[-1] for path, *_ in unit.files if path not in names]
         selection = replace(unit, files=tuple(file for file in unit.files if file[0] in names))

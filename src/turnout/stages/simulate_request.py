@@ -44,7 +44,7 @@ def check_request(request: Mapping[str, Any]) -> None:
     if request.get("out") and request.get("tests", 1) > 1:
         raise option_error("out", f"one file for {request['tests']} tests", "Write --tests 1, or leave out --out")
     if fault := time_problem(request["at"]):
-        raise option_error("at", f"{request['at']!r} is not a time in UTC{fault[0]}", fault[1])
+        raise option_error("at", f"{request['at']!r}{fault[0] or ' is not a time in UTC'}", fault[1])
 
 
 def with_format(request: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 
 from turnout.config import Configuration, load_configuration
 from turnout.config.consistency import ToSi
+from turnout.config.events import day_problem
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError, TurnoutError
 from turnout.files import write_text
@@ -194,10 +195,9 @@ def _day(value: Any) -> str:
     """The given day, else the day on which the run began, which is the same for all of its jobs."""
     if not value:
         return (launch_time() or datetime.now(UTC)).date().isoformat()
-    try:
-        return date.fromisoformat(str(value)).isoformat()
-    except ValueError:
-        raise ConfigError("--config", "day", f"{value!r} is no day of the calendar", "Write YYYY-MM-DD") from None
+    if problem := day_problem(str(value)):
+        raise ConfigError("--config", "day", f"{str(value)!r}{problem[0]}", problem[1])
+    return date.fromisoformat(str(value)).isoformat()
 
 
 def _diagnosis_scope(options: Mapping, configuration: Configuration) -> str:

@@ -49,3 +49,29 @@ def test_a_file_without_a_train_is_reported_with_exit_code_1(folder_with_link, c
         samples[7] = broken
     code, printed = command_result(folder_with_link, samples, capsys)
     assert code == 1 and expected in printed
+
+
+def filed(folder, name):
+    """A file of noise at ``name`` below the raw folder."""
+    samples = np.random.default_rng(7).normal(0.0, 0.1, (1, 20000))
+    path = folder / "raw" / name
+    path.parent.mkdir(parents=True)
+    return write([Recording(samples, 5000.0, (Channel("web", "acceleration"),), "passage")], path, "npz")
+
+
+@pytest.mark.parametrize("command", [["passage", "--no-fit"], ["compare"]])
+def test_a_hammer_test_and_a_file_of_another_turnout_are_named_as_such(folder_with_link, capsys, command):
+    (folder_with_link / "config/turnouts.tsv").write_text("turnout\tlayout\nt1\tsmall\nt2\tsmall\n")
+    layout = folder_with_link / "config/layouts/small.yaml"
+    hammer = 'hammer:\n  files: "hammer/{campaign}/{section}_{test}.{ext}"\n  rate: 20000\n'
+    hammer += "  force: hammer\n  response: rail\n  channels:\n"
+    hammer += "    hammer: {source: hammer, quantity: force, unit: N}\n"
+    hammer += "    rail: {source: rail, quantity: acceleration, unit: m/s²}\n"
+    layout.write_text(LAYOUT + hammer)
+    test = filed(folder_with_link, "t1/hammer/2026-07-25/A_1.npz")
+    assert main([*command, str(test), "--turnout", "t1"]) == 2
+    error = capsys.readouterr().err
+    assert f"is that of a hammer test, not of a passage. Use turnout hammer {test} --turnout t1" in error
+    passage = filed(folder_with_link, "t2/passages/20260725T090000Z.npz")
+    assert main([*command, str(passage), "--turnout", "t1"]) == 2
+    assert "is t1, and the file lies in the raw folder of t2. Write --turnout t2" in capsys.readouterr().err

@@ -15,5 +15,15 @@ def test_the_newest_visit_a_given_visit_or_all_visits_are_selected():
 
 
 def test_the_error_of_an_unknown_visit_lists_the_known_visits():
-    with pytest.raises(SimulationError, match=r"no visit '2023'; there are 2024-02-06, 2024-07-16\."):
+    with pytest.raises(
+        SimulationError, match=r"no visit '2023'; its visits are, newest first, 2024-07-16, 2024-02-06\."
+    ):
         _visit("t", FOUND, "2023", "raw")
+
+
+def test_an_unknown_visit_is_answered_by_the_newest_visits_and_the_number_of_the_others():
+    visits = {f"2024-{month:02d}-01": [] for month in range(1, 13)} | {"2025-01-01": [], "2025-02-01": []}
+    with pytest.raises(SimulationError) as error:
+        _visit("t", visits, "2025-03-01", "raw")
+    assert "newest first, 2025-02-01, 2025-01-01, 2024-12-01" in str(error.value)
+    assert str(error.value).endswith("2024-03-01 and 2 earlier ones.")

@@ -96,3 +96,5 @@ def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, 
     assert {r["band_high_hz"] for r in rows} == {"40", "1000"} and float(rows[5]["recorded_psd"]) > 0.0
     assert main([*arguments[:6], "--raw", str(passage.parent), "--sensors", "A9"]) == 2
     assert "A9: did not record the train" in capsys.readouterr().err
+    assert main([*arguments[:6], "--raw", str(passage.parent), "--sensors", "A17"]) == 2
+    assert "no sensor 'A17'. The turnout has OT, SP, CLP, A7, A8, A9, ASM, ASD." in capsys.readouterr().err

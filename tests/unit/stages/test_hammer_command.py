@@ -287,7 +287,7 @@ def test_a_missing_file_a_folder_and_a_passage_are_errors_with_a_remedy(tmp_path
     passage.parent.mkdir()
     passage.write_bytes(path.read_bytes())
     code, _, error = run_hammer(capsys, tmp_path, passage)
-    assert code == 2 and "turnout passage" in error
+    assert code == 2 and f"turnout passage {passage} --turnout" in error
 
 
 def test_the_same_file_given_twice_is_used_once(tmp_path, capsys):
