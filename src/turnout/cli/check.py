@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from turnout.config import Configuration, Event, TurnoutConfig
     from turnout.errors import ReadError
-    from turnout.records import Unit
     from turnout.units import Conversion
 
 MAX_TYPES = 6  # of trains that a remark names
@@ -159,7 +158,7 @@ def _position_remarks(configuration: Configuration) -> Iterator[str]:
     return position_remarks(configuration.rows, zone_of)
 
 
-def _remarks_on_train_types(turnout: TurnoutConfig, raw: Path) -> Iterator[str]:
+def _remarks_on_train_types(turnout: TurnoutConfig) -> Iterator[str]:
     """A remark on the types of trains.csv that no axle pattern has: recordings cannot show them."""
     from turnout.errors import ConfigError
     from turnout.stages.passage_context import known_patterns
@@ -173,7 +172,7 @@ def _remarks_on_train_types(turnout: TurnoutConfig, raw: Path) -> Iterator[str]:
     if types and (without := sorted(listed - types)):
         names = first_texts([*map(repr, without)], MAX_TYPES)
         yield (
-            f"{raw / turnout.raw / 'trains.csv'}: no axle pattern is called {names}, so no recording is recognised as "
+            f"{turnout.raw}/trains.csv: no axle pattern is called {names}, so no recording is recognised as "
             f"such a train. Correct the name, or add its axle distances to {path}"
         )
 
@@ -181,7 +180,8 @@ def _remarks_on_train_types(turnout: TurnoutConfig, raw: Path) -> Iterator[str]:
 def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]) -> int:
     """Print the number of raw files and each problem with them; returns the number of problems."""
     from turnout.config.campaign_notes import read_notes
-    from turnout.workflow.notes_check import note_contradictions
+    from turnout.stages.layout_reading import lack_of_temperature
+    from turnout.workflow.notes_check import improbable_temperatures, note_contradictions
     from turnout.workflow.scan import scan
 
     n_units = n_files = 0
@@ -194,8 +194,11 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
         noted_turnout, note_errors = read_notes(turnout, raw)
         problems += [*scanned.problems, *note_errors, *note_contradictions(noted_turnout, raw, scanned.units)]
         if not note_errors:
-            remarks += _without_temperature(noted_turnout, raw, scanned.units)
-            remarks += _remarks_on_train_types(noted_turnout, raw)
+            if lack := lack_of_temperature(noted_turnout, raw, scanned.units):
+                problems += [lack.error] if lack.is_certain else []
+                remarks += [] if lack.is_certain else [str(lack.error)]
+            remarks += _remarks_on_train_types(noted_turnout)
+        remarks += improbable_temperatures(noted_turnout)
     problem_count = count_of(len(problems), "problem") if problems else "no problem"
     print(f"{raw}: {count_of(n_files, 'file')} in {count_of(n_units, 'unit')}, {problem_count}.")
     for problem in problems:
@@ -205,18 +208,6 @@ def _report_left_out(configuration: Configuration, raw: Path, ids: Sequence[str]
     for folder in _folders_without_turnout(configuration, raw):
         print(f"  {folder}: no turnout reads this folder. `turnout add ID LAYOUT --raw {folder.name}` adds one")
     return len(problems)
-
-
-def _without_temperature(turnout: TurnoutConfig, raw: Path, units: Iterable[Unit]) -> Iterator[str]:
-    """A remark on a turnout of whose campaigns none has a noted rail temperature: no file, no column or empty cells."""
-    days = {unit.campaign for unit in units if unit.kind == "hammer" and unit.campaign}
-    if days and all(turnout.campaigns[day].rail_temperature is None for day in days):
-        path = raw / turnout.raw / "campaigns.csv"
-        lack = "no column rail_temperature_c with values" if path.is_file() else "there is no such file"
-        yield (
-            f"{path}: {lack}. Charts do not judge a campaign without a rail temperature. "
-            "Note it there, unless the recordings state it"
-        )
 
 
 def _folders_without_turnout(configuration: Configuration, raw: Path) -> list[Path]:

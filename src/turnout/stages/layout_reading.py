@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from turnout.config import TurnoutConfig
-from turnout.counts import count_of
+from turnout.counts import count_of, first_texts
 from turnout.errors import ReadError
 from turnout.hammer_test import receptance_of
 from turnout.hammer_test.response_quality import find_track_impacts
@@ -29,6 +29,7 @@ from turnout.units import SI
 STIFFNESS_BAND = (80.0, 300.0)  # Hz, of the printed dynamic stiffness
 # Rejections of impacts that a wrong layout may cause.
 LAYOUT_REASONS = ("out_of_scale", "sign_reversed", "dead_channel", "no_impact", "not_simultaneous", "overload")
+MAX_NAMED_DAYS = 3  # in a message
 MAX_TEMPERATURE_DIFFERENCE = 15.0  # °C, of one rail within the day of a campaign
 MAX_TRAIN_ACCELERATION = 5e4  # m/s²: more than any sensor on a rail withstands
 MIN_TRAIN_ACCELERATION = 0.05  # m/s²: less than the quiet trains at the farthest sensor
@@ -121,6 +122,63 @@ def _read(
     else:
         more, found_events = _passage_faults(path, [*result.recordings, *result.long_recordings])
     return FileReading(turnout.id, section, path, f"{text}{found_events}", (*faults, *more))
+
+
+@dataclass(frozen=True)
+class LackOfTemperature:
+    """A turnout without any rail temperature, as ``error``; certain if its newest recordings state none either."""
+
+    error: ReadError
+    is_certain: bool
+
+
+def lack_of_temperature(turnout: TurnoutConfig, raw_root: Path, units: Sequence[Unit]) -> LackOfTemperature | None:
+    """Whether no chart of a turnout can be evaluated, as none of its campaigns has a rail temperature.
+
+    One file of the newest campaign is read if campaigns.csv has no temperature of a campaign with files.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout with its notes.
+    raw_root : Path
+        Folder that the paths of the units start from.
+    units : sequence of Unit
+        Units of the turnout.
+
+    Returns
+    -------
+    LackOfTemperature or None
+        None if a temperature is noted or recorded, or there is no hammer test.
+    """
+    descriptions = turnout.hammer.descriptions if turnout.hammer else {}
+    tests = [unit for unit in units if unit.kind == "hammer" and unit.section in descriptions]
+    days = {str(unit.campaign) for unit in tests}
+    noted = [day for day, campaign in turnout.campaigns.items() if campaign.rail_temperature is not None]
+    if not days or days.intersection(noted):
+        return None
+    newest = max(tests, key=lambda unit: (str(unit.campaign), unit.label))
+    is_certain = False
+    try:
+        recordings = read(newest.files[0][0], raw_root, descriptions[str(newest.section)]).recordings
+        if rail_temperature(recordings) is not None:
+            return None
+        is_certain = bool(recordings)
+    except ReadError:
+        pass  # the nightly run puts the file into quarantine
+    problem = "no column rail_temperature_c with values"
+    if noted:
+        days_noted = first_texts(sorted(noted), MAX_NAMED_DAYS)
+        problem = f"it has a rail temperature of {days_noted} only, and no hammer file is of such a campaign"
+    elif not (raw_root / turnout.raw / "campaigns.csv").is_file():
+        problem = "there is no such file"
+    if is_certain:
+        problem += f", and the recordings of {newest.campaign} state no rail temperature"
+    problem += ": charts do not evaluate a campaign without one"
+    remedy = "Note them there" + ("" if is_certain else ", unless the recordings state them")
+    return LackOfTemperature(
+        ReadError(f"{turnout.raw}/campaigns.csv", "rail temperatures", problem, remedy), is_certain
+    )
 
 
 def _filing_errors(turnout: TurnoutConfig, unit: Unit, path: str, result: ReadResult) -> Iterator[ReadError]:

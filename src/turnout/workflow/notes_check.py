@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
+from statistics import median
 
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import COLUMNS
@@ -17,6 +18,8 @@ from turnout.workflow.notes import start_of
 CLOCK_SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
 FUTURE_TOLERANCE = timedelta(days=1)
 FUTURE_REMEDY = "Correct the date, or the clock of this machine"
+MIN_SEASON = 3  # campaigns of the same and the neighbouring months
+MAX_DIFFERENCE_TO_SEASON = 25.0  # °C, of a rail from the median of its season
 MIN_SHIFTED_PASSAGES = 3  # passages that a shift must match to trains: fewer may match by chance
 
 
@@ -71,6 +74,33 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
         )
         remedy = f"Add a line '{day},<start in UTC>,<rail temperature in °C>'"
         yield ReadError(name, "line 1", finding, remedy)
+
+
+def improbable_temperatures(turnout: TurnoutConfig) -> Iterator[str]:
+    """A remark on each noted rail temperature that is far from those of its season in the other campaigns.
+
+    Parameters
+    ----------
+    turnout : TurnoutConfig
+        Configuration of the turnout with its notes.
+
+    Yields
+    ------
+    str
+        A sentence that names the day, both temperatures and what to do.
+    """
+    noted = [(date.fromisoformat(day), c.rail_temperature) for day, c in turnout.campaigns.items()]
+    known = [(day, value) for day, value in noted if value is not None]
+    for day, value in known:
+        season = [t for other, t in known if other != day and (other.month - day.month) % 12 in (0, 1, 11)]
+        if len(season) < MIN_SEASON or abs(value - (usual := median(season))) <= MAX_DIFFERENCE_TO_SEASON:
+            continue
+        celsius = (value - 32.0) / 1.8
+        unit = f": in °F it would be {celsius:.0f} °C" if abs(celsius - usual) < abs(value - usual) / 2 else ""
+        yield (
+            f"{turnout.raw}/campaigns.csv: campaign {day} has a rail temperature of {value:g} °C, and the median of "
+            f"the other campaigns of its season is {usual:g} °C{unit}. Correct it if it is wrong"
+        )
 
 
 def is_future(moment: datetime) -> bool:

@@ -56,6 +56,8 @@ def configuration(tmp_path):
 def write_files(tmp_path, scale=1.0, labels=("A7", "A8"), rate=RATE):
     folder = tmp_path / "raw" / "t1" / "hammer" / "2026-05-13"
     folder.mkdir(parents=True, exist_ok=True)
+    campaigns = "campaign,started_at_utc,rail_temperature_c\n2026-05-13,2026-05-13T09:00,15\n"
+    (tmp_path / "raw" / "t1" / "campaigns.csv").write_text(campaigns)
     paths = [folder / f"{label}_1.h5" for label in labels]
     for k, path in enumerate(paths):
         write(hammer_test(scale * (1.0 + 1e-6 * k), rate), path, "hdf5")  # so that no file is a copy of the first

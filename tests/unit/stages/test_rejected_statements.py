@@ -93,6 +93,8 @@ def project(tmp_path):
     (folder / "turnouts.tsv").write_text("turnout\tlayout\nt1\tmine\n")
     raw = tmp_path / "raw"
     (raw / "t1" / "hammer" / "2026-05-13").mkdir(parents=True)
+    campaigns = "campaign,started_at_utc,rail_temperature_c\n2026-05-13,2026-05-13T09:00,15\n"
+    (raw / "t1" / "campaigns.csv").write_text(campaigns)
     return folder, raw
 
 

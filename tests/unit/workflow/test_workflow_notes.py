@@ -29,7 +29,11 @@ def raw(tmp_path, repository, monkeypatch):
 
 def check_lines(capsys):
     code = main(["check"])
-    return code, [line.strip() for line in capsys.readouterr().out.splitlines() if ".csv, " in line]
+    return code, [
+        line.strip()
+        for line in capsys.readouterr().out.splitlines()
+        if ".csv, " in line and "rail temperatures:" not in line
+    ]
 
 
 def test_campaigns_that_agree_with_the_files_give_no_message(raw, capsys):
@@ -47,10 +51,50 @@ def test_a_turnout_without_any_rail_temperature_has_a_remark(raw, capsys, text):
         (raw / "campaigns.csv").write_text(text)
     code = main(["check"])
     (line,) = (line for line in capsys.readouterr().out.splitlines() if "rail temperature" in line)
-    assert code == 0 and line.startswith("  raw/line_7/s1/campaigns.csv: ")
+    assert code == 0 and line.startswith("  line_7/s1/campaigns.csv, rail temperatures: ")
     assert ("no such file" if text is None else "no column rail_temperature_c") in line
     (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n2024-09-02,2024-09-02T09:00,\n")
     assert main(["check"]) == 0 and "rail temperature" not in capsys.readouterr().out
+
+
+def readable_tests(raw, temperature):
+    """Hammer tests of the newest campaign that state this rail temperature, or none with None."""
+    for section in ("A7", "A8"):
+        path = raw / "hammer/2024-09-02" / f"{section}_1.uff"
+        path.unlink()
+        noted = [] if temperature is None else ["--temperature", str(temperature)]
+        command = ["simulate", "hammer", "--section", section, "--impacts", "1", "--at", "2024-09-02T09:00", *noted]
+        assert main([*command, "--turnout", "tommerup_s1", "--out", str(path)]) == 0
+
+
+@pytest.mark.parametrize("temperature", [None, 14.0])
+def test_a_turnout_whose_recordings_state_no_temperature_either_has_a_problem(raw, capsys, temperature):
+    readable_tests(raw, temperature)
+    capsys.readouterr()
+    code, printed = main(["check"]), capsys.readouterr().out
+    assert code == (1 if temperature is None else 0)
+    problem = "there is no such file, and the recordings of 2024-09-02 state no rail temperature"
+    assert (problem in printed) == (temperature is None) == ("1 problem." in printed)
+
+
+def test_temperatures_of_other_days_than_those_of_the_files_are_named(raw, capsys):
+    (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-14,2024-05-14T09:00,12\n")
+    main(["check"])
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if "rail temperatures:" in line)
+    assert "it has a rail temperature of 2024-05-14 only, and no hammer file is of such a campaign" in line
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"), [("59", "in °F it would be 15 °C"), ("-15", "is 14 °C. Correct"), ("35", None)]
+)
+def test_a_temperature_far_from_its_season_has_a_remark(raw, capsys, value, expected):
+    rows = [f"202{year}-05-13,202{year}-05-13T09:00,{12 + 2 * year}\n" for year in range(3)]
+    (raw / "campaigns.csv").write_text(HEADER + "".join(rows) + f"2024-05-13,2024-05-13T09:00,{value}\n")
+    main(["check"])
+    lines = [line for line in capsys.readouterr().out.splitlines() if "the other campaigns of its season" in line]
+    assert len(lines) == (expected is not None)
+    if expected:
+        assert f"campaign 2024-05-13 has a rail temperature of {value} °C" in lines[0] and expected in lines[0]
 
 
 def test_a_campaign_without_files_and_files_without_a_campaign_are_reported(raw, capsys):
