@@ -5,6 +5,7 @@
 
 An acknowledged alarm moves from "inspect this week" to "plan"; an alarm raised later is a new one. A suppressed
 chart is not on the list until the date. Both are lines of config/acknowledgements.csv and count from the next run.
+Nothing is written if no open alarm was raised by the time of the acknowledgement.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_registry
 from turnout.config.acknowledgements import BANDS
+from turnout.constants import DAYS_PER_YEAR
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +26,12 @@ OPEN_ALARMS_QUERY = """
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
         and band = coalesce($3, band) and raised_at_utc <= $4
     limit 1"""
+SUPPRESSED_QUERY = """
+    select count(*), count(*) filter (exists (
+        select 1 from alarms a where a.closed_at_utc is null and a.turnout_id = s.turnout_id
+            and a.section_id = s.section_id and a.band = s.band and a.source = s.source))
+    from chart_status s
+    where turnout_id = $1 and section_id = coalesce($2, section_id) and band = coalesce($3, band)"""
 GROUP = "Worklist and maintenance"
 HELP = "acknowledge an alarm, or suppress a chart until a date"
 
@@ -62,7 +70,9 @@ def run(args: argparse.Namespace) -> int:
     Raises
     ------
     ConfigErrors
-        A cell of the new row is wrong, or the row has no effect.
+        A cell of the new row is wrong.
+    ConfigError
+        The row refers to no open alarm.
     """
     from datetime import UTC, datetime
     from pathlib import Path
@@ -82,29 +92,39 @@ def run(args: argparse.Namespace) -> int:
     path = Path(args.configuration) / "acknowledgements.csv"
     if problems := list(row_problems(cells, configuration.ids, configuration.variants)):
         raise ConfigErrors([ConfigError(path, column, *content) for column, *content in problems])
+    row = acknowledgement_row(cells)
+    try:
+        remark = _effect(args.registry, row)
+    except RegistryError as error:
+        remark = f"Note: not compared with the open alarms. {error}"
+    if remark is None:
+        observation = f"no alarm of {args.id}, {args.band or 'all bands'}, is open that was raised by {at}"
+        remedy = "Write id, band and time of an open alarm, which `turnout worklist` lists. Nothing was written"
+        raise ConfigError(args.registry, "open alarms", observation, remedy)
     with added_row(path, cells, COLUMNS) as tables:
         after = load_configuration(args.configuration, tables=tables)
-        if acknowledgement_row(cells) not in after.acknowledgements:
+        if row not in after.acknowledgements:
             raise ConfigErrors(after.warnings)
     print(f"{path}: {action} {args.id} {args.band or 'all bands'}. It counts from the next run on.")
-    try:
-        no_alarm = action == "acknowledge" and _has_no_alarm(args.registry, acknowledgement_row(cells))
-    except RegistryError as error:  # the line is written: what follows is a remark about it
-        print(f"Note: not compared with the open alarms. {error}")
-        return 0
-    if no_alarm:
-        print(f"Note: no alarm is open there in {args.registry} that was raised by then: nothing on the list changes.")
+    if remark:
+        print(remark)
     return 0
 
 
-def _has_no_alarm(registry: str, row: Mapping[str, Any]) -> bool:
-    """Whether there is a registry without an open alarm that the row of ``acknowledgements`` refers to."""
+def _effect(registry: str, row: Mapping[str, Any]) -> str | None:
+    """What a row of ``acknowledgements`` does, "" without a registry; None if it refers to no open alarm."""
     from pathlib import Path
 
+    from turnout.counts import count_of
     from turnout.registry.database import DATABASE, open_registry
 
     if not (Path(registry) / DATABASE).exists():
-        return False
+        return ""
+    place = [row[name] for name in ("turnout_id", "section_id", "band")]
     with open_registry(registry) as con:
-        values = [row[name] for name in ("turnout_id", "section_id", "band", "at_utc")]
-        return not con.execute(OPEN_ALARMS_QUERY, values).fetchall()
+        if row["action"] == "acknowledge":
+            return "" if con.execute(OPEN_ALARMS_QUERY, [*place, row["at_utc"]]).fetchall() else None
+        ((n_charts, n_alarms),) = con.execute(SUPPRESSED_QUERY, place).fetchall()
+    days = (row["until_utc"] - row["at_utc"]).days
+    extent = f"{days / DAYS_PER_YEAR:.1f} years" if days > DAYS_PER_YEAR else count_of(days, "day")
+    return f"It hides {count_of(n_charts, 'chart')} for {extent}, {n_alarms} of them with an open alarm."

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {fault}")
     for path in _unread_files(configuration.folder):
         print(f"  {path}: no command reads a file of this name. Rename it, or move it out of the configuration")
-    for remark in (*_planned_events(configuration.events), *_position_remarks(configuration)):
+    for remark in (*_event_remarks(configuration.events), *_position_remarks(configuration)):
         print(f"  {remark}")
     if not configuration.ids:
         print("  no turnout yet: `turnout add ID LAYOUT` adds one")
@@ -133,15 +133,17 @@ def _open_decisions(folder: Path) -> Iterator[str]:
             yield f"{path}, {decision}: still marked with DECIDE. Write the value, and remove the mark"
 
 
-def _planned_events(events: Iterable[Event]) -> Iterator[str]:
-    """Each event of the next year, which may be a typing error; later ones are warnings already."""
+def _event_remarks(events: Iterable[Event]) -> Iterator[str]:
+    """Each event that may be a mistake: of the next year (later ones are warnings already), or with unusual resets."""
     from datetime import timedelta
 
-    from turnout.config.events import MAX_LEAD_TIME, now
+    from turnout.config.events import MAX_LEAD_TIME, now, reset_remark
 
     for e in events:
+        where = f"{e.turnout}/{e.section}" if e.section else e.turnout
+        if remark := reset_remark(e):
+            yield f"{e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv): {remark}"
         if timedelta(days=1) < e.at - now() <= MAX_LEAD_TIME:
-            where = f"{e.turnout}/{e.section}" if e.section else e.turnout
             yield f"planned, counts from its day: {e.kind} at {where}, {e.at:%Y-%m-%d} (events.csv)"
 
 

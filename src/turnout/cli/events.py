@@ -76,7 +76,7 @@ def _enter(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from turnout.config import load_configuration
-    from turnout.config.events import COLUMNS, date_problem, event_of, now, read_events, turnout_problems
+    from turnout.config.events import COLUMNS, date_problem, event_of, now, read_events, reset_remark, turnout_problems
     from turnout.config.table_edits import added_row, turnout_and_section
     from turnout.errors import ConfigError, ConfigErrors
 
@@ -90,11 +90,18 @@ def _enter(args: argparse.Namespace) -> int:
         entered = event_of(cells)
         if problem := date_problem(entered):
             raise ConfigError(path, "date", *problem)
+        if entered.at.year < (earliest := after.settings["trend"].earliest_year):
+            observation = (
+                f"date {entered.at:%Y-%m-%d} is before {earliest} (trend.earliest_year): no chart begins so early"
+            )
+            raise ConfigError(path, "date", observation, "Correct its year")
         if entered.work in (event.work for event in read_events(path, str(path), None, {})[0]):
             repetition = f"{args.kind} at {args.id}, {args.date}, is there already"
             raise ConfigError(path, "the work", repetition, "To change its row, edit the file")
     begin = "from its day" if entered.at > now() else "from the next run"
     print(f"{path}: {args.kind} at {args.id}, {args.date}. It counts {begin} on.")
+    if remark := reset_remark(entered):
+        print(f"Note: {remark}.")
     return 0
 
 

@@ -128,6 +128,32 @@ def date_problem(event: Event) -> tuple[str, str] | None:
     return f"date {event.at:%Y-%m-%d} is more than a year ahead", "Correct it, or enter it nearer to its day"
 
 
+def reset_remark(event: Event) -> str:
+    """A remark on work that resets none of the resonances that its kind changes, "" without one.
+
+    Parameters
+    ----------
+    event : Event
+        The event.
+
+    Returns
+    -------
+    str
+        A sentence without its end.
+
+    Examples
+    --------
+    >>> reset_remark(Event("t", None, datetime(2026, 4, 2), "tamping", ("railpad",)))
+    'tamping changes the ballast resonance, and this row resets railpad alone: correct resets if this is wrong'
+    """
+    usual = RESETS[event.kind]
+    if not usual or not event.resets or set(usual) & set(event.resets):
+        return ""
+    changed = f"the {' and '.join(usual)} resonance{'s' * (len(usual) > 1)}"
+    resets = f"this row resets {event.resets[0]} alone"
+    return f"{event.kind} changes {changed}, and {resets}: correct resets if this is wrong"
+
+
 def _repetition(line: int, first: Event, second: Event) -> tuple[str, str]:
     """Problem and remedy of a row about the same work as the row in ``line``."""
     if first.resets == second.resets:

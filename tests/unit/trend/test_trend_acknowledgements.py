@@ -73,8 +73,29 @@ def test_an_acknowledgement_without_a_matching_alarm_is_reported(configuration, 
         (turnout, "2026-03-03", ["--band", "railpad"], False),
         (turnout, "2026-01-03", [], False),
     ):
-        assert main(["acknowledge", place, "--at", at, *band, *options]) == 0
-        assert ("nothing on the list changes" in capsys.readouterr().out) is not changes
+        before = len(load_configuration(configuration).acknowledgements)
+        assert main(["acknowledge", place, "--at", at, *band, *options]) == (0 if changes else 2)
+        assert ("is open that was raised by" in capsys.readouterr().err) is not changes
+        assert len(load_configuration(configuration).acknowledgements) == before + changes
+
+
+def test_a_suppression_states_how_many_charts_it_hides_and_for_how_long(configuration, tmp_path, capsys):
+    """Two charts, of which one has an open alarm, and one of another section."""
+    turnout, label = place_of(configuration)
+    place = {"turnout_id": turnout, "section_id": f"{turnout}/{label}"}
+    charts = [CHART | place | {"band": "ballast"}, CHART | place | {"band": "railpad"}]
+    charts.append(CHART | {"turnout_id": turnout, "section_id": f"{turnout}/other", "band": "ballast"})
+    alarm = {"alarm_id": "a", "band": "ballast", "source": "passage", "direction": "down", **place}
+    alarm["raised_at_utc"] = pd.Timestamp("2026-02-01")
+    register([], tmp_path / "registry", read=iter)
+    tables = {"alarms": [alarm], "chart_status": charts}
+    publish(tmp_path / "registry", {name: arrow_rows(name, pd.DataFrame(rows)) for name, rows in tables.items()})
+    options = ["--by", "me", "--reason", "works", "--configuration", str(configuration), "--at", "2026-05-30"]
+    options += ["--registry", str(tmp_path / "registry")]
+    assert main(["acknowledge", place["section_id"], "--suppress-until", "2099-01-01", *options]) == 0
+    assert "It hides 2 charts for 72.6 years, 1 of them with an open alarm." in capsys.readouterr().out
+    assert main(["acknowledge", turnout, "--suppress-until", "2026-06-09", *options]) == 0
+    assert "It hides 3 charts for 10 days, 1 of them with an open alarm." in capsys.readouterr().out
 
 
 def test_a_suppression_may_begin_later_and_an_acknowledgement_may_not(configuration, capsys):
@@ -263,4 +284,19 @@ def test_a_command_enters_maintenance_and_rejects_an_unknown_kind(configuration,
     after = (configuration / "events.csv").read_text()
     assert after.startswith(before.rstrip("\n"))
     assert main(["events", turnout, "tampin", "2026-04-02", *base]) == 2
+    assert main(["events", turnout, "tamping", "1926-05-20", *base]) == 2
+    assert "date 1926-05-20 is before 1990 (trend.earliest_year)" in capsys.readouterr().err
     assert (configuration / "events.csv").read_text() == after
+
+
+def test_work_that_resets_what_its_kind_does_not_change_has_a_remark(configuration, tmp_path, capsys):
+    turnout, _ = place_of(configuration)
+    base = ["--configuration", str(configuration)]
+    assert main(["events", turnout, "tamping", "2026-04-02", "--resets", "railpad", *base]) == 0
+    remark = "tamping changes the ballast resonance, and this row resets railpad alone"
+    assert f"Note: {remark}" in capsys.readouterr().out
+    (tmp_path / "raw").mkdir()
+    main(["check", *base, "--raw", str(tmp_path / "raw")])
+    assert f"tamping at {turnout}, 2026-04-02 (events.csv): {remark}" in capsys.readouterr().out
+    assert main(["events", turnout, "tamping", "2026-05-02", "--resets", "ballast railpad", *base]) == 0
+    assert "Note" not in capsys.readouterr().out

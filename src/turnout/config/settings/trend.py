@@ -32,7 +32,7 @@ class TrendSettings:
         0.8, "", "share of the baseline with enough siblings, else the chart stands alone", minimum=0.0, maximum=1.0
     )
     target_percent: float = setting(
-        1.5, "%", "change in frequency to be seen: 3 % of stiffness, one degree of freedom", minimum=0.01
+        1.5, "%", "change in frequency to be seen: 3 % of stiffness, one degree of freedom", minimum=0.01, maximum=20.0
     )
     target_damping_percent: float = setting(
         20.0, "%", "change of a damping ratio to be seen; no limit is published, so this is an estimate", minimum=0.01
