@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import at_least_one
 from turnout.cli.options import add_csv, add_registry, add_result, check_output_files
+from turnout.counts import first_texts
 from turnout.registry.spreadsheet import without_formula
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 NAMES_SQL = """
     select turnout_id from turnouts union select section_id from sections union select distinct band from charts
     union select distinct kind from events"""
+MAX_SECTIONS = 4  # that a remark names
 GROUP = "Results"
 HELP = "query the registry in SQL"
 
@@ -127,10 +129,20 @@ def misspelt_names(connection: duckdb.DuckDBPyConnection, sql: str) -> list[str]
     list of str
         Sentences.
     """
+    from turnout.config.events import RESETS
+
     names = {str(name) for (name,) in connection.execute(NAMES_SQL).fetchall()}
-    unknown = [text for text in re.findall(r"'([^']+)'", sql) if text not in names]
-    similar = {text: get_close_matches(text, names, n=1) for text in unknown}
-    return [f"The registry has no {text!r}. Did you mean {close[0]!r}?" for text, close in similar.items() if close]
+    remarks = []
+    for text in (text for text in re.findall(r"'([^']+)'", sql) if text not in names):
+        of_label = sorted(name for name in names if name.endswith(f"/{text}"))
+        if text in RESETS:
+            remarks.append(f"The registry has no event of the kind {text!r}.")
+        elif of_label:
+            sections = first_texts([*map(repr, of_label)], MAX_SECTIONS)
+            remarks.append(f"The registry has no {text!r}. A section is written with its turnout: {sections}.")
+        elif close := get_close_matches(text, names | RESETS.keys(), n=1):
+            remarks.append(f"The registry has no {text!r}. Did you mean {close[0]!r}?")
+    return remarks
 
 
 def _text_of_query(word: str) -> str:

@@ -117,6 +117,12 @@ def test_a_csv_has_no_formula(registry, tmp_path):
 def test_a_misspelt_name_is_reported_if_a_query_returns_no_row(registry, capsys):
     assert query(registry, "from turnouts where turnout_id = 't11'") == 0
     assert capsys.readouterr().err == "The registry has no 't11'. Did you mean 't1'?\n"
+    for text, remark in (
+        ("tamping", "The registry has no event of the kind 'tamping'."),
+        ("tampin", "The registry has no 'tampin'. Did you mean 'tamping'?"),
+    ):
+        assert query(registry, f"from change_since_event('{text}', 90)") == 0
+        assert capsys.readouterr().err == f"{remark}\n"
     for sql in ("from turnouts where turnout_id = 't1' and name = ''", "select 'T1'"):
         assert query(registry, sql) == 0
         assert capsys.readouterr().err == "", sql

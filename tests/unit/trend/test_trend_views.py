@@ -104,6 +104,16 @@ def test_cusum_in_sql_equals_the_chart(con, frames):
     assert chart["cusum_down"].max() > 10
 
 
+def test_the_sums_since_a_date_are_those_of_the_whole_epoch(con, frames):
+    chart = plain(frames["charts"])
+    since = chart["measured_at_utc"].quantile(0.9)
+    found = plain(con.execute("select * from cusum(?)", [since.to_pydatetime()]).df())
+    expected = chart[chart["measured_at_utc"] >= since].reset_index(drop=True)
+    assert 0 < len(found) == len(expected) < len(chart)
+    assert np.abs(found["cusum_down"] - expected["cusum_down"]).max() < 1e-8
+    assert (found["cusum_down"] > found["threshold_down"]).any()
+
+
 def test_another_allowance_in_sql_equals_a_loop(con, frames):
     found = con.execute(f"select * from cusum(timestamp '2016-01-01', k := 0.5, h := 6.0) where section_id = '{SOUND}' "
                         "order by measured_at_utc").df()  # fmt: skip

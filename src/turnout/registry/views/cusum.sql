@@ -1,7 +1,8 @@
--- One row per chart and campaign since a date: the sums that the alarms rest on, recomputed from z.
+-- One row per chart and campaign since a date: the sums that the alarms rest on, recomputed from z from the start of
+-- the epoch on.
 -- S = P - min(0, min P), P the running sum of the steps within an epoch. A campaign with |z| beyond the smaller of
 -- outlier_limit and single_share * h + k is held: it counts only if the next one is beyond it on the same side.
--- k and h NULL: those of the chart. Other values ask "what if".
+-- k and h NULL: those of the chart. Other values ask "what if"; state stays that of the chart with its own.
 create or replace macro cusum(since, k := null, h := null) as table
 with steps as (
     select
@@ -14,7 +15,6 @@ with steps as (
         case when c.z is not null and c.state in ('ok', 'alarm_down', 'alarm_up') then 1 else 0 end as counts
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
-    where c.measured_at_utc >= since
 ),
 sides as (
     select
@@ -62,17 +62,20 @@ running as (
         partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
         rows between unbounded preceding and current row
     )
+),
+sums as (
+    select
+        turnout_id, section_id, band, source, measured_at_utc, epoch, z,
+        p_down - least(0, min(p_down) over history) as cusum_down,
+        p_up - least(0, min(p_up) over history) as cusum_up,
+        threshold_down, threshold_up, state
+    from running
+    window history as (
+        partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
+        rows between unbounded preceding and current row
+    )
 )
-select
-    turnout_id, section_id, band, source, measured_at_utc, epoch, z,
-    p_down - least(0, min(p_down) over history) as cusum_down,
-    p_up - least(0, min(p_up) over history) as cusum_up,
-    threshold_down, threshold_up, state
-from running
-window history as (
-    partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
-    rows between unbounded preceding and current row
-);
+select * from sums where measured_at_utc >= since;
 
 -- columns of cusum(since, k := null, h := null)
 -- turnout_id | varchar | | turnout
