@@ -6,6 +6,9 @@ import re
 import pytest
 from syntax_trees import tree_of
 
+from turnout.config.settings.identify import IdentifySettings
+from turnout.config.settings.trend import TrendSettings
+
 # Words of the last column of docs/glossary.md that may be used with another meaning.
 OTHER_MEANINGS = {
     "chain": "the Markov chain of a chart",
@@ -84,3 +87,32 @@ def test_replaced_words_are_not_used(repository):
 @pytest.mark.parametrize("text", ["A blow of 3 kN", "it Foretells more", "three blows"])
 def test_the_use_of_a_replaced_word_is_found(text):
     assert uses(["blow", "foretell"], [("page", text)])
+
+
+def test_the_glossary_and_the_readme_state_the_ranges_in_which_resonances_are_sought(repository):
+    settings = IdentifySettings()
+    ranges = {
+        "ballast": f"sought in {settings.ballast_low:g} to {settings.ballast_high:g} Hz",
+        "railpad": f"sought in {settings.railpad_low:g} to {settings.railpad_high:g} Hz",
+    }
+    glossary = (repository / "docs" / "glossary.md").read_text(encoding="utf-8")
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    for name, text in ranges.items():
+        (row,) = [line for line in glossary.splitlines() if line.startswith(f"| {name} resonance |")]
+        assert (
+            text in row and f"{name} (usually" in readme and text in readme.split(f"{name} (usually")[1].split(")")[0]
+        )
+
+
+def test_the_limit_of_a_clear_effect_is_that_of_its_share_of_the_response(repository):
+    glossary = (repository / "docs" / "glossary.md").read_text(encoding="utf-8")
+    assert "sqrt(46² + v²) - 46" in glossary
+    points, share = re.search(r"visibility is above (\d+) points, that is v above (\d+) %", glossary).groups()
+    assert round((46.0**2 + float(share) ** 2) ** 0.5 - 46.0) == int(points)
+    assert f"more than {share} % of the response" in (repository / "README.md").read_text(encoding="utf-8")
+
+
+def test_a_campaign_lasts_as_long_as_the_setting_says(repository):
+    hours = f"within {TrendSettings().campaign_gap_hours:g} hours of the first"
+    for page in ("glossary.md", "tutorial.md"):
+        assert hours in (repository / "docs" / page).read_text(encoding="utf-8")

@@ -1,10 +1,11 @@
 """Run the whole workflow unattended. Only one run is possible at a time. The last line states the result.
 
-  0 2 * * *   cd /srv/turnouts && mkdir -p logs && .venv/bin/turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
-  0 14 1 * *  cd /srv/turnouts && .venv/bin/turnout registry vacuum && .venv/bin/turnout registry compact
+  0 2 * * *   cd /srv/turnouts && mkdir -p logs && /opt/env/bin/turnout nightly --limit-hours 6 >> logs/nightly.log 2>&1
+  0 14 1 * *  cd /srv/turnouts && /opt/env/bin/turnout registry vacuum && /opt/env/bin/turnout registry compact
   turnout nightly --profile profiles/slurm
   turnout nightly -- --config accept_vanished=true
 
+The first two lines are for cron: the folder of the project, and what `command -v turnout` prints.
 The exit code is 0 only if every job ran and the results may be trusted. The registry is published in any case, with
 what was computed until a job failed or was ended. The last sixth of --limit-hours is reserved for publishing. The next
 run continues where this one ended. docs/operation.md lists the options after --config.

@@ -106,7 +106,8 @@ def _load_lines(
     lines[0] += f"{max(t['load'] for t in trains):.1f} t per axle"
     for channel, c in calibrations.items():
         lines.append(
-            f"  {channel:<6} load of one train ± {100 * c.scatter:.1f} % (sd), amplitude with speed to the power "
+            f"  {channel:<6} trains scatter by {100 * c.scatter:.1f} % (sd) beyond their own errors, "
+            f"amplitude with speed to the power "
             f"{c.exponent:.2f}, {KMH * c.slowest:.0f} to {KMH * c.fastest:.0f} km/h, n = {c.n}"
         )
     return lines

@@ -177,6 +177,8 @@ def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypa
     assert main(["trains", "--turnouts", "tommerup_s1", "--raw", str(raw)]) == 0
     output = capsys.readouterr().out
     assert "tommerup_s1: 6 trains of known weight, 10.0 to 19.0 t per axle" in output
-    assert re.search(r" load of one train ± [\d.]+ % \(sd\), amplitude with speed to the power", output)
+    assert re.search(
+        r" trains scatter by [\d.]+ % \(sd\) beyond their own errors, amplitude with speed to the power", output
+    )
     assert "clusters, version 1:" in output
     assert json.loads((tmp_path / "config" / "passages" / "loads.json").read_text())["tommerup_s1"]
