@@ -89,10 +89,10 @@ def improbable_temperatures(turnout: TurnoutConfig) -> Iterator[str]:
     str
         A sentence that names the day, both temperatures and what to do.
     """
-    noted = [(date.fromisoformat(day), c.rail_temperature) for day, c in turnout.campaigns.items()]
-    known = [(day, value) for day, value in noted if value is not None]
-    for day, value in known:
-        season = [t for other, t in known if other != day and (other.month - day.month) % 12 in (0, 1, 11)]
+    campaigns = [(date.fromisoformat(day), c.rail_temperature) for day, c in turnout.campaigns.items()]
+    temperatures = {day: value for day, value in campaigns if value is not None}
+    for day, value in temperatures.items():
+        season = [t for d, t in temperatures.items() if d != day and (d.month - day.month) % 12 in (0, 1, 11)]
         if len(season) < MIN_SEASON or abs(value - (usual := median(season))) <= MAX_DIFFERENCE_TO_SEASON:
             continue
         celsius = (value - 32.0) / 1.8
