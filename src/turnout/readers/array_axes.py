@@ -57,13 +57,13 @@ def with_records_first(array: np.ndarray, n_channel: int, facts: Metadata, where
             raise source.error(where, problem, AXES_REMEDY)
         return moved
     sample = max((2, 0, 1), key=lambda i: array.shape[i])
-    others = [i for i in range(3) if i != sample]
+    other_axes = [i for i in range(3) if i != sample]
     if sample == 1 and not n_channel:
-        sample, others = (0, [1, 2]) if array.shape[0] > array.shape[2] else (2, [0, 1])
-    fitting = [i for i in others if array.shape[i] == n_channel]
+        sample, other_axes = (0, [1, 2]) if array.shape[0] > array.shape[2] else (2, [0, 1])
+    fitting = [i for i in other_axes if array.shape[i] == n_channel]
     if n_channel and not fitting:
         raise source.error(where, f"{array.shape} samples do not match {n_channel} channels", AXES_REMEDY)
-    first, second = (array.shape[i] for i in others)
+    first, second = (array.shape[i] for i in other_axes)
     if first == second > 1:
         problem = f"it has the shape {array.shape}: nothing says which axis is that of the records and of the channels"
         raise source.error(where, problem, AXES_REMEDY)

@@ -186,7 +186,7 @@ def _day_numbers(dates: Sequence[str]) -> np.ndarray:
     if len(set(dates) - {""}) == 1:
         return np.zeros(len(dates))
     numbers = {date: tuple(map(int, re.split("[-/.]", date))) for date in dict.fromkeys(dates) if date}
-    best: dict[str, float] = dict.fromkeys(numbers, np.nan)
+    closest: dict[str, float] = dict.fromkeys(numbers, np.nan)
     least = np.inf
     for notation in NOTATIONS:
         try:
@@ -194,8 +194,8 @@ def _day_numbers(dates: Sequence[str]) -> np.ndarray:
         except ValueError:
             continue
         if (span := max(days.values()) - min(days.values())) < least:
-            best, least = days, span
-    return np.array([best[text] if text else np.nan for text in dates], dtype=float)
+            closest, least = days, span
+    return np.array([closest[text] if text else np.nan for text in dates], dtype=float)
 
 
 def with_dates(columns: Sequence[np.ndarray]) -> list[np.ndarray]:

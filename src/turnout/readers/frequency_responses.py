@@ -88,10 +88,10 @@ def _of_uff(source: Source, path: PathLike | str, root: PathLike | str) -> Frequ
     }
     if FREQUENCY_RESPONSE not in types or TIME_RESPONSE in types:
         return None
-    found = read_frf(path, root)
+    responses = read_frf(path, root)
     names = tuple(f"{name} ({response} / {reference})" for name, response, reference in
-                  zip(found.names, found.responses, found.references))  # fmt: skip
-    return FrequencyResponses(found.frequency, found.frf, names, found.units, "uff58")
+                  zip(responses.names, responses.responses, responses.references))  # fmt: skip
+    return FrequencyResponses(responses.frequency, responses.frf, names, responses.units, "uff58")
 
 
 def check_evaluable(responses: FrequencyResponses, path: PathLike | str) -> None:

@@ -184,17 +184,17 @@ def similar_name(name: str) -> str:
         or len(plain) > MAX_NAME_SIZE
     ):
         return ""
-    return next((KNOWN[known] for known in KNOWN if _is_damaged(plain, known)), "")
+    return next((KNOWN[known_name] for known_name in KNOWN if _is_damaged(plain, known_name)), "")
 
 
-def _is_damaged(name: str, known: str) -> bool:
+def _is_damaged(name: str, known_name: str) -> bool:
     """Whether a name is a known one with one character changed, missing or added, or two neighbours swapped.
 
     A changed word of one character ("sensor_a", "sensor_b") and a further letter or digit at the end of a word (as in
     a plural) make another name, not a damaged one.
     """
-    start = next((i for i, (a, b) in enumerate(zip(name, known)) if a != b), min(len(name), len(known)))
-    a, b = name[start:], known[start:]
+    start = next((i for i, (a, b) in enumerate(zip(name, known_name)) if a != b), min(len(name), len(known_name)))
+    a, b = name[start:], known_name[start:]
     if len(a) == len(b) + 1:  # added
         return a[1:] == b and not (a[0].isalnum() and a[1:2] in ("", *WORD_ENDS))
     if len(a) + 1 == len(b):
@@ -202,9 +202,9 @@ def _is_damaged(name: str, known: str) -> bool:
     if len(a) != len(b):
         return False
     is_swap = a[:2] == b[1::-1] and len(b) > 1 and a[2:] == b[2:]
-    is_word = (start == 0 or known[start - 1] in WORD_ENDS) and b[1:2] in ("", *WORD_ENDS)
+    is_word = (start == 0 or known_name[start - 1] in WORD_ENDS) and b[1:2] in ("", *WORD_ENDS)
     is_one_bit = (ord(a[0]) ^ ord(b[0])).bit_count() == 1 if a and b else True
-    return is_swap or (a[1:] == b[1:] and not is_word and (is_one_bit or len(known) > MAX_SHORT))
+    return is_swap or (a[1:] == b[1:] and not is_word and (is_one_bit or len(known_name) > MAX_SHORT))
 
 
 OTHER_LANGUAGES = frozenset(("operatør", "operator", "operatör", "operador", "operatore", "opérator", "operateur"))

@@ -154,8 +154,10 @@ def lack_of_temperature(turnout: TurnoutConfig, raw_root: Path, units: Sequence[
     descriptions = turnout.hammer.descriptions if turnout.hammer else {}
     tests = [unit for unit in units if unit.kind == "hammer" and unit.section in descriptions]
     days = {str(unit.campaign) for unit in tests}
-    noted = [day for day, campaign in turnout.campaigns.items() if campaign.rail_temperature is not None]
-    if not days or days.intersection(noted):
+    days_with_temperature = [
+        day for day, campaign in turnout.campaigns.items() if campaign.rail_temperature is not None
+    ]
+    if not days or days.intersection(days_with_temperature):
         return None
     newest = max(tests, key=lambda unit: (str(unit.campaign), unit.label))
     is_certain = False
@@ -167,8 +169,8 @@ def lack_of_temperature(turnout: TurnoutConfig, raw_root: Path, units: Sequence[
     except ReadError:
         pass  # the nightly run puts the file into quarantine
     problem = "no column rail_temperature_c with values"
-    if noted:
-        days_noted = first_texts(sorted(noted), MAX_NAMED_DAYS)
+    if days_with_temperature:
+        days_noted = first_texts(sorted(days_with_temperature), MAX_NAMED_DAYS)
         problem = f"it has a rail temperature of {days_noted} only, and no hammer file is of such a campaign"
     elif not (raw_root / turnout.raw / "campaigns.csv").is_file():
         problem = "there is no such file"
