@@ -24,19 +24,13 @@ REPEATED = {
         "trends.md",
         r"`aarup_n4/ASM` of the demonstration the row states -(\d+) % \(-(\d+) to -(\d+)\)",
         "demonstration.md",
-        r"aarup_n4/ASM ballast: .* lost (\d+) % of stiffness around the section \((\d+) to (\d+)\)",
+        r"aarup_n4/ASM ballast: .* the ballast lost (\d+) % of stiffness \((\d+) to (\d+), 95 %\)",
     ),
     "stiffness of a diagnosis": (
         "trends.md",
         r"the diagnosis -(\d+) % \(-(\d+) to -(\d+)\) at one hanging sleeper",
         "demonstration.md",
         r"aarup_n4 ASM: named. .* under impacts -(\d+) % \(-(\d+) to -(\d+), 95 %\)",
-    ),
-    "second chart of trains": (
-        "passages.md",
-        r"The chart of A8 raises one too, with \+([\d.]+) % \(([\d.]+) to ([\d.]+)\)",
-        "demonstration.md",
-        r"tommerup_s2/A8 amplitude: .* rose by ([\d.]+) % \(([\d.]+) to ([\d.]+), 95 %\)",
     ),
     "size in the list and in the chart": (
         "demonstration.md",

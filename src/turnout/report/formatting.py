@@ -278,6 +278,53 @@ def seconds(when: datetime) -> float:
     return (when - EPOCH).total_seconds()
 
 
+STIFFNESS_NOTE = (
+    "The stiffness behind a resonance holds if all supports around the section have changed alike. Where a diagnosis "
+    "names single sleepers, its value counts: that of these sleepers, with their neighbours unchanged."
+)
+
+
+def has_stiffness(worklist: Iterable[Mapping[str, Any]]) -> bool:
+    """Whether a row of the worklist states a stiffness, which needs ``STIFFNESS_NOTE``.
+
+    Parameters
+    ----------
+    worklist : iterable of mapping
+        Rows of the worklist.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> has_stiffness([{"changed_component": None}, {"changed_component": "ballast"}]), has_stiffness([])
+    (True, False)
+    """
+    return any(work.get("changed_component") in ("ballast", "pad", "both") for work in worklist)
+
+
+def result_and_evidence(diagnosis: str) -> tuple[str, str]:
+    """The first clause of a diagnosis, what was found, and the others, which state what it rests on.
+
+    Parameters
+    ----------
+    diagnosis : str
+        Text of ``worklist.diagnosis``.
+
+    Returns
+    -------
+    (str, str)
+
+    Examples
+    --------
+    >>> result_and_evidence("hanging sleeper at 36.0 m; 24 hammer tests; no train")
+    ('hanging sleeper at 36.0 m', '24 hammer tests; no train')
+    """
+    result, _, evidence = diagnosis.partition("; ")
+    return result, evidence
+
+
 def diagnoses_once(worklist: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     """The diagnosis of each row of the worklist, "as above for this turnout" where an earlier row has the same one.
 

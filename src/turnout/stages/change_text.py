@@ -38,7 +38,8 @@ def sentence_of(row: Mapping[str, Any], n_with_trains: int = 0) -> str:
             f"something has changed{position}{since and f', {since}'}, and no effect of a support explains it ({basis})"
         )
     names = " or ".join(_effect_words(n, row["change"]) for n in (row["term"], row["rival_term"]) if n)
-    words = f"{names}{position}: {_change_words(row)}{_parameter_words(row)}, {_since_words(row)}; {basis}"
+    size = f"{_change_words(row)}{_beside_words(row)}{_parameter_words(row)}"
+    words = f"{names}{position}: {size}, {_since_words(row)}; {basis}"
     if row.get("trains_visit") is None:
         return f"{words}; no train since then is recorded"
     return words + _train_words(row)
@@ -95,6 +96,14 @@ def _change_words(row: Mapping[str, Any]) -> str:
         return words
     so_far = "" if row.get("change_so_far") is None else f", {_size_words(row, 'change_so_far')} so far"
     return f"{words} a year{so_far}"
+
+
+def _beside_words(row: Mapping[str, Any]) -> str:
+    """What the size of a change of single supports takes for granted."""
+    if row["component"] is None or row.get("first_m") is None:
+        return ""
+    part = "pads" if row["component"] == "railpad" else "sleepers"
+    return f", with the {part} beside {'it' if row['first_m'] == row['last_m'] else 'them'} unchanged"
 
 
 def _size_words(row: Mapping[str, Any], name: str) -> str:

@@ -157,7 +157,8 @@ def test_a_diagnosis_of_two_alarms_is_shown_once():
         "sentence": "it fell",
     }
     rows = [row | {"diagnosis": "local pad; 4 tests"}, row, row | {"diagnosis": "local pad; 4 tests"}]
-    assert [line["diagnosis"] for line in lines_of(rows)] == ["local pad; 4 tests", "", "as above for this turnout"]
+    assert [line["diagnosis"] for line in lines_of(rows)] == ["local pad", "", "as above for this turnout"]
+    assert [line["evidence"] for line in lines_of(rows)] == ["4 tests", "", ""]
 
 
 def test_files_that_were_not_used_are_listed_as_in_quarantine(pages):

@@ -270,6 +270,7 @@ def test_the_sentence_states_the_possible_extent_of_a_change(changed, first, las
     )
     row = finding_of_change(named, None, 4, 8)
     assert words in row["sentence"]
+    assert f"with the sleepers beside {'it' if len(changed) == 1 else 'them'} unchanged" in row["sentence"]
     assert (row["first_low_m"], row["last_high_m"]) == (first[0], last[1])
 
 

@@ -32,7 +32,7 @@ select
     case
         when p.suppressed is not null and s.state in ('alarm', 'confirm_now', 'ok') then 'suppressed'
         when s.state = 'alarm' and p.acknowledged is null
-            and not is_below_target(s.band, s.change_low_pct, s.change_high_pct, s.target_pct)
+            and not is_below_target(s.change_low_pct, s.change_high_pct, s.target_pct)
             and not (s.is_coupled and count(*) filter (
                 s.band in ('ballast', 'railpad') and s.state in ('alarm', 'confirm_now') and p.suppressed is null
             ) over (partition by s.turnout_id, s.section_id, s.source) > 1)

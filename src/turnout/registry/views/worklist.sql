@@ -60,7 +60,7 @@ alarmed as (
         case when told then s.since_at_utc else r.began_at_utc end as since_at_utc,
         case when told then s.since_earliest_utc end as since_earliest_utc,
         case when told then s.since_latest_utc end as since_latest_utc,
-        is_below_target(r.band, low_pct, high_pct, c.target_pct) as is_small,
+        is_below_target(low_pct, high_pct, c.target_pct) as is_small,
         case when told then s.changed_component end as changed_component,
         s.ballast_stiffness_pct, s.ballast_stiffness_low_pct, s.ballast_stiffness_high_pct,
         s.pad_stiffness_pct, s.pad_stiffness_low_pct, s.pad_stiffness_high_pct,
@@ -209,6 +209,7 @@ diagnosed_sleepers as (
     -- where the newest diagnosis of a section names a change of ballast or pads, at most 3 m from it
     select
         c.turnout_id, c.label, c.found_at_utc, c.component, c.is_softer,
+        coalesce(c.verdict = 'named' and c.term = 'hanging_sleeper', false) as hangs,
         case when c.last_m - c.first_m < 0.05 then printf('the sleeper at %.1f m', c.first_m)
             else printf('the sleepers from %.1f to %.1f m', c.first_m, c.last_m) end as sleepers
     from changed c
@@ -303,6 +304,8 @@ select
         when h.changed_component = 'both' then
             ballast_advice(h.ballast_stiffness_pct, case w.component when 'ballast' then w.sleepers end) || '; '
             || pad_advice(h.pad_stiffness_pct, case w.component when 'railpad' then w.sleepers end)
+        when w.component = 'ballast' and w.hangs and w.is_softer and coalesce(h.changed_component, 'either') <> 'pad' then
+            void_advice(w.sleepers)
         when w.component = 'ballast' and coalesce(h.changed_component, 'either') <> 'pad' then
             ballast_advice(case when w.is_softer then -1 else 1 end, w.sleepers)
         when w.component = 'railpad' and coalesce(h.changed_component, 'either') <> 'ballast' then
@@ -315,7 +318,8 @@ select
         when h.band = 'railpad_damping' then 'aged or hardened pads, loose fastenings; the position of hammer and sensor'
         when h.band = 'amplitude' then
             peak_advice(h.direction,
-                c.verdict = 'none' and c.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc), p.position_m)
+                c.verdict = 'none' and c.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc),
+                p.panel, p.position_m)
         else 'the section'
     end as look_at,
     case

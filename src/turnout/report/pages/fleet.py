@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from turnout.reasons import REASONS
 from turnout.registry.as_of import chart_in_words
-from turnout.report.formatting import badge, day, diagnoses_once
+from turnout.report.formatting import (
+    STIFFNESS_NOTE,
+    badge,
+    day,
+    diagnoses_once,
+    has_stiffness,
+    result_and_evidence,
+)
 from turnout.report.panels.diagram import HATCH
 from turnout.report.panels.lines import line_diagrams
 from turnout.report.source import BASELINE
@@ -82,6 +89,8 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         cards=_cards(lines),
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w, diagnosis) for w, diagnosis in zip(worklist, diagnoses_once(worklist))],
+        has_stiffness=has_stiffness(worklist),
+        stiffness_note=STIFFNESS_NOTE,
         n_more=worklist[0]["n_in_all"] - len(worklist) if worklist else 0,
         n_charts=of_charts.total(),
         charts=[f"{of_charts[state]} {state}" for state in STATES if of_charts[state]],
@@ -117,7 +126,7 @@ def _work(row: Mapping[str, Any], diagnosis: str) -> dict[str, Any]:
         "state": row["state"],
         "badge": badge(row["state"]),
         "what": row["sentence"],
-        "diagnosis": diagnosis.partition("; ")[0],
+        "diagnosis": result_and_evidence(diagnosis)[0],
         "how_sure": row["false_alarm_words"],
         "maintenance": row["last_maintenance"] or "none known",
         "look_at": row["look_at"],
