@@ -20,7 +20,7 @@ NAMES = (
     "passage_values", "chart_values", "recursive_modes", "mode_residuals",
     "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "acknowledgement_counts", "in_service", "time_to_threshold",
-    "is_below_target", "stiffness_words", "damping_charts", "chart_states", "worklist",
+    "is_below_target", "stiffness_words", "half_band_pct", "damping_charts", "chart_states", "worklist",
 )  # fmt: skip
 
 

@@ -23,8 +23,9 @@ PAGE_CONTENT = {
     "results": "(select turnout_id, result_id from results_current)",
     "quarantine": "quarantine_open",
     "charts": """(
-        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct
-        from charts where source = 'hammer')""",
+        select turnout_id, section_id, band, measured_at_utc, expected_low_hz, expected_high_hz, state, deviation_pct,
+            case source when 'passage' then residual_pct end as train_residual_pct
+        from charts)""",
     "damping_charts": """(
         select turnout_id, section_id, band, measured_at_utc, expected_low_damping, expected_high_damping
         from damping_charts where source = 'hammer')""",

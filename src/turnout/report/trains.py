@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import TYPE_CHECKING
 
+from turnout.config.settings.trend import TrendSettings
 from turnout.constants import Z95
 from turnout.counts import count_of
 from turnout.registry.schema import literal
@@ -26,10 +27,15 @@ ROWS = {
     "weeks": """
         select
             v.turnout_id, v.section_id, v.measured_at_utc as week_utc, v.frequency_hz as peak_ms2,
-            v.frequency_se_hz as peak_se_ms2, c.state
+            v.frequency_se_hz as peak_se_ms2, c.state,
+            half_band_pct(c.residual_pct, c.z, b.phi, b.guard, b.sd_pct) as half_pct,
+            v.frequency_hz - b.acceleration_ms2 / 100 * (c.residual_pct + half_pct) as expected_low_ms2,
+            v.frequency_hz - b.acceleration_ms2 / 100 * (c.residual_pct - half_pct) as expected_high_ms2
         from passage_values v
         left join {charts} c on c.section_id = v.section_id and c.band = v.band and c.source = v.source
             and c.measured_at_utc = v.measured_at_utc
+        left join {baselines} b on b.section_id = c.section_id and b.band = c.band and b.source = c.source
+            and b.epoch = c.epoch
         where v.band = 'amplitude' and v.turnout_id in ({own}) order by v.section_id, week_utc""",
     "bars": "select * from fit_adjusted where turnout_id in ({own}) order by section_id, factor, class_from, class",
     "effects": "select * from fit_effects where turnout_id in ({own}) order by section_id, factor",
@@ -38,10 +44,14 @@ ROWS = {
         qualify row_number() over (partition by turnout_id order by passed_at_utc desc) <= 15
         order by passed_at_utc desc""",
 }
-# Stands for the table of charts before the first trend.
+# Stand for the tables of charts and baselines before the first trend.
 NO_CHARTS = """(
     select null::varchar as section_id, null as band, null as source, null::timestamp as measured_at_utc,
-        null::varchar as state
+        null::varchar as state, null::double as residual_pct, null::double as z, null::integer as epoch
+    where false)"""
+NO_BASELINES = """(
+    select null::varchar as section_id, null as band, null as source, null::integer as epoch, null::double as phi,
+        null::double as guard, null::double as sd_pct, null::double as acceleration_ms2
     where false)"""
 MEASURED_SOURCES = ("recording", "both")  # axle_load_source of a load from the sensors, not from trains.csv
 FACTORS = ("train type", "speed", "axle load")
@@ -68,10 +78,12 @@ def train_rows(
         Rows by table and turnout id: {table: {turnout_id: [row, ...]}}.
     """
     ids = ", ".join(literal(t) for t in turnout_ids)
+    names = ("charts", "baselines") if has_charts else (NO_CHARTS, NO_BASELINES)
+    trend_tables = dict(zip(("charts", "baselines"), names))
     rows_by_table: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for table, sql in ROWS.items():
         grouped = defaultdict(list)
-        for row in fetch(sql.format(own=ids, charts="charts" if has_charts else NO_CHARTS)) if ids else ():
+        for row in fetch(sql.format(own=ids, **trend_tables)) if ids else ():
             grouped[row["turnout_id"]].append(row)
         rows_by_table[table] = grouped
     return rows_by_table
@@ -107,6 +119,7 @@ def trains_part(
             weekly_peaks_panel(s["label"], [w for w in rows["weeks"] if w["section_id"] == s["section_id"]])
             for s in sections
         ),
+        "target": f"{TrendSettings().target_acceleration_percent:g}",
         "n_scores": sum(s["n"] for s in rows["scores"]),
         "n_beyond": sum(s["n"] for s in rows["scores"] if s["status"] in ("accepted", "not_an_impulse")),
         "charts": charts,

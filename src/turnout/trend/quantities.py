@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 RESONANCES = ("ballast", "railpad")
 DAMPING_SCALE = 100.0  # charts hold damping ratios in percent of critical damping
+ACCELERATION = "amplitude"  # band of the weekly peak acceleration under trains
 DAMPING_ENDING = "_damping"  # the band of the damping ratio of a resonance ends with it
 
 
@@ -74,5 +75,13 @@ def targets(bands: Sequence[str] | np.ndarray | pd.Series, settings: TrendSettin
     -------
     (n,) array of float
         Target. [%]
+
+    Examples
+    --------
+    >>> from turnout.config.settings.trend import TrendSettings
+    >>> targets(["railpad", "railpad_damping", "amplitude"], TrendSettings()).tolist()
+    [1.5, 20.0, 10.0]
     """
-    return np.where(is_damping(bands), settings.target_damping_percent, settings.target_percent)
+    is_acceleration = np.array([str(band) == ACCELERATION for band in bands], dtype=bool)
+    target = np.where(is_damping(bands), settings.target_damping_percent, settings.target_percent)
+    return np.where(is_acceleration, settings.target_acceleration_percent, target)

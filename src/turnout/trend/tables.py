@@ -16,7 +16,7 @@ from turnout.registry.arrow_types import arrow_schema
 from turnout.registry.schema import tables
 from turnout.trend.detectable_change import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.epochs import by_epoch
-from turnout.trend.quantities import DAMPING_SCALE, is_damping
+from turnout.trend.quantities import ACCELERATION, DAMPING_SCALE, is_damping
 from turnout.trend.residuals import first_epoch
 from turnout.trend.threshold import run_lengths
 from turnout.trend.times import timestamps
@@ -144,7 +144,7 @@ def reference_frequency(p: Prepared) -> np.ndarray:
     (n_chart,) array of float
         Frequency. [Hz]
     """
-    is_frequency = (p.charts["band"] != "amplitude") & ~is_damping(p.charts["band"])
+    is_frequency = (p.charts["band"] != ACCELERATION) & ~is_damping(p.charts["band"])
     return np.where(is_frequency, p.baseline.frequency, np.nan)
 
 
@@ -202,6 +202,7 @@ def baseline_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
         epoch_start_utc=timestamps(p.started[chart, epoch]),
         frequency_hz=reference_frequency(p)[chart],
         damping_ratio=np.where(is_damping(p.charts["band"]), p.baseline.frequency / DAMPING_SCALE, np.nan)[chart],
+        acceleration_ms2=np.where(p.charts["band"] == ACCELERATION, p.baseline.frequency, np.nan)[chart],
         rail_temperature_c=base.reference[chart],
         slope_pct_per_c=base.slope[chart],
         slope_se_pct_per_c=base.slope_se[chart],

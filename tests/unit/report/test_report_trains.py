@@ -123,13 +123,17 @@ def test_weekly_peaks_are_shown_before_the_collapsed_scores():
     """Four weeks, the last two in alarm: the chart shows their values; the scores are below a closed summary."""
     weeks = [
         {"section_id": "W1/OT", "week_utc": datetime(2026, 1, 5 + 7 * k), "peak_ms2": value, "peak_se_ms2": 2.0,
-         "state": state}
+         "state": state, "expected_low_ms2": 92.0, "expected_high_ms2": 108.0}
         for k, (value, state) in enumerate([(100.0, "ok"), (102.0, "ok"), (140.0, "alarm up"), (150.0, "alarm up")])
     ]  # fmt: skip
     svg = weekly_peaks_panel("OT", weeks)
     assert "OT: 150 ± 4 m/s² (95 %), in alarm; 4 weeks" in svg
     assert "week of 2026-01-19: 140.0 m/s² ± 3.9 (95 %)" in svg
-    assert weekly_peaks_panel("OT", []) == ""
+    assert weekly_peaks_panel("OT", []) == "" and 'class="expected"' in svg
+    low, high = (float(end) for end in re.search(r'data-y="([\d.]+) ([\d.]+)', svg).groups())
+    assert 80.0 < low < 92.0 and 153.9 < high < 162.0, "the axis follows weeks, intervals and the expected band"
+    without = [w | {"expected_low_ms2": None, "expected_high_ms2": None} for w in weeks]
+    assert 'class="expected"' not in weekly_peaks_panel("OT", without)
     part = {
         "weeks": svg, "words": "12 records", "n_scores": 12, "n_beyond": 2, "passages": [], "effects": [],
         "charts": {"fit": "<svg>bars</svg>", "forecast": ""}, "loads_known": True,

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from tests.oracles.trend_views import connect_views
 
-from turnout.trend import chart_rows, chart_status, evaluate
+from turnout.report.trains import ROWS as OF_TRAINS
+from turnout.trend import baseline_rows, chart_rows, chart_status, evaluate
 
 NEWEST = "2018-12-31"
 
@@ -86,6 +87,22 @@ def test_charts_of_trains_alarm_at_the_changed_sections_alone(weekly, settings):
     rows = chart_rows(charts)
     assert rows.query("band == 'amplitude'")["expected_hz"].isna().all()
     assert rows.query("band == 'ballast' and section_id != '*'")["expected_hz"].notna().all()
+
+
+def test_the_expected_band_of_a_page_holds_the_weeks_of_unchanged_sections(trains, weekly, settings):
+    """S1 is 15 % louder after a year and a half, three standard deviations of a week."""
+    charts = evaluate(weekly, None, settings)
+    frames = trains | {"charts": chart_rows(charts), "baselines": baseline_rows(charts, settings)}
+    sql = OF_TRAINS["weeks"].format(own="'T1'", charts="charts", baselines="baselines")
+    with connect_views(frames, NEWEST, rounded=False) as con:
+        weeks = con.execute(sql).df().set_index("section_id")
+    is_inside = weeks["peak_ms2"].between(weeks["expected_low_ms2"], weeks["expected_high_ms2"])
+    assert is_inside.loc[["T1/S0", "T1/S2", "T1/S3"]].mean() == pytest.approx(0.96, abs=0.03)
+    is_late = (weeks["week_utc"] > "2018-07-09").to_numpy()
+    assert (weeks["peak_ms2"] > weeks["expected_high_ms2"])[is_late].loc["T1/S1"].mean() > 0.6
+    middle = 0.5 * (weeks["expected_low_ms2"] + weeks["expected_high_ms2"])
+    mean = weeks["peak_ms2"][~is_late].groupby("section_id").mean()
+    assert (middle[~is_late].groupby("section_id").mean() / mean).to_numpy() == pytest.approx(1.0, abs=0.02)
 
 
 def passages(when, speed, peak):

@@ -37,6 +37,12 @@ class TrendSettings:
     target_damping_percent: float = setting(
         20.0, "%", "change of a damping ratio to be seen; no limit is published, so this is an estimate", minimum=0.01
     )
+    target_acceleration_percent: float = setting(
+        10.0,
+        "%",
+        "change of a peak acceleration to be seen: weekly values scatter by 3 to 8 %; no limit is published",
+        minimum=0.01,
+    )
     allowance_large: float = setting(
         1.0, "", "CUSUM allowance k where the target is at least allowance_switch standard deviations", minimum=0.1
     )

@@ -1,16 +1,13 @@
 -- One row per damping ratio and campaign: measured, expected at its temperature, and the 95 % band of one campaign.
--- band is the resonance. The band is that of the chart: 1.96 guarded standard deviations, from residual, z and memory.
+-- band is the resonance.
 -- A value belongs to the last campaign that began before it, the first value of a campaign is shown.
--- needs: chart_values
+-- needs: chart_values, half_band_pct
 create or replace view damping_charts as
 with banded as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.residual_pct, c.z, c.state,
         b.damping_ratio as baseline_damping,
-        -- z is rounded, so a small one does not give the standard deviation of its campaign
-        1.959964 * case
-            when abs(c.z) > 0.05 then abs(c.residual_pct / c.z) * sqrt((1 - b.phi) / (1 + b.phi)) else b.guard * b.sd_pct
-        end as half_pct
+        half_band_pct(c.residual_pct, c.z, b.phi, b.guard, b.sd_pct) as half_pct
     from charts c
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where ends_with(c.band, '_damping') and c.section_id <> '*'

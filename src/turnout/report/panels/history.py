@@ -47,6 +47,8 @@ DAMPING = Quantity(
     "damping_ratio", "damping_se", "expected_low_damping", "expected_high_damping", "damping_recursive",
     ("damping_low", "damping_high", "damping_steps"), " damping", decimals=4,
 )  # fmt: skip
+EXPECTED = "expected at this temperature"
+MEAN = "weighted mean, 180 days, not corrected for temperature"  # it follows the seasons and lags behind a change
 SERIES = {"point": "campaign", "confirm": "campaign to be confirmed", "alarm": "campaign in an open alarm"}
 
 
@@ -92,16 +94,16 @@ def history_panel(
     margin = 0.03 * (time.max() - time.min()) + 86400
     chart = Chart(
         Axis(time.min() - margin, time.max() + margin, "", "time"),
-        Axis(*_limits(low, high, lows, highs), f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
+        Axis(*history_limits(low, high, lows, highs), f"{band}{quantity.name} [{quantity.unit.strip() or '-'}]"),
         f"{band}{quantity.name}: {with_half_width(value[-1], intervals[-1].half_width, quantity.decimals)}"
         f"{quantity.unit} (95 %), n = {modes[-1]['n_impacts']}; " + count_of(len(modes), "campaign"),
     )
     if expected:
         when = [seconds(c["measured_at_utc"]) for c in expected]
-        chart.band(when, lows, highs, "expected", "expected at this temperature")
+        chart.band(when, lows, highs, "expected", EXPECTED)
     if recursive:
         means = [r[quantity.recursive] for r in recursive]
-        chart.line([seconds(r["measured_at_utc"]) for r in recursive], means, "curve", "weighted mean, 180 days")
+        chart.line([seconds(r["measured_at_utc"]) for r in recursive], means, "curve", MEAN)
     for row, event in enumerate(events):
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
@@ -118,15 +120,28 @@ def history_panel(
     return chart.svg()
 
 
-def _limits(low: np.ndarray, high: np.ndarray, lows: Sequence[float], highs: Sequence[float]) -> tuple[float, float]:
+def history_limits(
+    low: np.ndarray, high: np.ndarray, lows: Sequence[float], highs: Sequence[float]
+) -> tuple[float, float]:
     """Ends of the vertical axis: all campaigns with their intervals, and the usual range that was expected.
 
     The range that is expected of a campaign with a large error may be much wider. Beyond one span of the campaigns it
-    is cut off. No frequency and no damping ratio is below 0.
+    is cut off. No frequency, damping ratio or peak acceleration is below 0.
+
+    Parameters
+    ----------
+    low, high : (n,) array of float
+        Limits of the intervals of the campaigns.
+    lows, highs : (m,) sequence of float
+        Limits of the expected ranges, may be empty.
+
+    Returns
+    -------
+    (float, float)
 
     Examples
     --------
-    >>> ends = _limits(np.array([98.0]), np.array([102.0]), [95.0, 97.0, -200.0], [105.0, 103.0, 400.0])
+    >>> ends = history_limits(np.array([98.0]), np.array([102.0]), [95.0, 97.0, -200.0], [105.0, 103.0, 400.0])
     >>> [round(end, 2) for end in ends]
     [93.04, 106.96]
     """
