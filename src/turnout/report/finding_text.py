@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from turnout.constants import Z95_EXACT
 from turnout.counts import count_of
+from turnout.mismatch.calibrated.levels import IMPACTS
 from turnout.number_text import evidence_in_words
 from turnout.stages.mismatch_text import title
 from turnout.stages.parameter_text import (
@@ -114,13 +115,15 @@ def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
     evidence = json.loads(finding["evidence_json"] or "{}")
     pairs = [("Where", _where(finding)), (_frame_question(finding), _frame_words(finding, evidence))]
     if finding["band_low_hz"] is not None and finding["verdict"] not in ("none", "numerics"):
-        pairs.append(("Band", f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz"))
+        pairs.append(("Band", _band(finding, evidence)))
     if finding["wheel_within_m"] is not None and finding["verdict"] not in ("none", "numerics"):
         pairs.append(
             ("When", f"four fifths of it while a wheel is within {finding['wheel_within_m']:.1f} m of the sensor")
         )
     if words := _conditions(evidence):
-        pairs.append(("Most evidence in", words))
+        rests = finding["verdict"] in ("named", "a_or_b")
+        question = "The name rests on" if rests else "Most evidence in"
+        pairs.append((question, words + (_undecided(finding) if rests else "")))
     pairs.append(("From", _amount(finding)))
     pairs.append(("Prediction", _held_out_fit(finding)))
     pairs.append(("How sure", _certainty(finding, evidence)))
@@ -189,6 +192,26 @@ def _owner(finding: Mapping[str, Any]) -> str:
 def _conditions(evidence: Mapping[str, Any]) -> str:
     gains = sorted(((v or 0.0, k) for k, v in evidence.get("by_condition", {}).items()), reverse=True)
     return "; ".join(f"{k} ({evidence_in_words(v)})" for v, k in gains[:3] if v >= MIN_STATED_EVIDENCE)
+
+
+def _band(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
+    """Band of the evidence. That of impacts is far above the band in which trains are compared."""
+    gains = {name: value or 0.0 for name, value in evidence.get("by_condition", {}).items()}
+    is_of_impacts = bool(gains and finding["n_passages"]) and max(gains, key=gains.__getitem__).startswith(IMPACTS)
+    of_impacts = " under impacts; trains are compared in a lower band, see their spectra" if is_of_impacts else ""
+    return f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz{of_impacts}"
+
+
+def _undecided(finding: Mapping[str, Any]) -> str:
+    """Words where the recordings that were held out do not decide, "" where they do or where there are none."""
+    before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
+    if before is None or after is None or error is None or not finding["n_held_out"]:
+        return ""
+    half = Z95_EXACT * error
+    if abs(after - before) > half:
+        return ""
+    n = count_of(finding["n_held_out"], "held-out recording")
+    return f"; {n} alone would not decide ({after - before:+.1f} ± {half:.1f} points of fit)"
 
 
 def _amount(finding: Mapping[str, Any]) -> str:

@@ -368,3 +368,35 @@ def test_the_size_follows_in_parentheses_if_the_sentence_of_an_effect_does_not_c
         "The ballast about 24.6 m stiffens under load (share of stiffness added at 1 mm: 0.30, "
         "95 % interval 0.20 to 0.40)."
     )
+
+
+def colours(row):
+    """Style and both ends [px] of each stretch of the drawing."""
+    paths = re.findall(r'<path class="stretch (\S+)" d="M([\d.]+) [^"]*L([\d.]+) [\d.]+"', page(row))
+    return {style: (float(low), float(high)) for style, low, high in paths}
+
+
+def test_a_named_position_is_drawn_as_wide_as_its_interval_and_not_as_all_that_was_examined():
+    row = named(place_low_m=20.0, place_high_m=28.0, position_se_m=0.5)
+    drawing = TurnoutDrawing(SECTIONS)
+    ends = colours(row)
+    for style, low, high in (("found-named", 24.6 - 0.98, 24.6 + 0.98), ("found-examined", 18.7, 29.3)):
+        assert ends[style] == pytest.approx((drawing.px(low), drawing.px(high)), abs=0.1)
+    certain = colours(row | {"position_se_m": None})["found-named"]
+    assert certain == pytest.approx((drawing.px(24.3), drawing.px(24.9)), abs=0.1)
+    assert list(colours(finding("unknown", place_low_m=20.0))) == ["found-unknown"]
+
+
+@pytest.mark.parametrize(("error", "is_decided"), [(1.3, False), (1.0, True)])
+def test_the_page_states_what_a_name_rests_on_if_the_held_out_recordings_do_not_decide(error, is_decided):
+    """2.2 points with a standard error of 1.3 are +2.2 ± 2.5 (95 %)."""
+    impacts = {"impacts at 18.6 m 2026-07-25": 17.0, "ic3 120 km/h": 1.2}
+    row = named(fit_before_pct=92.8, fit_gain_se_pct=error, n_held_out=1) | {"fit_after_pct": 95.0}
+    row |= {"evidence_json": json.dumps(EVIDENCE | {"by_condition": impacts}), "band_high_hz": 718.0}
+    told = dict(facts(row))
+    assert told["The name rests on"].startswith("impacts at 18.6 m 2026-07-25 (17 nats")
+    words = "1 held-out recording alone would not decide (+2.2 ± 2.5 points of fit)"
+    assert (words in told["The name rests on"]) != is_decided
+    assert f": +2.2 ± {1.96 * error:.1f} points" in page(row)
+    assert told["Band"] == "21 to 718 Hz under impacts; trains are compared in a lower band, see their spectra"
+    assert dict(facts(named()))["Band"] == "21 to 88 Hz"

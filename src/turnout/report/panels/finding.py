@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import Z95_EXACT
 from turnout.report.axis import Axis
 from turnout.report.svg import Chart
 
@@ -184,11 +185,11 @@ def fit_panel(finding: Mapping[str, Any]) -> str:
 
 
 def _gain(finding: Mapping[str, Any]) -> str:
-    """Gain of the term with its standard error, in words; "" if unknown."""
+    """Gain of the term with half of its 95 % interval, in words; "" if unknown."""
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
     if before is None or after is None or error is None:
         return ""
-    return f": {after - before:+.1f} ± {error:.1f} points (standard error)"
+    return f": {after - before:+.1f} ± {Z95_EXACT * error:.1f} points"
 
 
 def history_of_parameter(rows: Sequence[Mapping[str, Any]]) -> str:

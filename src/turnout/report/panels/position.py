@@ -5,12 +5,15 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from turnout.constants import Z95
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
 WIDTH, HEIGHT = 920, 210  # px, of the plan
 MAIN, SPREAD = 92.0, 58.0  # px: the main track from above, and how far the diverging track goes off
+SLEEPER_SPACING = 0.6  # m, usual: the least width of a drawn position
 STYLES = {
     "named": "found-named",
     "a_or_b": "found-aorb",
@@ -75,18 +78,28 @@ class TurnoutDrawing:
     def stretch(self, finding: Mapping[str, Any]) -> None:
         """Draw the part of the track that a group covers, in the colour of its verdict.
 
+        Where the effect has a position, only its 95 % interval has this colour, and the rest is drawn as examined.
+
         Parameters
         ----------
         finding : mapping
             Row of ``mismatch_findings``.
         """
+        examined = finding["place_low_m"] - 1.3, finding["place_high_m"] + 1.3
+        position = finding["position_m"]
+        verdict = f"{finding['sections']}: {finding['verdict'].replace('_', ' ')}"
+        if position is None or finding["verdict"] == "none":
+            self._band(finding, *examined, STYLES[finding["verdict"]], verdict)
+            return
+        half = max(Z95 * (finding["position_se_m"] or 0.0), 0.5 * SLEEPER_SPACING)
+        self._band(finding, *examined, "found-examined", f"{finding['sections']}: examined")
+        self._band(finding, position - half, position + half, STYLES[finding["verdict"]], verdict)
+
+    def _band(self, finding: Mapping[str, Any], low: float, high: float, style: str, words: str) -> None:
         diverging = finding["route"] == "diverging"
-        low, high = finding["place_low_m"] - 1.3, finding["place_high_m"] + 1.3
         steps = [low + (high - low) * k / 12 for k in range(13)]
         path = "L".join(f"{self.px(m):.1f} {self.py(m, diverging):.1f}" for m in steps)
-        words = escape(f"{finding['sections']}: {finding['verdict'].replace('_', ' ')}")
-        style = STYLES[finding["verdict"]]
-        self.elements.append(f'<path class="stretch {style}" d="M{path}"><title>{words}</title></path>')
+        self.elements.append(f'<path class="stretch {style}" d="M{path}"><title>{escape(words)}</title></path>')
 
     def sensor(self, section: Mapping[str, Any], row: int, unnamed: bool = False) -> None:
         """Draw a measured section with its label; labels alternate between two rows.
