@@ -19,7 +19,7 @@ from pathlib import Path
 
 from PIL import Image
 
-WIDTH, HEAD, SECTION, FINDING = 1060, 668, 665, 2100  # px
+WIDTH, HEAD, SECTION, FINDING = 1060, 835, 665, 2100  # px
 
 
 def main(source: str, gallery: str, turnout: str = "", section: str = "") -> None:

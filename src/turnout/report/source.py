@@ -68,7 +68,8 @@ ROWS = {
         order by section_id, measured_at_utc desc, model_id""",
     "off_track": f"""
         select turnout_id, section_id, band, measured_at_utc, frequency_hz, frequency_track_hz, damping_ratio,
-            damping_track, residue_ratio, n_history, shape_mac, verdict, frequency_se_hz, damping_se
+            damping_track, residue_ratio, n_history, shape_mac, verdict, frequency_se_hz, damping_se,
+            frequency_distance, damping_distance
         from modes_off_track where {ID_GIVEN} and n_history >= {MIN_TRACK}
         order by section_id, measured_at_utc desc, band""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
@@ -137,13 +138,20 @@ REASONS = """
     ) group by reason order by sum(impacts) + sum(rows) desc, reason
 """
 # How much the stiffness (the square of a frequency) changes in ten years at the present drift, at least, in per cent.
+# A section with a step has no drift: a slope through the step would continue it.
 SCORES = """
-    select turnout_id, max(score) as score, max_by(section_id, score) as section_id, max_by(band, score) as band from (
+    select turnout_id, max(score) filter (not is_stepped) as score,
+        max_by(section_id, score) filter (not is_stepped) as section_id,
+        max_by(band, score) filter (not is_stepped) as band
+    from (
         select turnout_id, section_id, band,
+            bool_or(coalesce(change_kind = 'step', false)) over (partition by turnout_id, section_id) as is_stepped,
             100 * (1 - exp(-0.2 * greatest(abs(drift_pct_per_year) - 1.96 * drift_se_pct_per_year, 0))) as score
         from chart_states_on(:today)
         where band in ('ballast', 'railpad') and drift_pct_per_year is not null and drift_se_pct_per_year is not null
-    ) group by turnout_id
+    )
+    group by turnout_id
+    having not bool_or(is_stepped) or max(score) filter (not is_stepped) >= 0.5
 """
 TREND_VIEWS = {"charts", "damping_charts", "chart_states", "worklist"}
 

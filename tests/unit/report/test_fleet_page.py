@@ -3,10 +3,14 @@
 import math
 import re
 
+import duckdb
+import pytest
+
 from turnout.config.settings.trend import TrendSettings
 from turnout.report.pages.fleet import fleet_page
 from turnout.report.panels.lines import line_diagrams
 from turnout.report.site import page_environment, shared_by_pages
+from turnout.report.source import SCORES
 
 
 class Source:
@@ -110,10 +114,15 @@ def test_the_diagram_of_a_line_is_to_scale_and_has_a_link_for_each_turnout():
     assert re.findall(r"turnouts/(\w)\.html", second["svg"]) == ["a", "b", "c"]
 
 
-def test_the_more_urgent_of_two_close_turnouts_is_labelled():
-    fleet = [turnout("calm", 12.4) | {"worst": "cannot tell"}, turnout("urgent", 12.5) | {"worst": "inspect this week"}]
-    (drawing,) = line_diagrams([*fleet, turnout("far", 50.0) | {"worst": "ok"}])
-    assert re.findall(r'class="place"[^>]*>(\w+)<', drawing["svg"]) == ["urgent", "far"]
+def test_two_close_turnouts_are_labelled_in_two_rows_and_of_three_the_most_urgent():
+    calm, urgent = turnout("calm", 12.4) | {"worst": "cannot tell"}, turnout("urgent", 12.5) | {"worst": "plan"}
+    far = turnout("far", 50.0) | {"worst": "ok"}
+    labels = re.compile(r'class="place" x="[\d.]+" y="(\d+)"[^>]*>(\w+)<')
+    (drawing,) = line_diagrams([calm, urgent, far])
+    assert labels.findall(drawing["svg"]) == [("11", "urgent"), ("24", "calm"), ("11", "far")]
+    assert min(float(y) for y in re.findall(r'cy="([\d.]+)"', drawing["svg"])) - 7.0 > 24.0  # no circle on a label
+    (crowded,) = line_diagrams([calm, urgent, far, calm | {"turnout_id": "third", "worst": "inspect this week"}])
+    assert {name for _, name in labels.findall(crowded["svg"])} == {"third", "urgent", "far"}
 
 
 def test_turnouts_of_one_station_do_not_overlap_in_the_diagram():
@@ -131,3 +140,18 @@ def test_the_page_states_that_everything_was_used_in_place_of_an_empty_table():
     source.rows["reasons"] = [{"reason": "overload", "impacts": 2, "rows": 0}]
     text = fleet_page(source, page_environment().get_template("fleet.html"), shared_by_pages(1))
     assert sentence not in text and "<td>overload</td>" in text
+
+
+def test_a_section_with_a_step_has_no_long_term_score():
+    """14.6 %/a through a step is no drift. A drift of 2.94 ± 0.48 %/a: 100 (1 - exp(-0.2 (2.94 - 1.96 0.48)))."""
+    with duckdb.connect() as con:
+        con.execute("""
+            create table states as select * from (values
+                ('a', 'a/ASM', 'ballast', 'step', -14.6, 2.6), ('a', 'a/ASM', 'railpad', null, -0.9, 0.1),
+                ('a', 'a/OT', 'ballast', null, 0.1, 0.1), ('b', 'b/A8', 'ballast', 'drift', -2.94, 0.48),
+                ('b', 'b/A9', 'ballast', 'step', -9.0, 0.1), ('c', 'c/A8', 'ballast', null, 0.1, 0.1)
+            ) s(turnout_id, section_id, band, change_kind, drift_pct_per_year, drift_se_pct_per_year)""")
+        con.execute("create macro chart_states_on(day) as table from states")
+        rows = con.execute(SCORES.replace(":today", "null") + " order by turnout_id").fetchall()
+    assert [row[0] for row in rows] == ["b", "c"] and rows[0][2:] == ("b/A8", "ballast")
+    assert rows[0][1] == pytest.approx(100.0 * (1.0 - math.exp(-0.2 * (2.94 - 1.96 * 0.48)))) and rows[1][1] == 0.0

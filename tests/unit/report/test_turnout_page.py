@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from turnout.report import panels
+from turnout.report.departures import departure_rows, departure_sentences
 from turnout.report.pages.turnout import turnout_page
 from turnout.report.site import page_environment, replace_page, shared_by_pages
 from turnout.report.source import ROWS
@@ -46,32 +47,50 @@ def test_the_curves_of_the_latest_test_are_shown():
     assert "Latest hammer test, 2026-05-01: receptance" in text and "n = 30 impacts" in text
 
 
-@pytest.mark.parametrize(("mac", "words"), [
-    (None, ""), (0.034, "; shape at both responses: modal assurance criterion 0.03 with theirs"),
-])  # fmt: skip
-def test_a_mode_off_its_history_is_shown_with_its_shape_if_there_is_a_second_response(mac, words):
-    mode = {
+def departure(**more):
+    """Row of ``modes_off_track``: a mode that differs from the nine campaigns before."""
+    row = {
         "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 162.0,
-        "damping_ratio": 0.05, "frequency_track_hz": 150.0, "damping_track": 0.067, "residue_ratio": None,
-        "n_history": 9, "shape_mac": mac, "verdict": "departs", "frequency_se_hz": None, "damping_se": None,
+        "damping_ratio": 0.05, "frequency_track_hz": 178.0, "damping_track": 0.067, "residue_ratio": 0.84,
+        "n_history": 9, "shape_mac": None, "verdict": "departs", "frequency_se_hz": 1.0, "damping_se": 0.004,
+        "frequency_distance": 6.0, "damping_distance": 4.0,
     }  # fmt: skip
-    text = page(models=[REJECTED], off_track=[mode])
-    assert f"(median of 9 campaigns before: 150.0 Hz, 0.067{words})." in text
+    return row | more
+
+
+@pytest.mark.parametrize(("mac", "words"), [(None, "–"), (0.034, "0.03")])
+def test_a_mode_off_its_history_is_in_a_table_with_its_shape_if_there_is_a_second_response(mac, words):
+    text = page(models=[REJECTED], off_track=[departure(shape_mac=mac)])
+    cells = re.findall(r'<td class="n">([^<]*)</td>', text[text.index("squared residue") :])
+    assert cells[:7] == ["162.0 ± 2.0", "178.0", "0.050 ± 0.008", "0.067", "9", "0.84", words]
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "departing", "expected"),
+    [
+        ((178, 172, 166, 162), (1, 2), "From 2026-02-01 on the ballast mode differs from that before: 162.0 to 172.0"),
+        ((178, 172, 166, 177), (1, 2), "From 2026-02-01 to 2026-03-01 the ballast mode differs"),
+        ((178, 172, 178, 178), (1,), "On 2026-02-01 the ballast mode differs from that before: 172.0 Hz against 178.0"),
+        ((178, 178, 178, 162), (3,), "From 2026-04-01 on the ballast mode differs from that before: 162.0 Hz"),
+    ],
+    ids=["lasting", "over", "one campaign", "the newest"],
+)  # fmt: skip
+def test_one_sentence_states_from_when_to_when_a_mode_differs(frequencies, departing, expected):
+    """The newest campaign belongs to a lasting change, although it is compared with a history that contains it."""
+    modes = [
+        departure(measured_at_utc=datetime(2026, 1 + k, 1), frequency_hz=float(f)) for k, f in enumerate(frequencies)
+    ]
+    (sentence,) = departure_sentences([modes[k] for k in departing][::-1], modes)
+    assert sentence.startswith(expected) and "median of 9 before" in sentence
+    assert departure_rows([modes[k] for k in departing][::-1])[0]["when"] == f"2026-0{1 + departing[0]}-01"
 
 
 def test_a_mode_with_a_large_error_is_reported_as_uncertain():
-    mode = {
-        "section_id": "t/A7", "band": "ballast", "measured_at_utc": datetime(2026, 5, 1, 9), "frequency_hz": 307.37,
-        "damping_ratio": 0.417, "frequency_track_hz": 102.2, "damping_track": 0.209, "residue_ratio": None,
-        "n_history": 9, "shape_mac": None, "verdict": "uncertain", "frequency_se_hz": 77.8, "damping_se": 0.338,
-    }  # fmt: skip
+    mode = departure(verdict="uncertain", frequency_hz=307.37, frequency_se_hz=77.8, damping_se=0.338)
     text = page(models=[REJECTED], off_track=[mode])
-    assert (
-        "too uncertain to show whether it continues those before: 2026-05-01 ballast 307 Hz (standard error 78 Hz), "
-        in text
-    )
-    assert "damping 0.4 (standard error 0.3) (median of 9" in text
-    assert "another mode, or the track has changed" not in text
+    assert "Too uncertain to show whether the ballast mode continues that before: 2026-05-01." in text
+    assert "<td>too uncertain to compare</td>" in text and ">307 ± 152<" in text
+    assert "the track has changed" not in text
 
 
 def test_a_new_panel_needs_a_function_and_one_line(monkeypatch):
@@ -189,6 +208,9 @@ def test_records_of_one_file_that_fail_in_the_same_way_share_one_row_of_the_quar
     text = page(quarantine=[*(row | {"record": k, "place": f"record {k + 1} of 10"} for k in (9, 1, 2, 0, 5)), cut])
     assert text.count("<td>t/ASM_1.h5</td>") == 2
     assert "<td>5 records: 1 to 3, 6, 10</td><td>5 samples are not finite</td>" in text
+    whole = [row | {"record": None, "place": f"record {k + 1} of 3, channel &"} for k in (2, 0, 1)]
+    assert "<td>all 3 records, channel &amp;</td>" in page(quarantine=whole)
+    assert "<td>2 records: 1, 3, channel &amp;</td>" in page(quarantine=whole[:2])
     assert "<td>byte 81920</td>" in text and "more of" not in text
 
 
@@ -220,3 +242,29 @@ def test_two_channels_of_one_record_have_a_row_each():
     dead = [row | {"channels": [c], "place": f"channel '{c}'", "found": f"{c} is constant"} for c in ("A7", "A8")]
     text = page(quarantine=dead)
     assert "<td>A7 is constant</td>" in text and "<td>A8 is constant</td>" in text and "records:" not in text
+
+
+def test_the_diagram_shows_hammer_tests_and_trains_each_by_itself():
+    """A chart of trains that cannot tell leaves the green circle of the hammer tests."""
+    charts = [
+        {"section_id": "t/A7", "source": source, "state": state, "band": band}
+        for source, state, band in (("hammer", "ok", "ballast"), ("passage", "cannot tell", "amplitude"))
+    ]
+    text = page(chart_states=charts)
+    assert re.search(r'<circle class="state-ok"[^>]*><title>A7, CP panel: hammer tests ok<', text)
+    assert re.search(r'<rect class="state-unknown"[^>]*><title>A7: trains cannot tell<', text)
+    assert "squares: accelerations under trains" in text
+    alone = page(chart_states=charts[:1])
+    assert '<rect class="state' not in alone and "squares:" not in alone
+
+
+def test_the_page_states_what_was_found_first_and_what_it_rests_on_in_a_detail():
+    row = {
+        "turnout_id": "t", "section_id": "t/A7", "sections": "A7", "band": "ballast", "state": "inspect this week",
+        "change_pct": -9.0, "sentence": "ballast resonance of A7 fell", "look_at": "the void",
+        "changed_component": None, "diagnosis": "hanging sleeper at 36.0 m; 24 hammer tests; 2 trains fit by 12.4 %",
+    }  # fmt: skip
+    text = page(worklist=[row])
+    assert "Diagnosis: hanging sleeper at 36.0 m<br>" in text
+    assert "</summary>24 hammer tests; 2 trains fit by 12.4 %</details>" in text
+    assert "its value counts" not in text and "its value counts" in page(worklist=[row | {"changed_component": "pad"}])

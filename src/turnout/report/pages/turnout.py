@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.counts import count_of, first_texts
-from turnout.records.modal import value_with_error
 from turnout.report import panels
-from turnout.report.formatting import badge, day, diagnoses_once, number_ranges, with_half_width
+from turnout.report.departures import departure_rows, departure_sentences
+from turnout.report.formatting import (
+    STIFFNESS_NOTE,
+    badge,
+    day,
+    diagnoses_once,
+    has_stiffness,
+    number_ranges,
+    result_and_evidence,
+    with_half_width,
+)
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
 from turnout.report.panels.diagram import diagram
 from turnout.report.panels.hammer import HammerTest
@@ -22,7 +32,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 BANDS = ("ballast", "railpad")
-MAX_UNUSED_SHOWN = 5  # earlier unused tests, and modes off their track, that are listed per section
+MAX_UNUSED_SHOWN = 5  # earlier unused tests that are listed per section
+RECORD_PLACE = re.compile(r"record (\d+)(?: of (\d+))?((?:, .*)?)")  # place of a row of the quarantine
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
     "OT": "open track",
@@ -64,8 +75,11 @@ def turnout_page(
         turnout=turnout,
         place=_position_words(turnout),
         latest=day(max((m["measured_at_utc"] for m in models.values()), default=None)),
-        diagram=diagram(rows["sections"], states) if rows["sections"] else "",
+        diagram=_diagram(rows) if rows["sections"] else "",
+        has_train_charts=any(c["source"] == "passage" for c in rows["chart_states"]),
         findings=lines_of(rows["worklist"]),
+        has_stiffness=has_stiffness(rows["worklist"]),
+        stiffness_note=STIFFNESS_NOTE,
         mismatches=mismatches_with_limits(rows["mismatches"], rows.get("limits", ())),
         summary=[
             _summary(s, models.get(s["section_id"]), _rows_of(rows, "modes", s), s["section_id"] in unread)
@@ -129,8 +143,8 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     Returns
     -------
     list of dict
-        ``state``, ``badge``, ``words``, ``diagnosis`` ("" without one), ``look_at`` (what to look at) and ``anchor``,
-        the label of the section that it concerns.
+        ``state``, ``badge``, ``words``, ``diagnosis`` ("" without one), ``evidence`` (what it rests on), ``look_at``
+        (what to look at) and ``anchor``, the label of the section that it concerns.
     """
     return [
         {
@@ -142,7 +156,8 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
                 else f"{work['sections']}, {work['band'].replace('amplitude', 'acceleration')}: "
             )
             + work["sentence"],
-            "diagnosis": diagnosis,
+            "diagnosis": result_and_evidence(diagnosis)[0],
+            "evidence": result_and_evidence(diagnosis)[1],
             "look_at": work.get("look_at") or "",
             "anchor": (work.get("section_id") or "").split("/")[-1].replace("*", ""),
         }
@@ -206,6 +221,7 @@ def _section(
         for band in BANDS
     )
     unused = _unused_tests(_rows_of(rows, "unused", section))
+    off_track = _rows_of(rows, "off_track", section)
     return {
         "label": section["label"],
         "measured": bool(model or history or unused),
@@ -218,27 +234,44 @@ def _section(
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": model["detail"] if model else "",
         "unused": unused,
-        "off_track": _off_track(_rows_of(rows, "off_track", section), "departs"),
-        "uncertain_modes": _off_track(_rows_of(rows, "off_track", section), "uncertain"),
+        "departures": departure_sentences(off_track, modes),
+        "departure_rows": departure_rows(off_track),
     }
 
 
 def _by_file(quarantine: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """One row for each file, reason and channels, with its records together; the details are those of its first one."""
     groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
-    for row in sorted(quarantine, key=lambda q: (q["path"], -1 if q["record"] is None else q["record"])):
+    for row in sorted(quarantine, key=lambda q: (q["path"], _place_of(q)[0] or 0)):
         groups.setdefault((row["path"], row["reason_code"], str(row.get("channels"))), []).append(row)
     return [dict(same[0]) | _records(same) for same in groups.values()]
 
 
 def _records(same: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Words for where and what in rows of one file and reason, if they are of several records."""
-    numbers = sorted({q["record"] + 1 for q in same if q["record"] is not None})
+    places = [_place_of(q) for q in same]
+    numbers = sorted({number for number, _, _ in places if number is not None})
     if len(numbers) < 2:
         return {}
+    totals, further = ({place[k] for place in places} for k in (1, 2))
+    is_all = totals == {len(numbers)}
+    place = f"all {len(numbers)} records" if is_all else f"{count_of(len(numbers), 'record')}: {number_ranges(numbers)}"
     alike = len({q["found"] for q in same}) == 1
     what = same[0]["found"] if alike else f"{same[0]['found']} (first of {len(numbers)})"
-    return {"place": f"{count_of(len(numbers), 'record')}: {number_ranges(numbers)}", "found": what}
+    return {"place": place + (further.pop() if len(further) == 1 else ""), "found": what}
+
+
+def _place_of(row: Mapping[str, Any]) -> tuple[int | None, int | None, str]:
+    """Number of the record from 1 and of all records of the file, and what else its place states.
+
+    >>> _place_of({"record": None, "place": "record 4 of 10, channel 'rail'"}), _place_of({"record": 3, "place": None})
+    ((4, 10, ", channel 'rail'"), (4, None, ''))
+    """
+    stated = RECORD_PLACE.fullmatch(row.get("place") or "")
+    number, total, further = stated.groups() if stated else (None, None, "")
+    if row["record"] is not None:
+        number = row["record"] + 1
+    return (None if number is None else int(number)), (None if total is None else int(total)), further
 
 
 def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
@@ -258,35 +291,6 @@ def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     return first_texts(entries, MAX_UNUSED_SHOWN, others="before")
 
 
-def _off_track(modes: Sequence[Mapping[str, Any]], verdict: str) -> str:
-    """Modes with a ``verdict`` of ``modes_off_track``, the newest first, with standard errors where they are known."""
-    entries = [
-        f"{day(m['measured_at_utc'])} {m['band']} {_with_error(m['frequency_hz'], m['frequency_se_hz'], 1, ' Hz')}, "
-        f"damping {_with_error(m['damping_ratio'], m['damping_se'], 3)} "
-        f"(median of {count_of(m['n_history'], 'campaign')} before: {m['frequency_track_hz']:.1f} Hz, "
-        f"{m['damping_track']:.3f}{_residue_words(m['residue_ratio'])}{_shape_words(m['shape_mac'])})"
-        for m in modes
-        if m["verdict"] == verdict
-    ]
-    return first_texts(entries, MAX_UNUSED_SHOWN, "; ", "before")
-
-
-def _with_error(value: float, error: float | None, decimals: int, unit: str = "") -> str:
-    """A value with its standard error, both to the last digit that the error leaves; without one to ``decimals``."""
-    if error is None:
-        return f"{value:.{decimals}f}{unit}"
-    number, _, error_text = value_with_error(value, error).partition(" ± ")
-    return f"{number}{unit} (standard error {error_text}{unit})" if error_text else f"{number}{unit}"
-
-
-def _residue_words(ratio: float | None) -> str:
-    return "" if ratio is None else f"; squared residue {ratio:.2g} times theirs"
-
-
-def _shape_words(mac: float | None) -> str:
-    return "" if mac is None else f"; shape at both responses: modal assurance criterion {mac:.2f} with theirs"
-
-
 def _reason(test: Mapping[str, Any]) -> str:
     words = (test["reason"] or "no reason").replace("_", " ")
     return f"{words}: {test['detail']}" if test["detail"] else words
@@ -302,6 +306,14 @@ def _panels(
     current = [m for m in modes if m["model_id"] == model["model_id"]]
     test = HammerTest(receptance, model, current, _rows_of(rows, "impacts", section))
     return "".join(panel(test) for panel in panels.HAMMER_PANELS)
+
+
+def _diagram(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """The turnout with the states of the charts of hammer tests and of trains, each by itself."""
+    by_source = [
+        _worst_states([c for c in rows["chart_states"] if c["source"] == source]) for source in ("hammer", "passage")
+    ]
+    return diagram(rows["sections"], *by_source)
 
 
 def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -26,7 +26,11 @@ STYLE = {
 
 
 def diagram(
-    sections: Sequence[Mapping[str, Any]], states: Mapping[str, str], width: int = 920, height: int = 200
+    sections: Sequence[Mapping[str, Any]],
+    states: Mapping[str, str],
+    train_states: Mapping[str, str] | None = None,
+    width: int = 920,
+    height: int = 200,
 ) -> str:
     """SVG of the turnout with its measured sections.
 
@@ -35,7 +39,9 @@ def diagram(
     sections : sequence of mapping
         Rows of ``sections`` of the turnout.
     states : mapping
-        State of the worklist by section id.
+        Most urgent state of the charts of hammer tests by section id: the colour of its circle.
+    train_states : mapping, optional
+        The same of the charts of trains: the colour of a square beside it. A section without such a chart has none.
     width : int
         Width. [px]
     height : int
@@ -67,7 +73,7 @@ def diagram(
         f'<path class="rail" d="M{px(toe):.1f} {main} {curve}"/>'
     ]
     for section, lift in zip(sections, _lifts(sections, px)):
-        elements.append(_section_marker(section, states, px, py, lift))
+        elements.append(_section_marker(section, states, train_states or {}, px, py, lift))
     elements.append(
         f'<text class="label" x="24" y="{height - 8}">facing direction →, metres from the switch toe</text>'
     )
@@ -77,6 +83,7 @@ def diagram(
 def _section_marker(
     section: Mapping[str, Any],
     states: Mapping[str, str],
+    train_states: Mapping[str, str],
     px: Callable[[float], float],
     py: Callable[[float, bool], float],
     lift: int,
@@ -91,10 +98,22 @@ def _section_marker(
         f'<a href="#{escape(section["label"])}">{leader}'
         f'<circle class="{STYLE.get(state, "state-unknown")}" cx="{x:.1f}" '
         f'cy="{y:.1f}" r="11"><title>{escape(section["label"])}, {escape(section["panel"] or "?")} panel: '
-        f"{escape(state)}</title></circle>"
+        f"{'hammer tests ' * bool(train_states)}{escape(state)}</title></circle>"
+        f"{_train_mark(section, train_states, x, y + (-26 if diverging else 15))}"
         f'<text class="place" x="{x:.1f}" y="{y + side:.1f}" text-anchor="middle">{escape(section["label"])}</text>'
         f'<text class="tick" x="{x:.1f}" y="{y + side + 11:.1f}" text-anchor="middle">'
         f"{_metres(section)}</text></a>"
+    )
+
+
+def _train_mark(section: Mapping[str, Any], states: Mapping[str, str], x: float, top: float) -> str:
+    """Square of the charts of trains, "" without one."""
+    state = states.get(section["section_id"])
+    if state is None:
+        return ""
+    return (
+        f'<rect class="{STYLE.get(state, "state-unknown")}" x="{x - 5.5:.1f}" y="{top:.1f}" width="11" height="11">'
+        f"<title>{escape(section['label'])}: trains {escape(state)}</title></rect>"
     )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 WIDTH, LEFT, RIGHT = 960, 20, 40  # px
 LANE = 22  # px between rows in which turnouts close to each other are drawn
 RADIUS = 7  # px
+LABEL_ROWS, LABEL_LINE = 2, 13  # rows of ids above a line, and px between them
 URGENT = ("confirm now", "inspect this week", "plan")
 
 
@@ -59,14 +60,15 @@ def _drawing(line: str, turnouts: Sequence[Mapping[str, Any]]) -> str:
         return LEFT + (WIDTH - LEFT - RIGHT) * (km - low) / (high - low)
 
     lanes = _lanes([px(t["km"]) for t in ordered])
-    rail = LANE * max(lanes) + 30
+    names = list(_names(ordered, px))
+    rail = LANE * max(lanes) + 30 + LABEL_LINE * max(row for _, row in names)
     elements = [
         f'<svg class="diagram" viewBox="0 0 {WIDTH} {rail + 34}" width="{WIDTH}" height="{rail + 34}" role="group" '
         f'aria-label="Turnouts of {escape(line, quote=True)} by kilometre">'
         f'<path class="rail" d="M{LEFT} {rail}H{WIDTH - RIGHT}"/>'
     ]
     elements += _kilometres(low, high, px, rail)
-    elements += _names(ordered, px)
+    elements += [text for text, _ in names]
     elements += [_circle(turnout, px(turnout["km"]), rail - LANE * lane) for turnout, lane in zip(ordered, lanes)]
     return "".join(elements) + "</svg>"
 
@@ -83,15 +85,18 @@ def _kilometres(low: float, high: float, px: Callable[[float], float], rail: flo
     yield f'<text class="label" x="{WIDTH}" y="{rail + 20}" text-anchor="end">km</text>'
 
 
-def _names(turnouts: Sequence[Mapping[str, Any]], px: Callable[[float], float]) -> Iterator[str]:
-    """Ids above the line, those left out that would lie on the id of another turnout, the most urgent first."""
-    occupied: list[tuple[float, float]] = []
+def _names(turnouts: Sequence[Mapping[str, Any]], px: Callable[[float], float]) -> Iterator[tuple[str, int]]:
+    """Ids above the line with their rows, the most urgent first; left out are those for which no row has room."""
+    occupied: list[list[tuple[float, float]]] = [[] for _ in range(LABEL_ROWS)]
     for turnout in sorted(turnouts, key=lambda t: URGENT.index(t["worst"]) if t["worst"] in URGENT else len(URGENT)):
         half = 0.5 * LETTER * len(turnout["turnout_id"])
         x = min(max(px(turnout["km"]), half), WIDTH - half)
-        if all(abs(x - centre) > half + width + 4.0 for centre, width in occupied):
-            yield f'<text class="place" x="{x:.1f}" y="11" text-anchor="middle">{escape(turnout["turnout_id"])}</text>'
-            occupied.append((x, half))
+        for row, ids in enumerate(occupied):
+            if all(abs(x - centre) > half + width + 4.0 for centre, width in ids):
+                position = f'x="{x:.1f}" y="{11 + LABEL_LINE * row}" text-anchor="middle"'
+                yield f'<text class="place" {position}>{escape(turnout["turnout_id"])}</text>', row
+                ids.append((x, half))
+                break
 
 
 def _circle(turnout: Mapping[str, Any], x: float, y: float) -> str:
