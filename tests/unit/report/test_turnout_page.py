@@ -253,9 +253,9 @@ def test_the_diagram_shows_hammer_tests_and_trains_each_by_itself():
     text = page(chart_states=charts)
     assert re.search(r'<circle class="state-ok"[^>]*><title>A7, CP panel: hammer tests ok<', text)
     assert re.search(r'<rect class="state-unknown"[^>]*><title>A7: trains cannot tell<', text)
-    assert "squares: accelerations under trains" in text
+    assert "a square that of accelerations under trains" in text
     alone = page(chart_states=charts[:1])
-    assert '<rect class="state' not in alone and "squares:" not in alone
+    assert '<rect class="state' not in alone and "a square" not in alone
 
 
 def test_the_page_states_what_was_found_first_and_what_it_rests_on_in_a_detail():

@@ -253,8 +253,8 @@ def _records(same: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     numbers = sorted({number for number, _, _ in places if number is not None})
     if len(numbers) < 2:
         return {}
-    totals, further = ({place[k] for place in places} for k in (1, 2))
-    is_all = totals == {len(numbers)}
+    further = {place[2] for place in places}
+    is_all = {total for _, total, _ in places} == {len(numbers)}
     place = f"all {len(numbers)} records" if is_all else f"{count_of(len(numbers), 'record')}: {number_ranges(numbers)}"
     alike = len({q["found"] for q in same}) == 1
     what = same[0]["found"] if alike else f"{same[0]['found']} (first of {len(numbers)})"
@@ -310,10 +310,10 @@ def _panels(
 
 def _diagram(rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """The turnout with the states of the charts of hammer tests and of trains, each by itself."""
-    by_source = [
+    hammer, trains = (
         _worst_states([c for c in rows["chart_states"] if c["source"] == source]) for source in ("hammer", "passage")
-    ]
-    return diagram(rows["sections"], *by_source)
+    )
+    return diagram(rows["sections"], hammer, trains)
 
 
 def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:
