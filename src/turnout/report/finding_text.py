@@ -123,7 +123,7 @@ def facts(finding: Mapping[str, Any]) -> list[tuple[str, str]]:
     if words := _conditions(evidence):
         rests = finding["verdict"] in ("named", "a_or_b")
         question = "The name rests on" if rests else "Most evidence in"
-        pairs.append((question, words + (_undecided(finding) if rests else "")))
+        pairs.append((question, words + (_held_out_words(finding) if rests else "")))
     pairs.append(("From", _amount(finding)))
     pairs.append(("Prediction", _held_out_fit(finding)))
     pairs.append(("How sure", _certainty(finding, evidence)))
@@ -202,7 +202,7 @@ def _band(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str:
     return f"{finding['band_low_hz']:.0f} to {finding['band_high_hz']:.0f} Hz{of_impacts}"
 
 
-def _undecided(finding: Mapping[str, Any]) -> str:
+def _held_out_words(finding: Mapping[str, Any]) -> str:
     """Words where the recordings that were held out do not decide, "" where they do or where there are none."""
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
     if before is None or after is None or error is None or not finding["n_held_out"]:

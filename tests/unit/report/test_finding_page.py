@@ -393,10 +393,10 @@ def test_the_page_states_what_a_name_rests_on_if_the_held_out_recordings_do_not_
     impacts = {"impacts at 18.6 m 2026-07-25": 17.0, "ic3 120 km/h": 1.2}
     row = named(fit_before_pct=92.8, fit_gain_se_pct=error, n_held_out=1) | {"fit_after_pct": 95.0}
     row |= {"evidence_json": json.dumps(EVIDENCE | {"by_condition": impacts}), "band_high_hz": 718.0}
-    told = dict(facts(row))
-    assert told["The name rests on"].startswith("impacts at 18.6 m 2026-07-25 (17 nats")
+    answers = dict(facts(row))
+    assert answers["The name rests on"].startswith("impacts at 18.6 m 2026-07-25 (17 nats")
     words = "1 held-out recording alone would not decide (+2.2 ± 2.5 points of fit)"
-    assert (words in told["The name rests on"]) != is_decided
+    assert (words in answers["The name rests on"]) != is_decided
     assert f": +2.2 ± {1.96 * error:.1f} points" in page(row)
-    assert told["Band"] == "21 to 718 Hz under impacts; trains are compared in a lower band, see their spectra"
+    assert answers["Band"] == "21 to 718 Hz under impacts; trains are compared in a lower band, see their spectra"
     assert dict(facts(named()))["Band"] == "21 to 88 Hz"
