@@ -65,12 +65,17 @@ def _position_words(row: Mapping[str, Any]) -> str:
         return "" if row["position_m"] is None else f" at {row['position_m']:.1f} m"
     first, last = (f"{row[end]:.1f}" for end in ("first_m", "last_m"))
     words = f" at {first} m" if first == last else f" from {first} to {last} m"
-    ends = [
+    uncertain = _uncertain_ends(row)
+    return f"{words} ({', '.join(uncertain)}, 95 %)" if uncertain else words
+
+
+def _uncertain_ends(row: Mapping[str, Any]) -> list[str]:
+    """In words, the ends of a change of adjacent supports that are not certain."""
+    ends = (
         _end_words("first support", row.get("first_low_m"), row.get("first_high_m"), "before"),
         _end_words("last support", row.get("last_high_m"), row.get("last_low_m"), "beyond"),
-    ]
-    uncertain = [end for end in ends if end]
-    return f"{words} ({', '.join(uncertain)}, 95 %)" if uncertain else words
+    )
+    return [end for end in ends if end]
 
 
 def _end_words(end: str, outer: float | None, inner: float | None, farther: str) -> str:
@@ -99,8 +104,8 @@ def _change_words(row: Mapping[str, Any]) -> str:
 
 
 def _beside_words(row: Mapping[str, Any]) -> str:
-    """What the size of a change of single supports takes for granted."""
-    if row["component"] is None or row.get("first_m") is None:
+    """What the size of a change of single supports takes for granted, where its ends are certain."""
+    if row["component"] is None or row.get("first_m") is None or _uncertain_ends(row):
         return ""
     part = "pads" if row["component"] == "railpad" else "sleepers"
     return f", with the {part} beside {'it' if row['first_m'] == row['last_m'] else 'them'} unchanged"

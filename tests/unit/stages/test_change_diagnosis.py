@@ -270,7 +270,8 @@ def test_the_sentence_states_the_possible_extent_of_a_change(changed, first, las
     )
     row = finding_of_change(named, None, 4, 8)
     assert words in row["sentence"]
-    assert f"with the sleepers beside {'it' if len(changed) == 1 else 'them'} unchanged" in row["sentence"]
+    are_ends_certain = (first, last) == ((18.0, 18.0), (18.6, 18.6))
+    assert ("with the sleepers beside them unchanged" in row["sentence"]) is are_ends_certain
     assert (row["first_low_m"], row["last_high_m"]) == (first[0], last[1])
 
 
