@@ -21,6 +21,7 @@ class HammerDelay(TimeOffset):
     message_negative = "In the hammer tests channel {channel} is early by {delay_size}, in the passages it is not"
     site_check = "Check clock and filter of this channel in the logger of the hammer tests"
     recording_types = ("hammer",)
+    general_form = "time_offset"
     requirements = (IMPACTS, PASSAGES)
 
     @classmethod

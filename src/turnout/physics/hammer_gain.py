@@ -26,6 +26,7 @@ class HammerGain(SensorGain):
     )
     site_check = "Check range and sensitivity of this channel in the logger of the hammer tests"
     recording_types = ("hammer",)
+    general_form = "sensor_gain"
     requirements = (IMPACTS, PASSAGES)
 
     @classmethod

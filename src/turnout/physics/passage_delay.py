@@ -24,6 +24,7 @@ class PassageDelay(TimeOffset):
     message_negative = "In the passages channel {channel} is early by {delay_size}, in the hammer tests it is not"
     site_check = "Check clock and filter of this channel in the logger of the passages"
     recording_types = ("passage",)
+    general_form = "time_offset"
     requirements = (PASSAGES, IMPACTS)
 
     @classmethod

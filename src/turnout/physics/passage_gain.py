@@ -26,6 +26,7 @@ class PassageGain(SensorGain):
     )
     site_check = "Check range and sensitivity of this channel in the logger of the passages"
     recording_types = ("passage",)
+    general_form = "sensor_gain"
     requirements = (PASSAGES, IMPACTS)
 
     @classmethod

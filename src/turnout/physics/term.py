@@ -110,6 +110,8 @@ class PhysicsTerm(Effect):
         Effect that looks the same at the lower bound of the first parameter.
     simpler_form : tuple
         (effect, k): where the first parameter does not matter, it equals that effect with parameter k as its size.
+    general_form : str
+        The same fault in recordings of all types: it is named where the recordings cannot tell the two.
     unbounded_form : str
         Effect that looks the same where only a lower limit of the first parameter is known.
     prescreen_group : str
@@ -155,6 +157,7 @@ class PhysicsTerm(Effect):
     component: ClassVar[str] = ""
     limit_form: ClassVar[str] = ""
     simpler_form: ClassVar[tuple[str, int] | tuple[()]] = ()
+    general_form: ClassVar[str] = ""
     unbounded_form: ClassVar[str] = ""
     prescreen_group: ClassVar[str] = ""
     start_from_base: ClassVar[bool] = True

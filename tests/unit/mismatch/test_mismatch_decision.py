@@ -51,6 +51,33 @@ def score(family="soft", gain=40.0, worst=0.0, explained=1.0, size=1.0, **more):
     return Score(candidate, gain, worst, explained, fit, **more)
 
 
+LAG = {"where": {"sensor": "A2"}, "flags": {"general_form": "time_offset"}}
+
+
+@pytest.mark.parametrize(
+    ("general", "special", "names", "words"),
+    [
+        (40.0, 38.0, ("time_offset",), "one type alone"),
+        (38.0, 40.0, ("time_offset",), "one type alone"),  # the passages cannot tell that the lag is not in them
+        (33.0, 40.0, ("hammer_delay",), ""),
+        (40.0, 33.0, ("time_offset",), ""),
+    ],
+)
+def test_a_fault_is_of_one_type_of_recordings_only_by_a_margin(general, special, names, words):
+    lags = [score("time_offset", general, where=LAG["where"]), score("hammer_delay", special, **LAG)]
+    verdict = judge(lags, 2.0, MismatchSettings())
+    assert (verdict.answer, verdict.names) == ("named", names) and words in verdict.reason
+    assert verdict.probability > 0.9  # both are the same fault
+
+
+def test_lags_of_two_channels_stay_a_choice():
+    there = {**LAG, "where": {"sensor": "A3"}}
+    verdict = judge(
+        [score("time_offset", 40.0, where=LAG["where"]), score("hammer_delay", 38.0, **there)], 2.0, MismatchSettings()
+    )
+    assert verdict.answer == "a_or_b"
+
+
 @pytest.mark.parametrize(("quality", "has_meaning"), [(1.5, False), (1.51, True), (12.0, True), (80.0, False)])
 def test_a_resonance_at_the_end_of_its_range_of_quality_is_another_effect(quality, has_meaning):
     """A low-pass of 500 Hz in one channel was a loose mounting of quality 1.5. A period of 0 stays possible."""
@@ -104,6 +131,7 @@ CASES = {
         2.0,
         {},
     ),
+    "may_be_in_one_type_of_recordings": ([score(), score("gap", 36.0, flags={"general_form": "soft"})], 2.0, {}),
     "passes": ([score(), score("gap", 33.0)], 2.0, {"local_change": 90.0, "local_deviation": 90.0}),
 }
 

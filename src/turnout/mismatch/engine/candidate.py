@@ -45,6 +45,8 @@ class Effect:
         size. () without such a family.
     unbounded_form : str
         Family that looks the same where only a lower limit of the first parameter is known.
+    general_form : str
+        Family of the same fault in recordings of all types.
     """
 
     family: str
@@ -56,6 +58,7 @@ class Effect:
     limit_form: str = ""
     simpler_form: tuple[str, int] | tuple[()] = ()
     unbounded_form: str = ""
+    general_form: str = ""
 
     def within(self, families: Collection[str]) -> Effect:
         """The effect in a library of some families alone: what is not in it is no form of the effect.
@@ -73,6 +76,7 @@ class Effect:
             limit_form=self.limit_form if self.limit_form in families else "",
             simpler_form=self.simpler_form if self.simpler_form and self.simpler_form[0] in families else (),
             unbounded_form=self.unbounded_form if self.unbounded_form in families else "",
+            general_form=self.general_form if self.general_form in families else "",
         )
 
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
 COMPONENT_DIFFERS, COMPONENT_UNUSUAL = "component_differs_under_trains", "component_unlike_its_kind"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"
+MISTAKES = "decisions/mistakes-in-campaigns.md"
 
 
 def _always(_: Any) -> bool:
@@ -100,6 +101,9 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "the evidence for one effect is hardly larger than for the other", HOW),
     Rule("exempt_from_explaining", lambda e: e.explains_too_little, "named",
          "{e.exemption}; it explains {e.leader.explained:.0%} of the residual in excess of the intact state", PAIRS),
+    Rule("may_be_in_one_type_of_recordings", lambda e: e.special_forms, "named",
+         "these recordings do not tell whether it is in hammer tests and passages, or in those of one type alone",
+         MISTAKES),
     Rule("passes", _always, "named", "", HOW),
 )
 
@@ -225,7 +229,8 @@ def judge(scores: Sequence[Score], excess: float, settings: MismatchSettings, **
         swap_with_unknown(probabilities)
     names = evidence.names(rule.answer)
     certainty = settings.certainty(rule.answer, rule.cause == "clock")
-    probability = calibrate(probabilities, names or (rule.answer,), certainty, settings)
+    alike = tuple(s.family for s in evidence.special_forms) if rule.answer == "named" else ()
+    probability = calibrate(probabilities, (*names, *alike) or (rule.answer,), certainty, settings)
     grade = ("A" if evidence.residual_excess <= 1.0 else "B") if rule.answer == "named" else ""
     return Verdict(
         rule.answer, names, grade, probability, probabilities, evidence.ranked, rule.reason_for(evidence), rule.cause,

@@ -121,8 +121,12 @@ class EffectEvidence:
 
     @cached_property
     def leader(self) -> Score:
-        """The likeliest of the passing candidates."""
-        return likeliest(self.passing, self.excess, self.settings)
+        """The likeliest of the passing candidates, or its general form where the recordings cannot tell the two."""
+        first = likeliest(self.passing, self.excess, self.settings)
+        general = [
+            s for s in self.passing if first.is_special_form_of(s) and first.gain - s.gain < self.settings.margin
+        ]
+        return general[0] if general else first
 
     @cached_property
     def ranked(self) -> tuple[Score, ...]:
@@ -186,8 +190,17 @@ class EffectEvidence:
         return [s for s in self.passing if s.is_limit_of(self.leader) and s.explained >= self.settings.explained]
 
     @cached_property
+    def special_forms(self) -> list[Score]:
+        """Reportable special forms of the leader within its margin: the same fault in recordings of one type."""
+        return [s for s in self._within_margin if s.is_special_form_of(self.leader)]
+
+    @cached_property
     def rivals(self) -> list[Score]:
-        """Reportable candidates within the margin of the leader."""
+        """Other reportable candidates within the margin of the leader."""
+        return [s for s in self._within_margin if not s.is_special_form_of(self.leader)]
+
+    @property
+    def _within_margin(self) -> list[Score]:
         return [s for s in self.ranked[1:] if s.is_reportable and self.leader.gain - s.gain < self.settings.margin]
 
     def names(self, answer: str) -> tuple[str, ...]:

@@ -165,6 +165,19 @@ class Score:
         (own_sizes, error), (rival_sizes, errors) = self.estimates, rival.estimates
         return bool(abs(own_sizes[0] - rival_sizes[k]) <= 2.0 * np.hypot(error[0], errors[k]))
 
+    def is_special_form_of(self, other: Score) -> bool:
+        """Whether the other one is the same fault at the same site, in recordings of all types.
+
+        Parameters
+        ----------
+        other : Score
+
+        Returns
+        -------
+        bool
+        """
+        return self.candidate.effect.general_form == other.family and self.candidate.where == other.candidate.where
+
     def is_independent_of(self, rival: Score) -> bool:
         """Whether two effects confirm one another.
 

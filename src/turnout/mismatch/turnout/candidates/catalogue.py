@@ -91,6 +91,7 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
             limit_form=effect.limit_form,
             simpler_form=effect.simpler_form,
             unbounded_form=effect.unbounded_form,
+            general_form=effect.general_form,
         ),
         RefitStarts(
             hypothesis.starts,
