@@ -222,6 +222,10 @@ def test_a_reading_of_a_broken_thermometer_is_left_out_alone(tmp_path, noted, ke
     unit, turnout = lay_out(tmp_path, replace(recording, conditions={"rail_temperature": noted}))
     rows = passage_unit(unit, turnout, tmp_path, context())
     assert rows["passages"][0]["rail_temperature_c"] == kept and rows["passage_fits"]
+    if noted > 100.0:  # readers leave out what no thermometer shows
+        (row,) = rows["quarantine"]
+        assert "condition_lost" in row.values() and "999" in str(row)
+        return
     assert (f"rail temperature {noted:g} °C noted, not used" in str(rows["passages"][0]["detail"])) == (kept is None)
 
 

@@ -46,6 +46,7 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
         "with_reserved_passages": lambda case, fit, *_: (case, fit),
         "_fit_again": lambda *_: again,
         "visit_groups": lambda case, fit, *_: fit.name,
+        "channel_levels": lambda case, fit: {"channel A1 in the passages": 0.5},
         "packed_groups": lambda groups: groups,
         "write_value": lambda path, value: written.update(value),
     }
@@ -58,3 +59,4 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
     monkeypatch.setattr(stored_visits, "replace", lambda fitted, fit: fitted)
     stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")
+    assert written["levels"] == {"channel A1 in the passages": 0.5}
