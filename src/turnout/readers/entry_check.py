@@ -17,6 +17,7 @@ from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_sensitivities import uncompared_sensitivities
+from turnout.readers.stated_zones import OR
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import with_stated_units
 from turnout.readers.time_texts import stated_time
@@ -85,7 +86,11 @@ class EntryCheck:
         if not self.checked:
             return record
         entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self.checked)
-        return record if len(entries) == len(record.entries) else replace(record, entries=entries)
+        if len(entries) == len(record.entries):
+            return record
+        dropped = {" ".join(str(e.value).split()) for e in record.entries if e.name.strip().casefold() in self.checked}
+        zones = [text for text in record.unread_zone.split(OR) if text not in dropped and not self.is_checked(text)]
+        return replace(record, entries=entries, unread_zone=OR.join(zones))
 
     def remarks(
         self, record: RawRecord, rate: float, n_record: int, where: str, is_rate_stated: bool

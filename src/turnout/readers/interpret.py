@@ -135,7 +135,7 @@ def convert_records(
     unread = {k: text for k, text in unread.items() if not entry_check.is_checked(text)}
     kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
     errors.extend(start_errors(kept, unread, description.time_zone, source))
-    errors.extend(zone_errors(raw.records, description.time_zone, source))
+    errors.extend(zone_errors(stated, description.time_zone, source))
     return tuple(recordings), tuple(errors)
 
 

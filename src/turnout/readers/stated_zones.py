@@ -17,15 +17,27 @@ from turnout.readers.time_texts import parse_time
 
 ZONE_NAME = re.compile(
     r"timezone|zeitzone|tidszone|tijdzone|fuseauhoraire|fusoorario|zonahoraria|fusohorario|strefaczasowa|casovepasmo"
-    r"|casovapasmo|aikavyohyke|idozona|tz|(?:utc|gmt)offset"
+    r"|casovapasmo|aikavyohyke|idozona|saatdilimi|tz|(?:utc|gmt)offset"
 )
 NO_ZONE = frozenset(("", "-", "none", "n/a", "?", "unknown", "null", "local", "naive"))
 OFFSET = re.compile(r"(?:UTC|GMT)? ?([+-])(\d{1,2})(?::?(\d{2}))?")
 SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST", "SEČ": "CET", "SELČ": "CEST"}
 # Abbreviations that a name may hold; which offset they mean depends on the day and on the country.
 ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC|SEL?Č)\b")
-# An abbreviation or an offset that is a zone under any name; WEST is a direction, too.
-ZONE_ALONE = re.compile(r"(?!WEST$)(?:UTC|GMT|(?:UTC|GMT)? ?[+-]\d{1,2}:\d{2}|(?:UTC|GMT) ?[+-]\d{1,2})")
+# A zone without the word; a bare offset may be a duration or a ratio as well.
+ZONE_ALONE = re.compile(r"(?:UTC|GMT)(?: ?[+-]\d{1,2}(?::\d{2})?)?")
+# Names of which every word is one of these, and one of TIME, state the zone of the start: "Time base", "Zeitreferenz".
+TIME = re.compile(
+    r"times?|timestamps?|zeit(?:en|stempel|referenz|basis|bezug|format|system)?|uhrzeit|heures?|horodatages?|tid|tijd"
+    r"|hora|cas|czas|ora"
+)
+BESIDE_TIME = re.compile(
+    r"start|record(?:ed|ing)?|all|the|of|is|are|in|reference|ref|standard|base|basis|system|format|local|logger|der|die|des"
+)
+# Names of the source of a clock and of places: an abbreviation under them is no zone of the start.
+NO_CLOCK = re.compile(
+    r"sync\w*|ntp|ptp|gps|gnss|source|quelle|display|anzeige|track|gleis|line|strecke|depot|station|train|zug"
+)
 # Words for the two states of a clock that is put forward in summer, without accents.
 SUMMER = re.compile(
     r"\b(?:dst|daylight (?:saving|time)s?|summer ?time|sommerzeit|sommertid|zomertijd|letni cas|czas letni|ora legale"
@@ -65,6 +77,10 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
         return record
     in_names = [text for name in _names_of_start(record) if (text := zone_in_name(name))]
     texts = list(dict.fromkeys(in_names or _zone_texts(record.entries)))
+    if not texts:
+        texts = list(dict.fromkeys(_zones_of_other_names(record.entries)))
+        texts += dict.fromkeys(_season_texts(record.entries))
+        return replace(record, unread_zone=OR.join(texts)[:MAX_SHOWN]) if texts else record
     zones = {zone for text in texts if (zone := zone_of(text))}
     if len(zones) == 1 and len(texts) == 1:
         return replace(record, started_at=record.started_at.replace(tzinfo=zones.pop()))
@@ -123,19 +139,31 @@ def zone_in_name(name: str) -> str:
     return next(of_brackets, abbreviation[0] if abbreviation else "")
 
 
-def _zone_texts(entries: tuple[Entry, ...]) -> Iterator[str]:
-    """Zones of entries under such a name, and under any other whose whole value is an abbreviation or an offset."""
+def _zone_texts(entries: tuple[Entry, ...]) -> tuple[str, ...]:
+    """Zones of entries under such a name, else of those whose whole name speaks of the time, as "Time base: UTC"."""
+    texts = [
+        (entry.name, " ".join(str(entry.value).split()))
+        for entry in entries
+        if isinstance(entry.value, (str, int, float, np.number)) and not isinstance(entry.value, bool)
+    ]
+    named = tuple(text for name, text in texts if _is_zone_name(name) and text.casefold() not in NO_ZONE)
+    return named or tuple(text for name, text in texts if ZONE_ALONE.fullmatch(text) and _is_time_name(name))
+
+
+@lru_cache(maxsize=4096)
+def _is_time_name(name: str) -> bool:
+    words = words_of(name)
+    return any(map(TIME.fullmatch, words)) and all(TIME.fullmatch(w) or BESIDE_TIME.fullmatch(w) for w in words)
+
+
+def _zones_of_other_names(entries: tuple[Entry, ...]) -> Iterator[str]:
+    """Abbreviations of zones under any name: they are reported, and never change the start."""
     for entry in entries:
-        if not isinstance(entry.value, (str, int, float, np.number)):
-            continue
-        text = " ".join(str(entry.value).split())
-        is_named = _is_zone_name(entry.name) and text.casefold() not in NO_ZONE
-        if is_named or (isinstance(entry.value, str) and not entry.is_piece and _is_zone_alone(text)):
-            yield text
-
-
-def _is_zone_alone(text: str) -> bool:
-    return bool(ZONE_ALONE.fullmatch(text) or (text != "WEST" and ABBREVIATION.fullmatch(text)))
+        if isinstance(entry.value, str) and not entry.is_piece:
+            text = " ".join(entry.value.split())
+            is_zone = ZONE_ALONE.fullmatch(text) or (text != "WEST" and ABBREVIATION.fullmatch(text))
+            if is_zone and not any(map(NO_CLOCK.fullmatch, words_of(entry.name))):
+                yield text
 
 
 def _season_texts(entries: tuple[Entry, ...]) -> Iterator[str]:
@@ -255,6 +283,8 @@ def is_zone_of(text: str, stamp: datetime, time_zone: str) -> bool:
     (True, False)
     """
     local = stamp.replace(tzinfo=ZoneInfo(time_zone))
+    if ZONE_ALONE.fullmatch(text) and (zone := zone_of(text)):
+        return local.utcoffset() == zone.utcoffset(stamp)
     if (is_summer := is_summer_time(text)) is not None:
         return is_summer == bool(local.dst())
     return SAME_ABBREVIATIONS.get(text.upper(), text.upper()) == local.tzname()
@@ -279,4 +309,6 @@ def zone_problem(record: RawRecord, time_zone: str) -> str:
         return ""
     if all(is_zone_of(text, record.started_at, time_zone) for text in record.unread_zone.split(OR)):
         return ""
+    if all(ZONE_ALONE.fullmatch(text) for text in record.unread_zone.split(OR)):
+        return f"{record.unread_zone!r} may be its time zone: that of the layout is used, {time_zone}"
     return f"its time zone {record.unread_zone!r} cannot be read: that of the layout is used, {time_zone}"

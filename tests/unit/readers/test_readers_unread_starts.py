@@ -108,6 +108,36 @@ def test_an_offset_counts_whatever_its_name(offset, tmp_path):
 
 
 @pytest.mark.parametrize(
+    "entry",
+    [
+        *["Train delay: +05:00", "Verspätung: -00:30", "Cant: +00:15", "Delay: +00:30", "Time offset: +00:02"],
+        *["NTP: UTC", "Clock source: UTC", "GPS sync: UTC", "Range: -10:10", "Line: BST", "Track: CET"],
+    ],
+)
+@pytest.mark.parametrize("zone", ["", "Time zone: UTC\n"])
+def test_a_duration_and_the_name_of_a_clock_are_no_zone(zone, entry, tmp_path):
+    """Formerly, a start was moved by the delay of a train."""
+    head = f"Start: 2024-05-13 14:05:30\n{zone}{entry}"
+    expected = START if zone else datetime(2024, 5, 13, 12, 5, 30)
+    assert outcome(tmp_path, head, "Europe/Berlin") == (expected, ())
+
+
+@pytest.mark.parametrize("entry", ["Uhrwerk: UTC", "Standard: GMT", "Hubi: UTC+3", "Hubi: CET"])
+def test_an_abbreviation_of_a_zone_under_an_unknown_name_is_a_remark(entry, tmp_path):
+    head = f"Start: 2024-05-13 14:05:30\n{entry}"
+    start, (error,) = outcome(tmp_path, head, "Europe/Berlin")
+    assert start == datetime(2024, 5, 13, 12, 5, 30) and error.reason == "start_unknown"
+    assert outcome(tmp_path, head, "Europe/Berlin", checked=(entry.split(":")[0],))[1] == ()
+    agreeing = {"CET": "Africa/Tunis"}.get(entry.split(": ")[1], "Etc/GMT-3" if "+3" in entry else "UTC")
+    assert outcome(tmp_path, head, agreeing)[1] == ()
+
+
+@pytest.mark.parametrize("entry", ["Time reference: UTC", "Time base: GMT", "Zeitbasis: UTC", "All times: UTC"])
+def test_a_name_of_the_time_states_the_zone(entry, tmp_path):
+    assert outcome(tmp_path, f"Start: 2024-05-13 14:05:30\n{entry}", "Europe/Berlin") == (START, ())
+
+
+@pytest.mark.parametrize(
     ("entry", "is_summer"),
     [
         *[("DST: off", False), ("DST: 0", False), ("Clock: winter time", False), ("Zimní čas: ano", False)],
