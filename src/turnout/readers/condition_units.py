@@ -12,6 +12,7 @@ import numpy as np
 from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import CONDITION_QUANTITIES, TEMPERATURES
 from turnout.readers.rate_statements import PLACEHOLDERS
+from turnout.readers.rate_units import words_of
 from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import number_and_unit
@@ -55,7 +56,7 @@ def _temperatures_in_other_words(entries: Sequence[Entry]) -> dict[str, float]:
     """Temperatures [°C] under names such as "Schienentemperatur", if all entries about one of them agree."""
     numbers: dict[str, set[float | None]] = {}
     for entry in entries:
-        if (name := condition_of_entry(entry)) in TEMPERATURES:
+        if name := read_temperature(entry):
             value = f"{entry.value} {_unit_in_name(entry.name)}" if _is_bare(entry.value) else entry.value
             numbers.setdefault(name, set()).add(_number_in_unit(name, value, ()))
     return {name: x for name, stated in numbers.items() if len(stated) == 1 and (x := next(iter(stated))) is not None}
@@ -153,34 +154,87 @@ def is_impossible(name: str, value: Any) -> bool:
     return bool(np.isfinite(value)) and not low <= value <= high
 
 
-# Words for the conditions in other names, without case, accents and separators.
-TEMPERATURE_WORD = r"(?:temp|tepl|lampotil|homers)"
-BESIDE_TEMPERATURE = {
-    "rail_temperature": r"(?:rail|schiene|skinne|voie|kolejnic|szyn|spoor|carril|rotaia|kisko)",
-    "air_temperature": r"(?:air|luft|lucht|vzduch|powietrz|aria|aire|ilma)",
+# Words for the conditions in other names, without case and accents: whole words, or these in one word.
+TEMPERATURE_WORD = r"(?:temp|temperatur(?:e|en|a|y)?|temperaturen|teplot[ay]|lampotila|homerseklet)"
+RAIL_OR_AIR = {
+    "rail_temperature": r"(?:rails?|schienen?|skinnen?s?|skinner|voies?|kolejnice?|szyn[ay]?|spoor|spoorstaaf|carril"
+    r"|rotai[ae]|kiskon?)",
+    "air_temperature": r"(?:air|luft|lucht|vzduchu?|powietrza?|aria|aire|ilman?)",
 }
+# Words beside them that leave the meaning; with any other word it is the temperature of something else, or a limit.
+BESIDE_TEMPERATURE = re.compile(
+    r"measured|measurement|current|actual|mean|average|avg|value|reading|start|at|of|the|in|before|test"
+    r"|deg|degc|degf|degrees?|grad|celsius|fahrenheit|kelvin|c|f|k|t|\d+|left|right|links|rechts"
+    r"|gemessene?|aktuelle?|ist|mittel|mittlere|mittelwert|wert|messung|messwert|beginn|der|des|die|am|zu"
+    r"|de|du|la|le|l|mesuree?|actuelle|moyenne|della?|dell|misurata|del|medida|malt|maalt|middel|zmerzona|namerena"
+)
 SPEED_WORD = r"speed|geschwind|vitesse|hastigh|rychlost|predkosc|velocidad|velocita|snelheid|nopeus"
 OTHER_CONDITION = re.compile(
     r"neutral|verspann|stress|limit|max|min|alarm|sensor|unit|einheit|coef|koef|comp|komp|source|serial|date|channel|kanal"
     r"|line|strecke|wind(?!ig)|sound|schall|wave|welle|zulass|permit|design|disk|fan|motor|playback|sampl|tape"
 )
-NAMES_OF_CONDITIONS = {
-    name: re.compile(f"{beside}.{{0,12}}{TEMPERATURE_WORD}|{TEMPERATURE_WORD}.{{0,12}}{beside}")
-    for name, beside in BESIDE_TEMPERATURE.items()
-} | {"speed": re.compile(SPEED_WORD)}
+# Words beside that of a speed that make it the one of a train.
+TRAIN_WORD = re.compile(
+    r"trains?|zug(?:es|s)?|zugs?geschwindigkeit|tog(?:et|ets)?|trein|vlaku?|pociagu?|tren[oi]?|junan?|vehicle|fahrzeug\w*"
+    r"|fahrgeschwindigkeit|passage|vorbeifahrt\w*|locomotive|lok|wagon|wagen"
+)
 
 
 @lru_cache(maxsize=4096)
-def _condition_in_other_words(name: str) -> str:
-    """The condition of which a name speaks in other words, "Schienentemperatur"; "" for none, and for its own name."""
-    word = plain_word(name)
+def _condition_in_other_words(name: str) -> tuple[str, bool]:
+    """The condition of which a name speaks in other words, "Schienentemperatur", and whether it can mean no other.
+
+    "" for none, and for the name that is read.
+    """
+    word, words = plain_word(name), words_of(name)
     if _plain(name) in CONDITION_QUANTITIES or re.search("[:=]", name) or OTHER_CONDITION.search(word):
-        return ""
-    return next((condition for condition, pattern in NAMES_OF_CONDITIONS.items() if pattern.search(word)), "")
+        return "", False
+    for condition, place in RAIL_OR_AIR.items():
+        one_word = re.compile(f"{place}{TEMPERATURE_WORD}|{TEMPERATURE_WORD}{place}")
+        is_named = any(map(one_word.fullmatch, words))
+        apart = re.compile(f"{place}|{TEMPERATURE_WORD}")
+        is_named |= any(re.fullmatch(place, w) for w in words) and any(re.fullmatch(TEMPERATURE_WORD, w) for w in words)
+        if is_named:
+            further = [w for w in words if not one_word.fullmatch(w) and not apart.fullmatch(w)]
+            return condition, all(map(BESIDE_TEMPERATURE.fullmatch, further))
+    if re.search(SPEED_WORD, word):
+        further = [w for w in words if not re.fullmatch(SPEED_WORD + r"|geschwindigkeit|hastighed", w)]
+        return "speed", not further or any(map(TRAIN_WORD.fullmatch, words))
+    return "", False
+
+
+def _is_speed(value: Any) -> bool:
+    """Whether a value has a unit of speed."""
+    stated = number_and_unit(value) if isinstance(value, str) else None
+    unit = known_unit(stated[1]) if stated and stated[1] else None
+    return unit is not None and unit.dimension == "velocity"
+
+
+def read_temperature(entry: Entry) -> str:
+    """The temperature that an entry states under another name that can mean nothing else.
+
+    Parameters
+    ----------
+    entry : Entry
+        Entry of the metadata.
+
+    Returns
+    -------
+    str
+        "" for that of something else, a limit, a correction and the like.
+
+    Examples
+    --------
+    >>> names = "Schienentemperatur gemessen", "Rail laying temperature", "Trailer temperature"
+    >>> [read_temperature(Entry("head", name, "23 °C")) for name in names]
+    ['rail_temperature', '', '']
+    """
+    condition, is_certain = _condition_in_other_words(entry.name)
+    return condition if is_certain and condition in TEMPERATURES and condition_of_entry(entry) else ""
 
 
 def condition_of_entry(entry: Entry) -> str:
-    """The condition that an entry may state under another name than the one that is read.
+    """The condition that an entry may state under another name than the one that is read, perhaps something else.
 
     Parameters
     ----------
@@ -197,9 +251,11 @@ def condition_of_entry(entry: Entry) -> str:
     >>> condition_of_entry(Entry("head", "Schienentemperatur", "12,5 °C"))
     'rail_temperature'
     """
-    name = "" if entry.is_piece else _condition_in_other_words(entry.name)
+    name, is_certain = ("", False) if entry.is_piece else _condition_in_other_words(entry.name)
     if not name or isinstance(entry.value, bool):
         return ""
+    if name == "speed" and not is_certain and not _is_speed(entry.value):
+        return ""  # of a disk, a line
     is_number = isinstance(entry.value, (int, float, np.number))
     is_stated = is_number or (isinstance(entry.value, str) and number_and_unit(entry.value) is not None)
     return name if is_stated else ""

@@ -17,9 +17,9 @@ from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_sensitivities import uncompared_sensitivities
-from turnout.readers.stated_zones import OR
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import with_stated_units
+from turnout.readers.stated_zones import OR
 from turnout.readers.time_texts import stated_time
 from turnout.readers.unexplained_entries import MAX_SHOWN, RecordFacts, shown_text, text_of_value, unexplained_entries
 from turnout.readers.whole_numbers import converting_entries

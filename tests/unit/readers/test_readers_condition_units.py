@@ -129,3 +129,49 @@ def test_a_speed_in_an_unknown_unit_is_reported_and_a_word_is_not(text, tmp_path
         assert conditions["speed"] == text
         assert [error.reason for error in errors] == ["condition_lost"][: int(text != "fast")]
         assert all("km/h" in error.remedy for error in errors)
+
+
+OTHER_TEMPERATURES = [
+    *["Rail temperature threshold", "Rail laying temperature", "Spannungsfreie Schienentemperatur"],
+    *["Schienentemperatur Soll", "Rail temperature offset", "Rail temperature accuracy", "Rail temperature forecast"],
+    *["Air conditioning temperature", "Calibration air temperature", "Lufttemperatur Labor"],
+    *["Rail temperature at laying", "Rail temperature (setpoint)"],
+]
+
+
+@pytest.mark.parametrize("name", OTHER_TEMPERATURES)
+def test_another_temperature_of_a_rail_or_the_air_is_a_remark_and_no_value(name, tmp_path):
+    """Formerly, the temperature at which a rail was laid was read as that of the measurement."""
+    conditions, errors = read_with(tmp_path, "csv", {}, [f"{name}: 23 °C"])
+    assert not {"rail_temperature", "air_temperature"} & set(conditions)
+    assert [error.reason for error in errors] == ["condition_lost"] and "may mean" in errors[0].problem
+
+
+@pytest.mark.parametrize("name", ["Trailer", "Repair", "Fair", "Airport", "Handrail", "Trail", "Affair", "Stair"])
+def test_a_word_that_only_holds_that_of_a_rail_or_the_air_is_neither(name, tmp_path):
+    assert read_with(tmp_path, "csv", {}, [f"{name} temperature: 23 °C"]) == ({}, ())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *["Rail temperature measured", "Current rail temp.", "railTemp", "Schienentemperatur gemessen"],
+        *["Temperatur der Schiene", "Skinnetemperatur", "Température du rail", "Teplota kolejnice"],
+        *["Temperatura szyny"],
+        *["Rail temperature (start)", "Mean rail temperature", "Rail temperature [°C]", "rail_temperature_celsius"],
+    ],
+)
+def test_a_temperature_of_the_rail_in_other_words_is_still_read(name, tmp_path):
+    assert read_with(tmp_path, "csv", {}, [f"{name}: 23 °C"]) == ({"rail_temperature": 23.0}, ())
+
+
+@pytest.mark.parametrize(
+    "line", ["Rotational speed: 1500 rpm", "Recording speed: 1x", "CPU speed: 3 GHz", "Baud speed: 9600"]
+)
+def test_the_speed_of_a_device_is_no_lost_condition(line, tmp_path):
+    assert "condition_lost" not in [error.reason for error in read_with(tmp_path, "csv", {}, [line])[1]]
+
+
+@pytest.mark.parametrize("line", ["Train speed: 80", "Geschwindigkeit: 80", "Speed of passing: 80 km/h"])
+def test_the_speed_of_a_train_under_another_name_is_a_remark(line, tmp_path):
+    assert [error.reason for error in read_with(tmp_path, "csv", {}, [line])[1]] == ["condition_lost"]
