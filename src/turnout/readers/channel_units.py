@@ -5,7 +5,9 @@ import re
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.inversions import INVERSION
 from turnout.readers.lazy import Column
+from turnout.readers.rate_units import words_of
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
 from turnout.readers.stated_sensitivities import sensitivity_problem
@@ -85,7 +87,10 @@ def undecided_error(record: RawRecord, index: int, place: str, source: Source) -
         About a scale that may be applied already, or about two units that contradict each other.
     """
     if statement := record.undecided.get(index):
-        return source.error(place, statement, _scale_remedy(record.units[index]), reason="scale_unknown")
+        remedy = _scale_remedy(record.units[index])
+        if any(map(INVERSION.fullmatch, words_of(statement))):
+            remedy = f"{remedy}; if the entry means something else, name it there, 'checked_entries'"
+        return source.error(place, statement, remedy, reason="scale_unknown")
     if statement := record.unit_conflicts.get(index):
         return source.error(place, statement, FIND_OUT, reason="scale_unknown")
     return None

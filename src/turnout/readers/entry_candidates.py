@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
-from turnout.readers.inversions import is_half_turn, speaks_of_inversion
+from turnout.readers.inversions import REVERSED, UNCLEAR, is_half_turn, sign_in_text, stated_sign
 from turnout.readers.metadata_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.precision import Interval, readings
@@ -21,8 +21,10 @@ from turnout.readers.rate_statements import USUAL_RATES, statements_of_value
 from turnout.readers.rate_units import CYRILLIC, SECONDS, RateUnit, rate_unit, words_of
 from turnout.readers.rate_vocabulary import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
 from turnout.readers.scale_vocabulary import (
+    INVERSIONS,
     LEVELS,
     is_fill_name,
+    is_other_sign,
     is_ratio_of_drawing,
     is_scale_name,
     plain_word,
@@ -171,10 +173,14 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 
 def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     """Candidates of an entry or of a named piece of a text, by what its name explains."""
-    if name in SIMULATED_CONDITIONS:
+    if name in SIMULATED_CONDITIONS or is_other_sign(name):
         return
     if is_half_turn(name, text):
         yield Candidate(SCALE, text[:MAX_SIZE])
+        return
+    if scale_meaning(name) == INVERSIONS:
+        if stated_sign(name, text) == UNCLEAR:
+            yield Candidate(SCALE, text[:MAX_SIZE], True)
         return
     subject = STRONG if explained_subject(group) == STRONG else explained_subject(name)
     if subject == STRONG:
@@ -337,8 +343,11 @@ def _of_state(name: str, text: str) -> Iterator[Candidate]:
         pattern = CONVERTED if is_denied else CHANGED
         is_changed = any(map(pattern.fullmatch, names))
     else:
-        is_changed = any(map(CHANGED.fullmatch, words)) or speaks_of_inversion(text)
+        sign = sign_in_text(text)
+        is_changed = any(map(CHANGED.fullmatch, words)) or sign == REVERSED
         is_changed = is_changed and not is_denied and len(words) <= MAX_WORDS
+        if sign == UNCLEAR and not is_changed and len(words) <= MAX_WORDS:
+            yield Candidate(SCALE, text[:MAX_SIZE], True)
     if is_changed:
         yield Candidate(SCALE, text[:MAX_SIZE])
 

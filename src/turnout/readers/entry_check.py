@@ -16,6 +16,7 @@ from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
 from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_scales import without_checked_signs
 from turnout.readers.stated_sensitivities import uncompared_sensitivities
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import with_stated_units
@@ -85,6 +86,9 @@ class EntryCheck:
         """
         if not self.checked:
             return record
+        undecided = {i: without_checked_signs(text, self.checked) for i, text in record.undecided.items()}
+        if undecided != dict(record.undecided):
+            record = replace(record, undecided={i: text for i, text in undecided.items() if text})
         entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self.checked)
         if len(entries) == len(record.entries):
             return record

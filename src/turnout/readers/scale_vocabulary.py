@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from turnout.readers.inversions import INVERSION, leaves_sign
+from turnout.readers.inversions import INVERSION, REVERSED, SIGN, stated_sign
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.rate_units import rate_unit, words_of
 
@@ -54,6 +54,7 @@ POSSIBLE_OFFSET = re.compile(
     r"|intercept$|^tar[ae]$|^zero$|nullabgleich|nullpunkt|nullwert"
 )
 STEPS_OF_CONVERTER = re.compile(r"bits?|counts?|lsb|digits?|codes?|quant\w*|eu|unit|div")
+NO_SIGN = re.compile(r"off|convention|road|traffic|signals?|call|speed|warning|stop")  # beside "sign"
 LEVEL = re.compile(r"dampfung|correct|korrekt|correz")  # a scale if its value is a level in dB
 CORRECTION = re.compile(r"correct|korrekt|correz")
 PREFIX = re.compile(r"(?:unit|einheit\w*|si)?(?:prefix|vorsatz|prefixe|prefisso|prefijo|praefiks)")
@@ -184,6 +185,8 @@ def scale_meaning(name: str) -> str:
     if any(word in ("file", "name") for word in words) or (SCREEN_SCALE <= set(words) or "horizontal" in words):
         return ""
     for pattern, meaning in ((INVERSION, INVERSIONS), (PREFIX, PREFIXES), (EXPONENT, EXPONENTS)):
+        if meaning == INVERSIONS and is_other_sign(name):
+            continue
         if any(pattern.fullmatch(w) for w in (*words, "".join(words))):
             return meaning
     is_factor = word in CALIBRATION_WORDS or any(POSSIBLE_FACTOR.search(word) for word in words)
@@ -195,6 +198,27 @@ def scale_meaning(name: str) -> str:
     if is_offset:
         return POSSIBLY_OFFSET
     return LEVELS if any(LEVEL.search(word) for word in words) else ""
+
+
+def is_other_sign(name: str) -> bool:
+    """Whether a name speaks of a signature, a convention or something beside the track, and not of a polarity.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_other_sign(name) for name in ("Sign-off", "Sign convention", "Road sign", "Sign")]
+    [True, True, True, False]
+    """
+    words = words_of(name)
+    return any(map(SIGN.fullmatch, words)) and any(map(NO_SIGN.fullmatch, words))
 
 
 def _is_conversion(words: tuple[str, ...]) -> bool:
@@ -299,7 +323,7 @@ def is_fill_name(name: str) -> bool:
     return plain_word(name) in FILL_WORDS
 
 
-def value_of_word(meaning: str, value: object) -> float | None:
+def value_of_word(meaning: str, value: object, name: str = "") -> float | None:
     """The factor that a text stands for under a name of an inversion, a prefix or an exponent.
 
     Parameters
@@ -308,23 +332,25 @@ def value_of_word(meaning: str, value: object) -> float | None:
         As ``scale_meaning`` returns it.
     value : object
         Value of the entry.
+    name : str
+        Its name.
 
     Returns
     -------
     float or None
-        1 for a value that changes nothing; -1 for any other under a name of an inversion, 1 for one that is not
-        understood under that of a prefix or an exponent; None for any other meaning of scale.
+        1 for a value that changes nothing or is not understood; -1 for one of an inversion; None for any other meaning
+        of scale.
 
     Examples
     --------
     >>> [value_of_word("inversion", value) for value in ("Verpolt", "nicht invertiert", "rail", 0)]
-    [-1.0, 1.0, -1.0, 1.0]
+    [-1.0, 1.0, 1.0, 1.0]
     >>> value_of_word("prefix", "k"), value_of_word("exponent", -3)
     (1000.0, 0.001)
     """
     text = str(value.decode("utf-8", "replace") if isinstance(value, bytes) else value).strip()
     if meaning == INVERSIONS:
-        return 1.0 if leaves_sign(text) else -1.0
+        return -1.0 if stated_sign(name or "polarity", text) == REVERSED else 1.0
     if meaning == PREFIXES:
         return 1e6 if text == "M" else PREFIX_VALUES.get(text.casefold().replace("\u03bc", "µ"), 1.0)
     if meaning == LEVELS:

@@ -18,6 +18,7 @@ from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.rate_statements import PLACEHOLDERS
 from turnout.readers.scale_vocabulary import (
     FACTOR,
+    INVERSIONS,
     NEUTRAL,
     OFFSET,
     POLYNOMIAL,
@@ -68,8 +69,8 @@ def scale_statements(facts: Mapping[str, Any], n_channel: int = 1) -> tuple[str,
     Returns
     -------
     tuple of str
-        Text for each channel, as in "gain = 0.4"; "" where nothing or a neutral scale is stated. A value that is not
-        understood is not neutral.
+        Text for each channel, as in "gain = 0.4"; "" where nothing or a neutral scale is stated. A factor or an
+        offset that is not understood is not neutral; a polarity is reversed only by a word or a number of an inversion.
 
     Examples
     --------
@@ -132,7 +133,7 @@ def _stated_by_channel(label: str, meaning: str, value: Any, n_channel: int) -> 
     if not meaning:
         return [[] for _ in range(n_channel)]
     neutral = NEUTRAL[meaning]
-    if (words := _words(value, meaning)) is not None:
+    if (words := _words(value, meaning, label)) is not None:
         stated = [f"{label} = {_value_text(v)}" if number != neutral else "" for v, number in words]
     else:
         values = _scale_values(value)
@@ -144,11 +145,12 @@ def _stated_by_channel(label: str, meaning: str, value: Any, n_channel: int) -> 
     return [list(filter(None, dict.fromkeys(stated))) for _ in range(n_channel)]
 
 
-def _words(value: Any, meaning: str) -> list[tuple[Any, float]] | None:
+def _words(value: Any, meaning: str, name: str) -> list[tuple[Any, float]] | None:
     """(value, factor) of each value under a name of an inversion, a prefix or an exponent; else None."""
     values = value.ravel().tolist() if isinstance(value, np.ndarray) else value
     values = values if isinstance(values, (list, tuple)) else [values]
-    pairs = [(v, value_of_word(meaning, v)) for v in values[:MAX_CHANNELS]]
+    values = [v for v in values[:MAX_CHANNELS] if isinstance(v, (str, bytes, int, float, np.number, np.bool_))]
+    pairs = [(v, value_of_word(meaning, v, name)) for v in values]
     return [(v, number) for v, number in pairs if number is not None] if pairs and pairs[0][1] is not None else None
 
 
@@ -363,3 +365,34 @@ def scale_problem(statement: str) -> str:
         The problem; "" for "".
     """
     return f"the file states {statement}, and nothing says whether its numbers already contain it" if statement else ""
+
+
+def without_checked_signs(problem: str, checked: Set[str]) -> str:
+    """A problem of ``scale_problem`` without the inversions that entries state which the layout declares checked.
+
+    Parameters
+    ----------
+    problem : str
+        As ``RawRecord.undecided`` has it.
+    checked : set of str
+        Names of the entries, in lower case.
+
+    Returns
+    -------
+    str
+        "" if nothing else is stated.
+
+    Examples
+    --------
+    >>> without_checked_signs(scale_problem("Polarity = 'rev', Gain = 10"), {"polarity", "gain"})
+    'the file states Gain = 10, and nothing says whether its numbers already contain it'
+    """
+    names = [name for name in checked if scale_meaning(name) == INVERSIONS]
+    if not names:
+        return problem
+    start, end = scale_problem("|").split("|")
+    label = "|".join(map(re.escape, names))
+    statement = rf"(?:[^,=]+ of )?(?:{label})(?: of [^,=]+)? = (?:'[^']*'|\"[^\"]*\"|[^\s,]+)(?:, |$)"
+    stated = problem.removeprefix(start).removesuffix(end)
+    rest = re.sub(rf"(?:^|(?<=, )){statement}", "", stated, flags=re.IGNORECASE).removesuffix(", ")
+    return problem if rest == stated else scale_problem(rest)

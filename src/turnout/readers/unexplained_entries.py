@@ -32,6 +32,7 @@ from turnout.readers.entry_candidates import (
 from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
+from turnout.readers.scale_vocabulary import INVERSIONS, scale_meaning
 from turnout.readers.stated_units import same_unit
 
 MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
@@ -128,7 +129,8 @@ def unexplained_entries(
             continue
         group = container_of(entry).rpartition("/")[2] if "/" in entry.place else ""
         texts = tuple(text[:MAX_TEXT] for text in _texts(entry.value, facts.n_sample))
-        texts = tuple(text for text in texts if text not in facts.names)  # ``stated_units`` compares these
+        if scale_meaning(entry.name) != INVERSIONS:
+            texts = tuple(text for text in texts if text not in facts.names)  # ``stated_units`` compares these
         if candidate := _unexplained_candidate(entry.name, group, texts, facts, are_units_certain):
             yield entry, candidate
 

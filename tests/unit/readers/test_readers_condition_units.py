@@ -135,7 +135,7 @@ OTHER_TEMPERATURES = [
     *["Rail temperature threshold", "Rail laying temperature", "Spannungsfreie Schienentemperatur"],
     *["Schienentemperatur Soll", "Rail temperature offset", "Rail temperature accuracy", "Rail temperature forecast"],
     *["Air conditioning temperature", "Calibration air temperature", "Lufttemperatur Labor"],
-    *["Rail temperature at laying", "Rail temperature (setpoint)"],
+    *["Rail temperature at laying", "Schienentemperatur (Soll)"],
 ]
 
 

@@ -1,5 +1,7 @@
 """Polarities and gains in words that no list has: they are reported, and those that change nothing are not."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from nptdms import ChannelObject, TdmsWriter
 
 from turnout.errors import ReadError
 from turnout.readers import read
-from turnout.readers.inversions import leaves_sign
+from turnout.readers.inversions import stated_sign
 from turnout.records import RawChannel, RawDescription
 
 RATE = 20000.0
@@ -35,13 +37,70 @@ def table(tmp_path, head):
 
 REVERSED = [
     *["minus", "opposite", "180", "180°", "-180 deg", "umgepolt", "verpolt", "négatif", "omvendt", "záporná", "ujemna"],
-    *["(-)", "N", "wahr", "vrai", "ano", "tak", "T", "Y", "enabled", "rail", "2", "obrnuto", "käännetty", "逆", "ters"],
+    *["(-)", "-", "-1", "−1", "reversed", "normal, flipped for rail", "vertauscht", "swapped (2024)", "gedreht"],
+]
+UNCLEAR = [
+    *["N", "wahr", "T", "Y", "enabled", "rail", "2", "obrnuto", "käännetty", "ters", "ISO", "see protocol"],
+    *["not normal", "nicht geprüft", "逆"],
 ]
 
 
 @pytest.mark.parametrize("value", REVERSED)
-def test_a_polarity_that_is_not_known_as_the_normal_one_is_reported(value, tmp_path):
+def test_a_polarity_with_a_word_or_number_of_an_inversion_is_refused(value, tmp_path):
     assert outcome(table(tmp_path, f"rail polarity: {value}"), tmp_path) == (0, ["scale_unknown"])
+
+
+@pytest.mark.parametrize("value", UNCLEAR)
+def test_a_polarity_that_is_not_understood_is_a_remark(value, tmp_path):
+    """Formerly, it was refused, as many that mean the normal polarity."""
+    assert outcome(table(tmp_path, f"rail polarity: {value}"), tmp_path) == (1, ["entry_unknown"])
+
+
+@pytest.mark.parametrize("value", ["yes", "1", "true", "ja", "wahr", "vrai", "ano", "tak", "T", "Y", "enabled", "2"])
+def test_a_channel_that_is_said_to_be_inverted_is_refused(value, tmp_path):
+    assert outcome(table(tmp_path, f"rail inverted: {value}"), tmp_path) == (0, ["scale_unknown"])
+
+
+@pytest.mark.parametrize("line", ["Polarity: minus", "Polarity: ISO", "Inverted: yes", "Polarity: -1", "Sign: -"])
+def test_a_polarity_that_the_layout_declares_checked_is_not_reported(line, tmp_path):
+    name = table(tmp_path, line)
+    checked = replace(IN_SI, checked_entries=(line.split(":")[0],))
+    result = read(name, tmp_path, checked)
+    assert len(result.recordings) == 1 and not result.errors
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *["Sign: JH", "Sign: N", "Sign: KN", "Segno: A", "Signo: A", "Sign-off: JH", "Sign convention: ISO 2041"],
+        *["Sign convention: up is positive", "Road sign: 12", "Call sign: OE3", "Signal sign: V2", "Sign: +"],
+        *["Note: polarity checked", "Note: polarity ok", "Polarität geprüft", "Note: power supply polarity checked"],
+        *["Bemerkung: Polarität aller Kanäle kontrolliert", "Remark: all polarities verified before test"],
+        *["Phase A: 180", "Phase reference: 180", "Start phase: 180°", "Inverted: N", "Inverted: -"],
+    ],
+)
+def test_initials_and_checks_are_no_statement_about_the_sign(line, tmp_path):
+    assert outcome(table(tmp_path, line), tmp_path) == (1, [])
+
+
+@pytest.mark.parametrize("line", ["Note: Vorzeichen laut Anlage", "Remark: polarity ISO"])
+def test_a_note_about_a_polarity_that_is_not_understood_is_a_remark(line, tmp_path):
+    assert outcome(table(tmp_path, line), tmp_path) == (1, ["entry_unknown"])
+
+
+@pytest.mark.parametrize("name", ["polarity", "inverted", "sign", "invert"])
+@pytest.mark.parametrize("value", ["normal", "+", "no", False, [False, False], [b"normal", b"normal"]])
+def test_a_data_set_of_hdf5_about_the_polarity_is_read(name, value, tmp_path):
+    """Formerly, a file with one was always refused, for its attributes."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.attrs["fs"] = RATE
+        file["force"], file["rail"] = FORCE, RAIL
+        file[name] = value
+    assert outcome("a.h5", tmp_path) == (1, [])
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file.attrs["fs"] = RATE
+        file["force"], file["rail"], file[name] = FORCE, RAIL, "-1"
+    assert outcome("b.h5", tmp_path) == (0, ["scale_unknown"])
 
 
 @pytest.mark.parametrize(
@@ -59,6 +118,27 @@ def test_a_polarity_that_is_not_known_as_the_normal_one_is_reported(value, tmp_p
             "n/a",
             "unknown",
             "12.7",
+            "(+)",
+            "OK",
+            "checked",
+            "verified",
+            "Normal (not inverted)",
+            "normal / positive",
+            "norm",
+            "Std",
+            "as is",
+            "as standard",
+            "+Z",
+            "up",
+            "upwards",
+            "positive up",
+            "positive = up",
+            "compression positive",
+            "bipolar",
+            "unipolar",
+            "nicht umgekehrt",
+            "unverändert",
+            "tension negative, compression positive",
         ],
     ],
 )
@@ -94,8 +174,9 @@ def test_a_line_about_something_else_is_not_reported(line, tmp_path):
     assert outcome(table(tmp_path, line), tmp_path) == (1, [])
 
 
-@pytest.mark.parametrize("value", ["Minus", "opposite", "ano", -1.0, True])
-def test_a_polarity_in_tdms_and_hdf5_is_reported(value, tmp_path):
+@pytest.mark.parametrize(("value", "is_reversed"), [("Minus", True), ("opposite", True), (-1.0, True), (True, False)])
+def test_a_polarity_in_tdms_and_hdf5_is_reported(value, is_reversed, tmp_path):
+    """A flag says that a channel is inverted only under such a name."""
     step = {"wf_increment": 1.0 / RATE}
     with TdmsWriter(str(tmp_path / "a.tdms")) as file:
         rail = ChannelObject("g", "rail", RAIL, step | {"Polarity": value})
@@ -104,12 +185,15 @@ def test_a_polarity_in_tdms_and_hdf5_is_reported(value, tmp_path):
         file.attrs["fs"] = RATE
         file["force"], file["rail"] = FORCE, RAIL
         file["rail"].attrs["Inverted"] = value
-    assert outcome("a.tdms", tmp_path) == outcome("a.h5", tmp_path) == (0, ["scale_unknown"])
+    assert outcome("a.h5", tmp_path) == (0, ["scale_unknown"])
+    assert outcome("a.tdms", tmp_path) == ((0, ["scale_unknown"]) if is_reversed else (1, ["entry_unknown"]))
 
 
 def test_the_numbers_of_flags_channels_and_half_turns_are_not_neutral():
-    assert not any(map(leaves_sign, ("1", "-1", "2", "64", "180", "-180", "1.0")))
-    assert all(map(leaves_sign, ("0", "-0.0", "+1", "90.5", "25600", "-7")))
+    signs = [stated_sign("Inverted", text) for text in ("1", "-1", "2", "64", "180", "-180", "1.0")]
+    assert set(signs) == {-1.0}
+    assert {stated_sign("Inverted", text) for text in ("0", "-0.0", "+1e3", "90.5", "25600", "-7")} == {1.0}
+    assert [stated_sign("Polarity", text) for text in ("+1", "1", "-1", "180")] == [1.0, 0.0, -1.0, -1.0]
 
 
 @pytest.mark.parametrize(
