@@ -9,18 +9,20 @@ from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
 from turnout.readers.entries import COLON, FREE_TEXT, Entry, decoded_json, entries_of, entries_of_text
+from turnout.readers.entry_owners import container_of
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.rate_vocabulary import is_rate_name
-from turnout.readers.scale_vocabulary import is_of_drawing, is_scale_name
+from turnout.readers.scale_vocabulary import is_of_drawing, is_scale_name, plain_word
+from turnout.readers.source import CONDITIONS
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
-from turnout.readers.stated_sensitivities import is_sensitivity_name
+from turnout.readers.stated_sensitivities import SENSITIVITY, is_sensitivity_name
 from turnout.readers.time_texts import is_day, looks_dated
-from turnout.readers.unit_names import is_unit_name
+from turnout.readers.unit_names import UNIT_WORD, is_unit_name
 
 HEAD_LINE = re.compile(
     rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*(?:{COLON}|[=,;\t])\s*(.*)$"
@@ -55,7 +57,7 @@ def entries_of_lines(
         if not text or is_line_of_names(cells, names):
             continue
         if isinstance(mapping := decoded_json(text), Mapping):  # '# {"units": {"force": "kN"}}'
-            yield from entries_of(mapping, place)
+            yield from (e for e in entries_of(mapping, place) if not _is_of_condition(e))
             continue
         filled = cells if cells[0] else cells[1:]
         statements = [HEAD_LINE.match(cell) for cell in filled if re.search("[:=]", cell)]
@@ -99,6 +101,16 @@ def entries_of_lines(
         is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
         if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
+
+
+def _is_of_condition(entry: Entry) -> bool:
+    """Whether an entry is the value of a condition or the unit beside it, '"speed": {"value": 80, "unit": "km/h"}'."""
+    group = "_".join(words_of(container_of(entry).rpartition("/")[2])) if "/" in entry.place else ""
+    is_part = is_unit_name(entry.name) or entry.name.casefold() == "value"
+    return is_part and (group in CONDITIONS or group in OTHER_CONDITIONS)
+
+
+OTHER_CONDITIONS = frozenset("temperature temperatur geschwindigkeit vitesse hastighed humidity".split())
 
 
 def _ends_in_time(name: str) -> bool:
@@ -155,5 +167,6 @@ def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
     begin_with_number = {
         re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if not NO_VALUE.fullmatch(text)
     }
-    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0])
+    is_unit = any(map(UNIT_WORD.fullmatch, words_of(cells[0]))) and SENSITIVITY.search(plain_word(cells[0])) is not None
+    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0]) or is_unit
     return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1

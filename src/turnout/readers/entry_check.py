@@ -17,7 +17,7 @@ from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import without_checked_signs
-from turnout.readers.stated_sensitivities import uncompared_sensitivities
+from turnout.readers.stated_sensitivities import other_sensitivities, uncompared_sensitivities
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import with_stated_units
 from turnout.readers.stated_zones import OR
@@ -27,6 +27,8 @@ from turnout.readers.whole_numbers import converting_entries
 from turnout.records import RawDescription
 from turnout.units import IGNORED
 
+UNCOMPARED = "cannot be compared with the sensitivity of the layout"
+OTHER_SENSITIVITY = "names no channel and is not the sensitivity of the layout"
 MAX_LISTED = 5  # entries in one message
 MAX_NAMES = 40  # entries that the remedy names, so that one correction of the layout explains them
 MAX_PROBLEM = 200  # characters of all of them
@@ -173,12 +175,14 @@ class EntryCheck:
 
     def _sensitivity_errors(self, where: str, record: RawRecord) -> Iterator[ReadError]:
         """Remark on each entry about a sensitivity that cannot be compared with those of the layout."""
-        for entry in uncompared_sensitivities(record, self._channels):
+        uncompared = ((e, UNCOMPARED) for e in uncompared_sensitivities(record, self._channels))
+        others = ((e, OTHER_SENSITIVITY) for e in other_sensitivities(record, self._channels))
+        for entry, statement in (*uncompared, *others):
             text = text_of_value(entry.value)[:MAX_SHOWN]
             if (entry.name, text) in self._reported:
                 continue
             self._reported.add((entry.name, text))
-            problem = f"'{entry.name}: {text}' in {entry.place} cannot be compared with the sensitivity of the layout"
+            problem = f"'{entry.name}: {text}' in {entry.place} {statement}"
             remedy = (
                 "Compare it with 'sensitivity' and 'sensitivity_unit' of the layout; if they agree, name it there, "
                 f"'checked_entries: {entry.name}'"

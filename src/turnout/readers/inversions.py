@@ -21,9 +21,10 @@ CHANNELS_NAME = re.compile(r"channels?|kan[aea]+le?r?|voies?|sensors?|sensoren|k
 NEUTRAL_WORDS = frozenset(
     "normal normale normaal normalni normalny normalna norm standard std default regular regulier unchanged original "
     "correct unverandert uandret inchange inchangee positive positiv positif positivo positiva positief kladna kladny "
-    "dodatnia plus pos no nein non nej nee ne nie ei false falsch faux falso falsk nepravda falsz off aus arret "
-    "uit vypnuto wylaczone slukket ninguno fra apagado spento none keine kein aucun aucune ningun nessuno ingen zadna "
-    "zaden geen dodatni uninverted unflipped noninverted noninverting inphase up upward upwards bipolar unipolar".split()
+    "dodatnia dodatni plus pos no nein non nej nee ne nie ei false falsch faux falso falsk nepravda falsz off arret "
+    "aus uit vypnuto wylaczone slukket fra apagado spento none keine kein aucun aucune ningun ninguno nessuno ingen "
+    "zadna zaden geen uninverted unflipped noninverted noninverting inphase up upward upwards bipolar "
+    "unipolar".split()
 )
 CHECKED_WORDS = frozenset(
     "ok okay checked verified gepruft geprueft kontrolliert uberpruft kontrolleret verifie verifiee verifiees "

@@ -143,7 +143,20 @@ def sensitivity_problem(
     >>> bool(sensitivity_problem(stated, 35.3, "mV/g", "acceleration"))
     True
     """
-    entries = list(entries)
+    of_channel = _compared(list(entries), sensitivity, unit, quantity, names, index)
+    if any(agrees for agrees, _ in of_channel):
+        return ""
+    certain = [entry for _, entry in of_channel if _is_certain(entry, entries, names)]
+    if not certain:
+        return ""
+    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for entry in certain[:3]))
+    return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
+
+
+def _compared(
+    entries: Sequence[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str], index: int
+) -> list[tuple[bool, Entry]]:
+    """(whether it agrees, entry) of each sensitivity that can be compared: those of the channel, else all others."""
     compared = [
         (bool(owners), agrees, entry)
         for entry, owners, stated in _stated_of_channel(entries, names, index)
@@ -151,10 +164,41 @@ def sensitivity_problem(
         if (agrees := _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)) is not None
     ]
     of_channel = [statement for statement in compared if statement[0]] or compared
-    if not of_channel or any(agrees for _, agrees, _ in of_channel):
-        return ""
-    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for _, _, entry in of_channel[:3]))
-    return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
+    return [(agrees, entry) for _, agrees, entry in of_channel]
+
+
+def _is_certain(entry: Entry, entries: Iterable[Entry], names: Sequence[str]) -> bool:
+    """Whether a sensitivity stands under such a name or at a channel, and not in a free text of no channel."""
+    if is_sensitivity_name(entry.name) or named_channels(str(entry.value), names):
+        return True
+    return bool(owners_of(entry, list(entries), names))
+
+
+def other_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[Entry]:
+    """Entries of free text that state another sensitivity than the layout and name no channel.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    channels : sequence of RawChannel
+        Channels of the layout; only those with a sensitivity count, and whose unit does not end with "!".
+
+    Yields
+    ------
+    Entry
+        None if another entry states the sensitivity of the layout.
+    """
+    if not states_sensitivity(record.entries):
+        return
+    for channel in channels:
+        row = None if (channel.unit or "").endswith("!") or not channel.sensitivity else _row_of(record, channel)
+        if row is None:
+            continue
+        in_layout = channel.sensitivity or 1.0, channel.sensitivity_unit or "", channel.quantity
+        compared = _compared(record.entries, *in_layout, record.names, row)
+        if compared and not any(agrees for agrees, _ in compared):
+            yield from (e for _, e in compared if not _is_certain(e, record.entries, record.names))
 
 
 def uncompared_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[Entry]:
@@ -183,9 +227,27 @@ def uncompared_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) 
             if is_overruled or any(_is_compared(x, unit, channel, bool(owners), entry) for x, unit in stated):
                 compared.add(id(entry))
             elif owners or (is_sensitivity_name(entry.name) and _is_general(entry.name, channel.quantity)):
+                if not _may_be_sensitivity(entry, stated):
+                    continue
                 is_other = any(_sensitivity_scale(quantity, x, unit) for x, unit in stated for quantity in SENSOR_WORDS)
                 unclear |= {} if is_other and not owners else {id(entry): entry}
     yield from (entry for key, entry in unclear.items() if key not in compared)
+
+
+# What is said about a sensitivity beside its value.
+ABOUT_SENSITIVITY = re.compile(r"check|valid|drift|calibrated|kalibriert|gepruft")
+
+
+def _may_be_sensitivity(entry: Entry, stated: Sequence[tuple[float, str]]) -> bool:
+    """Whether the value of an entry under the name of a sensitivity may be one: it has a digit, and is no gain of 1."""
+    if not re.search(r"\d", str(entry.value)):
+        return False  # "see certificate"
+    if ABOUT_SENSITIVITY.search(plain_word(entry.name)) and not any(unit for _, unit in stated):
+        return False
+    return not (GAIN_OF_ONE.fullmatch(str(entry.value).strip()))
+
+
+GAIN_OF_ONE = re.compile(r"(?:1(?:[.,]0+)?\s?V|1000(?:[.,]0+)?\s?mV)\s?/\s?(?:V|EU|units?)", re.IGNORECASE)
 
 
 def _is_compared(number: float, unit: str, channel: RawChannel, is_own: bool, entry: Entry) -> bool:
@@ -232,10 +294,14 @@ def _stated_of_channel(
         owners = owners_of(entry, entries, names)
         if not owners and not is_named:
             owners = named_channels(entry.value, names)
-        if isinstance(entry.value, list) and len(entry.value) == len(names) > 1:  # one for each channel
+        is_list = isinstance(entry.value, list) and len(entry.value) == len(names) > 1
+        unit = _unit_in_list(entry, entries, index) if is_list else ""
+        if is_list:  # one for each channel
             entry, owners = replace(entry, value=entry.value[index]), frozenset((index,))
+        if not owners and _is_of_other_sensor(entry, is_named):
+            continue
         if not owners or index in owners:
-            yield entry, owners, _sensitivities(entry, entries)
+            yield entry, owners, [(number, own or unit) for number, own in _sensitivities(entry, entries)]
 
 
 def _ratios_beside(entry: Entry) -> tuple[tuple[float, str], ...]:
@@ -295,6 +361,30 @@ def _sensitivities(entry: Entry, entries: Sequence[Entry]) -> list[tuple[float, 
         return [(parts[0], parts[1])] if parts[0] else []
     numbers = finite_numbers(entry.value)
     return [] if numbers is None else [(float(x), unit) for x in numbers if x]
+
+
+# A sensor that does not measure here, and, in a free text, a sensitivity that is none of a certificate.
+UNUSED = re.compile(
+    r"\b(?:spare|former(?:ly)?|old|not (?:used|connected)|unused|reserve|ersatz|nicht (?:benutzt|verwendet))\b"
+)
+NOMINAL = re.compile(r"\b(?:nominal|alt|alter|altes|nenn|available)\b")
+
+
+def _is_of_other_sensor(entry: Entry, is_named: bool) -> bool:
+    """Whether the words of an entry of no channel say that its sensitivity is of a sensor that is not in use."""
+    words = spaced_words(f"{entry.name} {entry.value}")
+    return UNUSED.search(words) is not None or (not is_named and NOMINAL.search(words) is not None)
+
+
+def _unit_in_list(entry: Entry, entries: Sequence[Entry], index: int) -> str:
+    """The unit of a channel in a row "Sensitivity unit" beside the row of the sensitivities; "" without one."""
+    wanted = set(spaced_words(entry.name).split())
+    for other in entries:
+        words = spaced_words(other.name)
+        is_of_unit = wanted < set(words.split()) and re.search(r"unit|einheit", words) is not None
+        if is_of_unit and isinstance(other.value, list) and len(other.value) == len(entry.value):
+            return str(other.value[index]).strip()
+    return ""
 
 
 def _unit_beside(entry: Entry, entries: Sequence[Entry]) -> str:

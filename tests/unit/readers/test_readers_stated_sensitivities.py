@@ -1,5 +1,7 @@
 """Sensitivities that a file states beside other words: compared with the layout, or reported, never passed over."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -73,10 +75,67 @@ def test_its_name_may_be_any(name, tmp_path):
     assert outcome(head, tmp_path, layout(10.0, "mV/g")) == (0, ["scale_unknown"])
 
 
-@pytest.mark.parametrize("text", ["rail 100 mV/g", "Wilcoxon 736 S/N 4711, 100 mV/g", "neuer Sensor mit 100 mV/g"])
-def test_a_line_of_free_text_may_state_it(text, tmp_path):
+@pytest.mark.parametrize(
+    "text", ["rail 100 mV/g", "Sensor rail: Wilcoxon 736, 100 mV/g", "Sensitivity: 100 mV/g (nominal)"]
+)
+def test_a_text_at_a_channel_may_state_it(text, tmp_path):
     assert outcome(table(tmp_path, text), tmp_path, layout(100.0, "mV/g"))[0] == 1
     assert outcome(table(tmp_path, text), tmp_path, layout(1.0)) == (0, ["scale_unknown"])
+
+
+@pytest.mark.parametrize("text", ["Wilcoxon 736 S/N 4711, 100 mV/g", "neuer Sensor mit 100 mV/g", "Sensor: 100 mV/g"])
+def test_a_free_text_without_a_channel_is_a_remark(text, tmp_path):
+    assert outcome(table(tmp_path, text), tmp_path, layout(100.0, "mV/g")) == (1, [])
+    name = table(tmp_path, text)
+    assert outcome(name, tmp_path, layout(1.0)) == (1, ["entry_unknown"])
+    checked = replace(layout(1.0), checked_entries=(text.partition(":")[0], "text"))
+    assert outcome(name, tmp_path, checked) == (1, [])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *["# Spare sensor: PCB 353B03, 10 mV/g", "# Ch4 sensitivity: 500 mV/g (not used)"],
+        *["Hammer: 086D20 (nominal 2 mV/N)", "Sensitivity rail: see layout", "Sensitivity: ok", "Sensitivity: nominal"],
+        *[
+            "Sensitivity: 1 V/V",
+            "Sensitivity: 1000 mV/EU",
+            "Sensitivity check: 13.05.2024",
+            "Sensitivity drift: < 0.5 %",
+        ],
+        *["Sensitivity calibrated: yes", "Sensitivity valid: 2025", "Sensitivity rail: high"],
+    ],
+)
+def test_what_is_said_about_other_sensors_and_gains_is_not_reported(text, tmp_path):
+    assert outcome(table(tmp_path, text), tmp_path, layout(100.0, "mV/g")) == (1, [])
+
+
+def test_a_sensor_that_is_not_in_use_refuses_no_file(tmp_path):
+    assert outcome(table(tmp_path, "# Former sensor: 500 mV/g"), tmp_path, layout(100.0, "mV/g"))[0] == 1
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        "Sensitivity;1;100\nSensitivity unit;mV/N;mV/g",
+        "Sensitivity unit;mV/N;mV/g\nSensitivity;1;100",
+        "Empfindlichkeit;1,0;100,0\nEinheit Empfindlichkeit;mV/N;mV/g",
+        "Sensitivity;1 mV/N;100 mV/g",
+    ],
+)
+def test_rows_of_sensitivities_and_their_units_are_those_of_the_columns(rows, tmp_path):
+    """Formerly, the units of the sensitivities were taken as those of the channels."""
+    name = table(tmp_path, rows)
+    assert outcome(name, tmp_path, layout(100.0, "mV/g")) == (1, [])
+    assert outcome(name, tmp_path, layout(100.0 / GRAVITY)) == (1, [])
+    assert outcome(name, tmp_path, layout(35.0, "mV/g")) == (0, ["scale_unknown"])
+
+
+def test_a_unit_beside_a_condition_is_none_of_a_channel(tmp_path):
+    head = '# {"temperature": {"value": 12.5, "unit": "°C"}, "speed": {"value": 80, "unit": "km/h"}}'
+    assert outcome(table(tmp_path, head), tmp_path, layout(100.0, "mV/g")) == (1, [])
+    of_channel = '# {"rail": {"unit": "km/h"}}'
+    assert outcome(table(tmp_path, of_channel), tmp_path, layout(100.0, "mV/g")) == (0, ["unit_unknown"])
 
 
 def test_the_sensitivity_of_the_channel_itself_counts_more_than_one_of_no_channel(tmp_path):
@@ -84,7 +143,7 @@ def test_the_sensitivity_of_the_channel_itself_counts_more_than_one_of_no_channe
     assert outcome(name, tmp_path, layout(1.0)) == (0, ["scale_unknown"])
 
 
-@pytest.mark.parametrize("value", ["see certificate", "hundred mV/g", "g/100 mV", "98 pC/g", "high"])
+@pytest.mark.parametrize("value", ["g/100 mV", "98 pC/g", "100 of the old unit"])
 @pytest.mark.parametrize("name", ["Sensitivity rail", "Empfindlichkeit rail", "Citlivost rail"])
 def test_one_that_cannot_be_compared_is_reported(name, value, tmp_path):
     head = table(tmp_path, f"{name}: {value}")
