@@ -31,6 +31,7 @@ from turnout.readers.start_times import check_order, is_plausible, start_errors,
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements, is_count_or_time
+from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
 MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
@@ -132,7 +133,11 @@ def convert_records(
     stated = [entry_check.without_checked(r) if isinstance(r, RawRecord) else r for r in raw.records]
     errors.extend(lost_entry_errors(stated, source))
     unread = {k: r.unread_start for k, r in enumerate(raw.records) if isinstance(r, RawRecord) and r.unread_start}
-    unread = {k: text for k, text in unread.items() if not entry_check.is_checked(text)}
+    unread = {
+        k: text
+        for k, text in unread.items()
+        if not entry_check.is_checked(text) and not is_of_other_day(text, source.name)
+    }
     kept = [(k, stamp) for k, stamp in stamps if k not in order_errors]
     errors.extend(start_errors(kept, unread, description.time_zone, source))
     errors.extend(zone_errors(stated, description.time_zone, source))

@@ -8,7 +8,7 @@ from turnout.errors import ReadError
 from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.stated_starts import OTHER
+from turnout.readers.stated_starts import DATE_WORD, OTHER, TIME_WORD, is_start_name
 
 YEAR = r"(?:19|20)\d{2}"
 DATE = (
@@ -23,6 +23,23 @@ MOMENT = re.compile(
 DAY_ALONE, CLOCK_ALONE = (
     re.compile(DATE),
     re.compile(rf"{CLOCK}(?:\s?m\s?\d{{2}}\s?s?)?(?:[.,]\d+)?(?:\s?(?:[AaPp][Mm]|Uhr|h))?"),
+)
+# Whole words for events that are no start, beside those of ``stated_starts``, without accents.
+OTHER_EVENT = re.compile(
+    r"generated|output|diadem|written|report(?:ed)?|processed|evaluated|filtered|sent|received|downloaded|transferred"
+    r"|approved|reviewed|verified|inspected|checked|gepruft|geprueft|geandert|geaendert|bearbeitet|ausgegeben|ausgewertet"
+    r"|stand|eksporteret|[ae]?ndret|aendret|\u00e6ndret|oprettet|hentet|verifiee?|built|baujahr|weld(?:ed|ing)?|laid|glued"
+    r"|commissioned|delivered|zero(?:ed)?|tared?|balanced|nullabgleich|boot(?:ed)?|power|uptime|possession|closure"
+    r"|sperrpause|shift|schicht|arbeitszeit|licen[sc]e|lizenz|copyright|battery|batterie|akku|cal|forecast|weather|wetter"
+    r"|inventarisiert|inventory|drawing|part"
+)
+# Names of a date and of a time of day in other languages, beside those of ``stated_starts``.
+DAY_WORD = re.compile(r"day|tag|dag|jour|giorno|dia|data|den|dzien|paiva\w*|pvm|tarih|nap|measured|gemessen|taken")
+CLOCK_WORD = re.compile(r"saat|saa|kello\w*|aika|ido|kl|um|at|gmt|utc")
+YEAR_OF_FOUR_DIGITS = re.compile(rf"(?<!\d){YEAR}(?!\d)")
+DAY_IN_NAME = re.compile(rf"(?<!\d)({YEAR})([-_.]?)(0[1-9]|1[0-2])\2(0[1-9]|[12]\d|3[01])(?!\d)")
+DAY_IN_TEXT = re.compile(
+    rf"(?<!\d)(?:({YEAR})[-./]?\s?(\d{{1,2}})[-./]?\s?(\d{{1,2}})|(\d{{1,2}})[-./]\s?(\d{{1,2}})[-./]\s?({YEAR}))"
 )
 MAX_TEXT = 200  # characters of a text that is searched
 MAX_SHOWN = 60  # characters of an entry in the message
@@ -63,13 +80,15 @@ def possible_start(record: RawRecord) -> str:
     Returns
     -------
     str
-        Name and value of the first with a date and a time of day, else of two of which one is a date and one a time of
-        day; "" if each is about another event, such as an export, a calibration or the end.
+        Name and value of the first with a date and a time of day, else of two of which one is called a date and one a
+        time of day; "" if each is about another event, such as an export, a calibration or the end.
     """
     entries = [e for e in record.entries if isinstance(e.value, str) and not e.is_piece and not _is_of_other(e.name)]
     if moment := next(_moments(entries), ""):
         return moment
-    days = [entry for entry in entries if DAY_ALONE.fullmatch(entry.value.strip())]
+    dated = [e for e in entries if _is_named(e.name, DATE_WORD, DAY_WORD) and YEAR_OF_FOUR_DIGITS.search(e.value)]
+    days = [entry for entry in dated if DAY_ALONE.fullmatch(entry.value.strip())]
+    entries = [e for e in entries if _is_named(e.name, TIME_WORD, CLOCK_WORD)]
     clocks = [e for e in entries if CLOCK_ALONE.fullmatch(e.value.strip()) and not DAY_ALONE.fullmatch(e.value.strip())]
     clocks = clocks or [e for e in days[1:] if CLOCK_ALONE.fullmatch(e.value.strip())]
     return f"{_quotation(days[0])}; {_quotation(clocks[0])}" if days and clocks else ""
@@ -89,4 +108,44 @@ def _quotation(entry: Entry) -> str:
 
 
 def _is_of_other(text: str) -> bool:
-    return any(OTHER.search(word) for word in words_of(text))
+    return any(OTHER.search(word) or OTHER_EVENT.fullmatch(word) for word in words_of(text))
+
+
+def _is_named(name: str, *patterns: re.Pattern[str]) -> bool:
+    return (
+        is_start_name(name)
+        or any(pattern.search(word) for pattern in patterns[:1] for word in words_of(name))
+        or any(pattern.fullmatch(word) for pattern in patterns[1:] for word in words_of(name))
+    )
+
+
+def is_of_other_day(text: str, file_name: str) -> bool:
+    """Whether a possible start is of another day than the name of its file, so that it is of another event.
+
+    Parameters
+    ----------
+    text : str
+        As ``possible_start`` returns it.
+    file_name : str
+        Name of the file, with its folders.
+
+    Returns
+    -------
+    bool
+        False if either has no day that can be read.
+
+    Examples
+    --------
+    >>> [is_of_other_day(text, "s1/2024-05-13/a.csv") for text in ("Glue: 12.05.2024 10:00", "Glue: 2024-05-13 10:00")]
+    [True, False]
+    """
+    days = {(int(y), int(m), int(d)) for y, _, m, d in DAY_IN_NAME.findall(file_name)}
+    stated = set()
+    for y, m, d, first, second, year in DAY_IN_TEXT.findall(text):
+        stated |= (
+            {(int(y), int(m), int(d))}
+            if y
+            else {(int(year), int(second), int(first)), (int(year), int(first), int(second))}
+        )
+    name, mark, _ = text.partition(": ")
+    return bool(mark and days and stated) and not is_start_name(name) and days.isdisjoint(stated)

@@ -54,7 +54,7 @@ def test_day_and_time_of_day_in_other_languages_are_joined(head, tmp_path):
         *[
             "Ölçüm: 13.05.2024 14:05",
             "Mittaus alkoi 13.5.2024 14:05:30",
-            "Hubi: 2024-05-13\nSaa: 14:05:30",
+            "Päivä: 2024-05-13\nSaa: 14:05:30",
             "Sitzung 20240513_140530",
         ],
     ],
@@ -84,6 +84,51 @@ def test_an_entry_that_the_layout_declares_checked_is_no_start(tmp_path):
 )
 def test_the_time_of_another_event_is_not_reported(head, tmp_path):
     assert outcome(tmp_path, head) == (None, ())
+
+
+OTHER_EVENTS = [
+    *["Generated", "Output by DIAdem", "Written", "Report", "Processed", "Filtered", "Sent", "Received", "Downloaded"],
+    *[
+        "Transferred",
+        "Approved",
+        "Reviewed",
+        "Verified",
+        "Inspected",
+        "Geprüft",
+        "Geändert",
+        "Bearbeitet",
+        "Ausgegeben",
+    ],
+    *["Stand", "Eksporteret", "Ændret", "Oprettet", "Hentet", "Vérifié", "Built", "Baujahr", "Weld", "Rail laid"],
+    *["Commissioned", "Delivered", "Zero", "Tare", "Nullabgleich", "Boot", "Power on", "Possession", "Sperrpause"],
+    *["Shift", "License", "Copyright", "Battery", "TEDS cal"],
+]
+
+
+@pytest.mark.parametrize("name", OTHER_EVENTS)
+@pytest.mark.parametrize("mark", [": ", " "])
+def test_a_dated_event_that_is_no_start_is_not_reported(name, mark, tmp_path):
+    """Formerly, each of these was quoted as a start that cannot be read."""
+    assert outcome(tmp_path, f"{name}{mark}13.05.2024 14:05:30") == (None, ())
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *["Part: 12-05-20\nMast: 12:30", "Drawing: 12.05.2020\nShift: 06:00", "Inventory: 2019-05-12\nContact: 08:00"],
+        *["Lot: 2024-05-12\nMast: 12:30", "Datum: 12.05.20\nMast: 12:30"],
+    ],
+)
+def test_two_entries_are_a_start_only_if_they_are_called_date_and_time(head, tmp_path):
+    assert outcome(tmp_path, head)[0] is None and "Mast" not in str(outcome(tmp_path, head)[1])
+
+
+@pytest.mark.parametrize(("name", "n"), [("2024-05-14_a.csv", 0), ("2024-05-13_a.csv", 1), ("a.csv", 1)])
+def test_a_date_of_another_day_than_the_file_is_not_reported(name, n, tmp_path):
+    outcome(tmp_path, "Ölçüm: 13.05.2024 14:05")
+    (tmp_path / "a.csv").rename(tmp_path / name)
+    channels = RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="m/s²")
+    assert len(read(name, tmp_path, RawDescription(channels, rate=20000.0)).errors) == n
 
 
 def test_another_date_beside_a_start_is_not_reported(tmp_path):
