@@ -14,7 +14,15 @@ from fractions import Fraction
 from functools import lru_cache
 
 from turnout.readers.inversions import REVERSED, UNCLEAR, is_half_turn, sign_in_text, stated_sign
-from turnout.readers.metadata_subjects import LENGTH, NONE, STRONG, WEAK, explained_subject, subject_of
+from turnout.readers.metadata_subjects import (
+    LENGTH,
+    NONE,
+    SENSITIVITY_STEMS,
+    STRONG,
+    WEAK,
+    explained_subject,
+    subject_of,
+)
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_statements import USUAL_RATES, statements_of_value
@@ -173,7 +181,7 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 
 def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     """Candidates of an entry or of a named piece of a text, by what its name explains."""
-    if name in SIMULATED_CONDITIONS or is_other_sign(name):
+    if name in SIMULATED_CONDITIONS or is_other_sign(name) or _is_unit_of_sensitivity(name):
         return
     if is_half_turn(name, text):
         yield Candidate(SCALE, text[:MAX_SIZE])
@@ -189,6 +197,11 @@ def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     is_partly_other = STRONG in (subject_of(name), subject_of(group))
     for candidate in _of_value(name, text, subject):
         yield replace(candidate, is_weak=True) if is_partly_other else candidate
+
+
+def _is_unit_of_sensitivity(name: str) -> bool:
+    """Whether a name means the unit of a sensitivity, which is none of the samples."""
+    return any(map(UNIT_WORD.fullmatch, words_of(name))) and re.search(SENSITIVITY_STEMS, plain_word(name)) is not None
 
 
 def _of_other_subject(text: str) -> Iterator[Candidate]:

@@ -75,10 +75,12 @@ def stated_sign(name: str, text: str) -> float:
         return KEPT
     if plain == "-" or REVERSING_NUMBER.search(plain) or _is_reversed(plain):
         return REVERSED
+    if plain.startswith("+"):
+        return KEPT
     words = words_of(text)
     if is_inverted_name and (sign := _sign_under_inverted(plain, words, any(map(CHANNELS_NAME.fullmatch, names)))):
         return sign
-    if plain.startswith("+") or ((stated := number_and_unit(plain)) and (stated[0] == 0.0 or not _is_flag(stated[0]))):
+    if (stated := number_and_unit(plain)) and (stated[0] == 0.0 or not _is_flag(stated[0])):
         return KEPT
     is_only_sign = not any(INVERSION.fullmatch(w) and not SIGN.fullmatch(w) for w in names)
     if is_only_sign and not is_inverted_name:

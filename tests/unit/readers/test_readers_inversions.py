@@ -76,7 +76,7 @@ def test_a_polarity_that_the_layout_declares_checked_is_not_reported(line, tmp_p
         *["Sign convention: up is positive", "Road sign: 12", "Call sign: OE3", "Signal sign: V2", "Sign: +"],
         *["Note: polarity checked", "Note: polarity ok", "Polarität geprüft", "Note: power supply polarity checked"],
         *["Bemerkung: Polarität aller Kanäle kontrolliert", "Remark: all polarities verified before test"],
-        *["Phase A: 180", "Phase reference: 180", "Start phase: 180°", "Inverted: N", "Inverted: -"],
+        *["Phase A: 180", "Phase reference: 180", "Start phase: 180°", "Inverted: N", "Inverted: -", "Inverted: +1"],
     ],
 )
 def test_initials_and_checks_are_no_statement_about_the_sign(line, tmp_path):

@@ -117,6 +117,7 @@ def test_a_sensor_that_is_not_in_use_refuses_no_file(tmp_path):
 @pytest.mark.parametrize(
     "rows",
     [
+        "Sensitivity;1;10.197\nSensitivity unit;mV/N;mV/(m/s²)",
         "Sensitivity;1;100\nSensitivity unit;mV/N;mV/g",
         "Sensitivity unit;mV/N;mV/g\nSensitivity;1;100",
         "Empfindlichkeit;1,0;100,0\nEinheit Empfindlichkeit;mV/N;mV/g",
