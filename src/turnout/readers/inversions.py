@@ -32,15 +32,21 @@ CHECKED_WORDS = frozenset(
 )
 OTHER_POLARITY = frozenset("supply power battery trigger versorgung speisung alimentation plug stecker cable".split())
 REVERSING = re.compile(
-    r"inv|invert\w*|invers\w*|inverz\w*|neg\w*|rev|revers\w*|flip\w*|minus|opposite|umge\w*|verpolt|gedreht|vertauscht"
+    r"inv|invert\w*|invers\w*|inverz\w*|neg\w*|rev|revers\w*|flip\w*|minus|opposite|umge\w*|umkehr\w*|verpolt|gedreht|vertauscht"
     r"|omvendt|ompolet|zaporn\w*|ujemn\w*|swapped|odwroc\w*|obracen\w*"
 )
+PARTS = re.compile(r"[()\[\]/;,|:=.]|\b(?:but|sondern|mais|men)\b")
+NEGATIVE = re.compile(r"neg\w*|zaporn\w*|ujemn\w*|minus")
 CHANGED_SIGN = re.compile(r"anders|andere[rs]?|different|other|wrong|changed|geandert|verkehrt")  # in a free text
 REVERSING_NUMBER = re.compile(r"(?<![\w.,])(?:-\s?1|[+-]?180)(?:[.,]0+)?(?![.,]?\d)")
 AFFIRMATIONS = frozenset("true yes ja oui si ano tak wahr vrai vero y t j on enabled ein x".split())
-DENIALS = frozenset("not no non nicht keine kein ikke ej nej ne nie niet pas sans without in un never nie".split())
+DENIALS = frozenset(
+    "not no non nicht kein keine keiner ikke ej nej ne nie niet pas sans without never ohne uden aucun aucune ningun "
+    "ninguno nessuno nessuna ingen zadna zaden geen".split()
+)
+DOWN = frozenset("down downward downwards unten abwarts nedad".split())
 NO_VALUE = frozenset(("", "n/a", "n.a.", "na", "?", "unknown", "nan", "null", "undefined", "not set", "[]"))
-MAX_DENIED = 3  # words between a denial and what it denies
+MAX_DENIED = 2  # words between a denial and what it denies
 MAX_CHANNEL = 64  # a larger number is none of a channel
 HALF_TURN = 180.0  # degrees
 KEPT, REVERSED, UNCLEAR = 1.0, -1.0, 0.0
@@ -106,15 +112,16 @@ def _is_flag(number: float) -> bool:
 
 def _is_reversed(text: str) -> bool:
     """Whether a text has a word of an inversion without a denial before it, and none of the normal sign."""
-    is_reversed = False
-    for part in re.split(r"[()\[\]/;,|]", text):
-        words = words_of(part)
-        for i, word in enumerate(words):
-            if not REVERSING.fullmatch(word) or _is_denied(words, i):
-                continue
-            is_reversed = True
-    is_convention = bool({"positive", "positiv", "positif", "pos"} & set(words_of(text)))  # "tension negative"
-    return is_reversed and not is_convention
+    reversing = [
+        word
+        for part in PARTS.split(text)
+        for words in (words_of(part),)
+        for i, word in enumerate(words)
+        if REVERSING.fullmatch(word) and not _is_denied(words, i)
+    ]
+    if {"positive", "positiv", "positif", "pos"} & set(words_of(text)):  # "tension negative, compression positive"
+        reversing = [word for word in reversing if not NEGATIVE.fullmatch(word)]
+    return bool(reversing)
 
 
 def _is_denied(words: Sequence[str], i: int) -> bool:
@@ -144,11 +151,11 @@ def leaves_sign(text: str) -> bool:
         return True
     is_denied = any(REVERSING.fullmatch(w) and _is_denied(words, i) for i, w in enumerate(words))
     says_normal = any(
-        word in NEUTRAL_WORDS | CHECKED_WORDS and (word in DENIALS or not _is_denied(words, i))
+        word in NEUTRAL_WORDS | CHECKED_WORDS and (len(words) == 1 if word in DENIALS else not _is_denied(words, i))
         for i, word in enumerate(words)
     )
     is_not_normal = any(w in NEUTRAL_WORDS - DENIALS and _is_denied(words, i) for i, w in enumerate(words))
-    return is_denied or (says_normal and not is_not_normal)
+    return is_denied or (says_normal and not is_not_normal and DOWN.isdisjoint(words))
 
 
 PHASE = re.compile(

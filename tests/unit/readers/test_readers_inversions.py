@@ -38,10 +38,17 @@ def table(tmp_path, head):
 REVERSED = [
     *["minus", "opposite", "180", "180°", "-180 deg", "umgepolt", "verpolt", "négatif", "omvendt", "záporná", "ujemna"],
     *["(-)", "-", "-1", "−1", "reversed", "normal, flipped for rail", "vertauscht", "swapped (2024)", "gedreht"],
+    *[
+        "not as usual: inverted",
+        "not standard but inverted",
+        "in reverse",
+        "un canal inversé",
+        "inverted (positive = down)",
+    ],
 ]
 UNCLEAR = [
     *["N", "wahr", "T", "Y", "enabled", "rail", "2", "obrnuto", "käännetty", "ters", "ISO", "see protocol"],
-    *["not normal", "nicht geprüft", "逆"],
+    *["not normal", "nicht geprüft", "逆", "see protocol no. 5", "positive down", "ne normální"],
 ]
 
 
@@ -135,6 +142,9 @@ def test_a_data_set_of_hdf5_about_the_polarity_is_read(name, value, tmp_path):
             "positive = up",
             "compression positive",
             "bipolar",
+            "aucune inversion",
+            "keine Umkehrung",
+            "no phase inversion",
             "unipolar",
             "nicht umgekehrt",
             "unverändert",
