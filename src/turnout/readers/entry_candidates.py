@@ -181,6 +181,8 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
 
 def _of_entry(name: str, group: str, text: str) -> Iterator[Candidate]:
     """Candidates of an entry or of a named piece of a text, by what its name explains."""
+    if is_other_sign(name) and "convention" in words_of(name) and stated_sign("polarity", text) == REVERSED:
+        yield Candidate(SCALE, text[:MAX_SIZE], True)
     if name in SIMULATED_CONDITIONS or is_other_sign(name) or _is_unit_of_sensitivity(name):
         return
     if is_half_turn(name, text):

@@ -33,7 +33,7 @@ CHECKED_WORDS = frozenset(
 OTHER_POLARITY = frozenset("supply power battery trigger versorgung speisung alimentation plug stecker cable".split())
 REVERSING = re.compile(
     r"inv|invert\w*|invers\w*|inverz\w*|neg\w*|rev|revers\w*|flip\w*|minus|opposite|umge\w*|umkehr\w*|verpolt|gedreht|vertauscht"
-    r"|omvendt|ompolet|zaporn\w*|ujemn\w*|swapped|odwroc\w*|obracen\w*"
+    r"|przeciwn\w*|wrong|omvendt|ompolet|zaporn\w*|ujemn\w*|swapped|odwroc\w*|obracen\w*"
 )
 PARTS = re.compile(r"[()\[\]/;,|:=.]|\b(?:but|sondern|mais|men)\b")
 NEGATIVE = re.compile(r"neg\w*|zaporn\w*|ujemn\w*|minus")
@@ -44,7 +44,8 @@ DENIALS = frozenset(
     "not no non nicht kein keine keiner ikke ej nej ne nie niet pas sans without never ohne uden aucun aucune ningun "
     "ninguno nessuno nessuna ingen zadna zaden geen".split()
 )
-DOWN = frozenset("down downward downwards unten abwarts nedad".split())
+# A sign that is the normal one in some layouts only.
+DOWN = frozenset("down downward downwards unten abwarts nedad tension traction".split())
 NO_VALUE = frozenset(("", "n/a", "n.a.", "na", "?", "unknown", "nan", "null", "undefined", "not set", "[]"))
 MAX_DENIED = 2  # words between a denial and what it denies
 MAX_CHANNEL = 64  # a larger number is none of a channel
@@ -155,7 +156,7 @@ def leaves_sign(text: str) -> bool:
         for i, word in enumerate(words)
     )
     is_not_normal = any(w in NEUTRAL_WORDS - DENIALS and _is_denied(words, i) for i, w in enumerate(words))
-    return is_denied or (says_normal and not is_not_normal and DOWN.isdisjoint(words))
+    return is_denied or (says_normal and not is_not_normal and (DOWN.isdisjoint(words) or "compression" in words))
 
 
 PHASE = re.compile(

@@ -37,7 +37,18 @@ def table(tmp_path, head):
 
 REVERSED = [
     *["minus", "opposite", "180", "180°", "-180 deg", "umgepolt", "verpolt", "négatif", "omvendt", "záporná", "ujemna"],
-    *["(-)", "-", "-1", "−1", "reversed", "normal, flipped for rail", "vertauscht", "swapped (2024)", "gedreht"],
+    *[
+        "(-)",
+        "-",
+        "-1",
+        "−1",
+        "reversed",
+        "normal, flipped for rail",
+        "vertauscht",
+        "swapped (2024)",
+        "gedreht",
+        "przeciwna",
+    ],
     *[
         "not as usual: inverted",
         "not standard but inverted",
@@ -48,7 +59,7 @@ REVERSED = [
 ]
 UNCLEAR = [
     *["N", "wahr", "T", "Y", "enabled", "rail", "2", "obrnuto", "käännetty", "ters", "ISO", "see protocol"],
-    *["not normal", "nicht geprüft", "逆", "see protocol no. 5", "positive down", "ne normální"],
+    *["not normal", "nicht geprüft", "逆", "see protocol no. 5", "positive down", "tension positive", "ne normální"],
 ]
 
 
@@ -90,7 +101,9 @@ def test_initials_and_checks_are_no_statement_about_the_sign(line, tmp_path):
     assert outcome(table(tmp_path, line), tmp_path) == (1, [])
 
 
-@pytest.mark.parametrize("line", ["Note: Vorzeichen laut Anlage", "Remark: polarity ISO"])
+@pytest.mark.parametrize(
+    "line", ["Note: Vorzeichen laut Anlage", "Remark: polarity ISO", "Sign convention: compression negative"]
+)
 def test_a_note_about_a_polarity_that_is_not_understood_is_a_remark(line, tmp_path):
     assert outcome(table(tmp_path, line), tmp_path) == (1, ["entry_unknown"])
 
