@@ -143,7 +143,7 @@ def sensitivity_problem(
     >>> bool(sensitivity_problem(stated, 35.3, "mV/g", "acceleration"))
     True
     """
-    of_channel = _compared(list(entries), sensitivity, unit, quantity, names, index)
+    of_channel = _comparison(list(entries), sensitivity, unit, quantity, names, index)
     if any(agrees for agrees, _ in of_channel):
         return ""
     certain = [entry for _, entry in of_channel if _is_certain(entry, entries, names)]
@@ -153,7 +153,7 @@ def sensitivity_problem(
     return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
 
 
-def _compared(
+def _comparison(
     entries: Sequence[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str], index: int
 ) -> list[tuple[bool, Entry]]:
     """(whether it agrees, entry) of each sensitivity that can be compared: those of the channel, else all others."""
@@ -196,7 +196,7 @@ def other_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> It
         if row is None:
             continue
         in_layout = channel.sensitivity or 1.0, channel.sensitivity_unit or "", channel.quantity
-        compared = _compared(record.entries, *in_layout, record.names, row)
+        compared = _comparison(record.entries, *in_layout, record.names, row)
         if compared and not any(agrees for agrees, _ in compared):
             yield from (e for _, e in compared if not _is_certain(e, record.entries, record.names))
 

@@ -243,7 +243,7 @@ def zone_of(text: str) -> tzinfo | None:
         pass
     try:
         return ZoneInfo(text) if "/" in text else None
-    except (ValueError, OSError):
+    except (ValueError, OSError, KeyError):  # ZoneInfoNotFoundError is a KeyError
         return None
 
 

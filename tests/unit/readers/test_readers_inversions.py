@@ -64,7 +64,7 @@ UNCLEAR = [
 
 
 @pytest.mark.parametrize("value", REVERSED)
-def test_a_polarity_with_a_word_or_number_of_an_inversion_is_refused(value, tmp_path):
+def test_a_polarity_with_a_word_or_number_of_an_inversion_is_an_error(value, tmp_path):
     assert outcome(table(tmp_path, f"rail polarity: {value}"), tmp_path) == (0, ["scale_unknown"])
 
 
@@ -75,7 +75,7 @@ def test_a_polarity_that_is_not_understood_is_a_remark(value, tmp_path):
 
 
 @pytest.mark.parametrize("value", ["yes", "1", "true", "ja", "wahr", "vrai", "ano", "tak", "T", "Y", "enabled", "2"])
-def test_a_channel_that_is_said_to_be_inverted_is_refused(value, tmp_path):
+def test_a_channel_that_is_said_to_be_inverted_is_an_error(value, tmp_path):
     assert outcome(table(tmp_path, f"rail inverted: {value}"), tmp_path) == (0, ["scale_unknown"])
 
 

@@ -110,7 +110,7 @@ def test_what_is_said_about_other_sensors_and_gains_is_not_reported(text, tmp_pa
     assert outcome(table(tmp_path, text), tmp_path, layout(100.0, "mV/g")) == (1, [])
 
 
-def test_a_sensor_that_is_not_in_use_refuses_no_file(tmp_path):
+def test_a_sensor_that_is_not_in_use_costs_no_file(tmp_path):
     assert outcome(table(tmp_path, "# Former sensor: 500 mV/g"), tmp_path, layout(100.0, "mV/g"))[0] == 1
 
 

@@ -205,3 +205,8 @@ def test_a_month_of_another_language_in_a_universal_file_is_read():
     assert parse_uff_time("13-Mai-26 10:00:00") == datetime(2026, 5, 13, 10)
     assert parse_uff_time("13-Dez-25 10:00:00") == datetime(2025, 12, 13, 10)
     assert parse_uff_time("13-Foo-25 10:00:00") is None
+
+
+@pytest.mark.parametrize("text", ["Europa/Berlin", "Europe/Atlantis", "a/b", "../etc/passwd", "Europe/"])
+def test_a_zone_that_does_not_exist_is_none(text):
+    assert zone_of(text) is None
