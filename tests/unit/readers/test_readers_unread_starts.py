@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from turnout.readers import read
+from turnout.readers.stated_zones import zone_of
 from turnout.readers.time_texts import parse_uff_time
 from turnout.records import RawChannel, RawDescription
 
