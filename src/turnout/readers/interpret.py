@@ -3,7 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
@@ -23,14 +23,14 @@ from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import rate_remark, resolve
 from turnout.readers.rate_vocabulary import CERTAIN
-from turnout.readers.record_borders import border_errors
+from turnout.readers.record_borders import Measurement, border_errors
 from turnout.readers.repeated_blocks import repeated_block
 from turnout.readers.simultaneous_records import add_shared, shared_channels, simultaneous_errors
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.thousands_marks import mark_errors
-from turnout.readers.time_axes import all_statements, is_count_or_time
+from turnout.readers.time_axes import all_statements, has_time_in_seconds, is_count_or_time
 from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
@@ -267,7 +267,8 @@ class _Conversion:
         channel_maps = self.assignments.mappings(record, where)
         checked = self.entry_check.checked
         of_marks = list(mark_errors(record, _units_in_use(record, channel_maps, description), where, source))
-        of_borders = list(border_errors(record, sensor_rows, checked, rate, where, source))
+        measurement = _measurement(record, channel_maps, description.kind, rate, sensor_rows)
+        of_borders = list(border_errors(record, sensor_rows, checked, measurement, where, source))
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
         block_reader = BlockReader(record, channel_maps, where, source, source.state())
@@ -297,6 +298,16 @@ class _Conversion:
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+def _measurement(
+    record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float, measured: Set[int]
+) -> Measurement:
+    """The signals and the time axis of a record, which tell numbers of records from states and counts."""
+    used = [m for m in channel_maps if m.channel.quantity != "ignored"]
+    signals = [record.samples[m.index] for m in used if m.channel.quantity == "force"]
+    signals = signals or [record.samples[m.index] for m in used]
+    return Measurement(rate, kind, signals, has_time_in_seconds(record, measured))
 
 
 def _units_in_use(

@@ -218,6 +218,25 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         yield place, np.asarray(column[:], dtype=float) * float(scale), is_in_seconds, certainty
 
 
+def has_time_in_seconds(record: RawRecord, measured: Set[int]) -> bool:
+    """Whether a record has a time axis in a known unit; ``time_statements`` checks that it runs on evenly.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    measured : set of int
+        Columns that the layout assigns to a sensor: they are no time axes.
+
+    Returns
+    -------
+    bool
+    """
+    axes = [] if record.time is None else [_time_column(record)]
+    is_known = any(is_in_seconds for *_, is_in_seconds, _ in axes) or bool(record.clocks)
+    return is_known or any(is_in_seconds for *_, is_in_seconds, _ in _columns(record, measured))
+
+
 def is_count_or_time(column: Column) -> bool:
     """Whether a column rises evenly at its beginning and at its end, as times and counts do and no measured signal.
 

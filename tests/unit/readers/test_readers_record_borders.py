@@ -146,3 +146,118 @@ def test_texts_that_change_in_blocks_are_reported_and_flags_are_not(format, tmp_
         result = read(f"a.{format}", tmp_path, RawDescription(SENSORS, rate=RATE))
         assert len(result.recordings) == n_record and len(result.errors) == 1 - n_record
         assert n_record or "'qwxz' changes 2 times, from 0 to 2" in str(result.errors[0])
+
+
+# Columns of right files: one impact in the whole record, early in it.
+RATE_HIT, N_HIT = 2e4, 24000
+INDEX = np.arange(N_HIT)
+HIT = 4000.0 * np.exp(-(((INDEX - 300) / 8.0) ** 2)) + np.random.default_rng(5).normal(size=N_HIT)
+RINGING = 60.0 * np.exp(-np.maximum(INDEX - 300, 0) / 80.0) * np.sin(0.18 * INDEX) * (INDEX >= 300)
+
+
+def in_blocks(*numbers):
+    """Whole numbers in blocks of unequal lengths."""
+    lengths = [900 + 150 * i for i in range(len(numbers) - 1)]
+    return np.repeat(numbers, [*lengths, N_HIT - sum(lengths)])
+
+
+STATES = {
+    "Axles": in_blocks(0, 1, 2, 3), "Pulses": INDEX // 1000, "GPS fix": in_blocks(1, 2), "State": in_blocks(0, 1, 2, 3),
+    "Range": in_blocks(1, 2), "Packet": INDEX // 512, "n": INDEX % 20000, "Encoder": INDEX % 1024, "Angle": INDEX % 360,
+    "Count": (INDEX + 30000) % 2**15, "Status": np.repeat([0, 1], [11000, 13000]), "Temp": np.repeat([21, 22], 12000),
+    "Battery": in_blocks(87, 86), "Satellites": in_blocks(7, 8, 9), "RH": in_blocks(65, 66), "Minute": in_blocks(5, 6),
+    "Dir": np.repeat([-1, 1], 12000), "TTL": np.repeat([0, 1], 12000),
+}  # fmt: skip
+
+
+def outcome_of_hit(path, name, column, kind="hammer", force=HIT, unit="", with_time=False, layout=SENSORS):
+    """As ``outcome``, of a record with the given force."""
+    columns = {"time": INDEX / RATE_HIT} if with_time else {}
+    columns |= {"force": force, "rail": RINGING + 0.1 * HIT / 4000.0, name: column}
+    if path.suffix == ".csv":
+        head = ";".join({"time": "time [s]", name: f"{name} [{unit}]" if unit else name}.get(n, n) for n in columns)
+        rows = "".join(
+            ";".join(c if isinstance(c, str) else f"{c:.9g}" for c in row) + "\n" for row in zip(*columns.values())
+        )
+        path.write_text(f"{head}\n{rows}", encoding="utf-8")
+    elif path.suffix == ".parquet":
+        pq.write_table(pa.table(columns), path)
+    elif path.suffix == ".npz":
+        np.savez(path, **columns)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, columns)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for n, x in columns.items():
+                file[n] = x
+    else:
+        with nptdms.TdmsWriter(str(path)) as writer:
+            writer.write_segment([nptdms.ChannelObject("g", n, x) for n, x in columns.items()])
+    ignored = () if column.dtype.kind == "U" else (RawChannel("x", name, "ignored"),)
+    result = read(path.name, path.parent, RawDescription((*layout, *ignored), rate=RATE_HIT, kind=kind))
+    return len(result.recordings), [e.reason for e in result.errors]
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet", "npz", "mat", "h5", "tdms"])
+@pytest.mark.parametrize("name", STATES)
+def test_a_column_over_one_impact_numbers_no_records(format, name, tmp_path):
+    assert outcome_of_hit(tmp_path / f"a.{format}", name, STATES[name]) == (1, [])
+
+
+@pytest.mark.parametrize("with_time", [False, True])
+@pytest.mark.parametrize("unit", ["", "count", "-", "1", "bool"])
+@pytest.mark.parametrize("name", ["State", "Axles", "Packet"])
+def test_neither_unit_nor_time_axis_is_needed_over_one_impact(name, unit, with_time, tmp_path):
+    path = tmp_path / "a.csv"
+    assert outcome_of_hit(path, name, STATES[name], unit=unit, with_time=with_time) == (1, [])
+    layout = (RawChannel("force", "force", "ignored"), SENSORS[1])  # without a force the other sensors tell
+    assert outcome_of_hit(path, name, STATES[name], unit=unit, with_time=with_time, layout=layout) == (1, [])
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_a_column_that_counts_within_a_passage_does_not_cost_it(name, tmp_path):
+    noise = np.random.default_rng(6).normal(size=N_HIT)
+    assert outcome_of_hit(tmp_path / "a.csv", name, STATES[name], "passage", noise) == (1, [])
+
+
+@pytest.mark.parametrize("format", ["parquet", "npz"])
+@pytest.mark.parametrize("kind", ["hammer", "passage"])
+def test_states_in_words_do_not_cost_a_record(format, kind, tmp_path):
+    texts = np.repeat(["approach", "on", "off"], [8000, 7000, 9000])
+    assert outcome_of_hit(tmp_path / f"a.{format}", "phase", texts, kind) == (1, [])
+
+
+def test_numbers_of_passages_are_a_remark(tmp_path):
+    noise = np.random.default_rng(6).normal(size=N_HIT)
+    column = in_blocks(1, 2, 3)
+    assert outcome_of_hit(tmp_path / "a.csv", "qwxz", column, "passage", noise) == (1, ["entry_unknown"])
+
+
+LONG = (8200, 7600, 8200)
+THREE_HITS = np.concatenate([HIT[:n] * share for n, share in zip(LONG, (1.0, 0.4, 0.7))])
+
+
+@pytest.mark.parametrize("format", ["csv", "parquet", "npz", "mat", "h5", "tdms"])
+@pytest.mark.parametrize("name", ["qwxz", "shot", "Axles"])
+@pytest.mark.parametrize("column", [np.repeat([1, 2, 3], LONG), np.concatenate([np.arange(n) for n in LONG])])
+def test_three_impacts_that_a_column_numbers_are_an_error_under_any_name(format, name, column, tmp_path):
+    assert outcome_of_hit(tmp_path / f"a.{format}", name, column, force=THREE_HITS) == (0, ["wrong_length"])
+
+
+def test_records_of_a_power_of_two_are_told_from_a_counter_that_ends_by_their_impacts(tmp_path):
+    force = np.concatenate([HIT[:4096]] * 5 + [HIT[: N_HIT - 5 * 4096]])
+    assert outcome_of_hit(tmp_path / "a.csv", "n", INDEX % 4096, force=force) == (0, ["wrong_length"])
+    force = np.concatenate([HIT[:8192], HIT[: N_HIT - 8192]])  # a double hit
+    assert outcome_of_hit(tmp_path / "a.csv", "n", INDEX % 4096, force=force) == (1, ["entry_unknown"])
+
+
+def test_several_impacts_in_blocks_of_a_state_or_beside_a_running_time_are_a_remark(tmp_path):
+    column = np.repeat([1, 2, 3], LONG)
+    assert outcome_of_hit(tmp_path / "a.csv", "Status", column, force=THREE_HITS) == (1, ["entry_unknown"])
+    result = outcome_of_hit(tmp_path / "a.csv", "qwxz", column, force=THREE_HITS, with_time=True)
+    assert result == (1, ["entry_unknown"])
+
+
+def test_a_state_that_changes_within_the_impact_is_no_border_of_two(tmp_path):
+    column = np.repeat([1, 2], [300, N_HIT - 300])
+    assert outcome_of_hit(tmp_path / "a.csv", "qwxz", column) == (1, [])
