@@ -3,7 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
@@ -30,7 +30,7 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile,
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.thousands_marks import mark_errors
-from turnout.readers.time_axes import all_statements, has_time_in_seconds, is_count_or_time
+from turnout.readers.time_axes import all_statements, is_count_or_time
 from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
@@ -260,14 +260,14 @@ class _Conversion:
         if problem := unfilled_buffer(record, n_sample, self.n_record):
             raise source.error(where, problem, VALID_REMEDY, reason="wrong_length")
         sensor_rows = self.assignments.sensor_rows(record, where)
-        statements = all_statements(record, k, self.n_record, sensor_rows, where, source)
+        checked = self.entry_check.checked
+        statements = all_statements(record, k, self.n_record, sensor_rows, where, source, description.rate, checked)
         rate = resolve(statements, description.rate, where, source)
         if problem := delay_problem(record, sorted(sensor_rows), rate):
             raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
-        checked = self.entry_check.checked
         of_marks = list(mark_errors(record, _units_in_use(record, channel_maps, description), where, source))
-        measurement = _measurement(record, channel_maps, description.kind, rate, sensor_rows)
+        measurement = _measurement(record, channel_maps, description.kind, rate)
         of_borders = list(border_errors(record, sensor_rows, checked, measurement, where, source))
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
@@ -300,14 +300,12 @@ class _Conversion:
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
 
 
-def _measurement(
-    record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float, measured: Set[int]
-) -> Measurement:
-    """The signals and the time axis of a record, which tell numbers of records from states and counts."""
+def _measurement(record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float) -> Measurement:
+    """The signals of a record, which tell numbers of records from states and counts."""
     used = [m for m in channel_maps if m.channel.quantity != "ignored"]
     signals = [record.samples[m.index] for m in used if m.channel.quantity == "force"]
     signals = signals or [record.samples[m.index] for m in used]
-    return Measurement(rate, kind, signals, has_time_in_seconds(record, measured))
+    return Measurement(rate, kind, signals)
 
 
 def _units_in_use(

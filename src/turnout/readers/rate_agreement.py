@@ -174,7 +174,7 @@ def _check_axes(statements: Sequence[Statement], interval: Interval, where: str,
             problem += f"is {interval.rate:.9g} Hz in no unit"
             remedy = (
                 "Correct the rate in the layout; if the column is no time, give it the unit of its quantity in the "
-                "layout"
+                "layout, or name it under 'checked_entries'"
             )
             raise source.error(where, problem, remedy, reason="wrong_rate")
 

@@ -14,7 +14,7 @@ from turnout.readers.lazy import Column
 from turnout.readers.rate_statements import MIN_EPOCH, TIME_SCALES
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.time_axes import HEAD_SIZE, is_unit_of_no_time
+from turnout.readers.time_axes import HEAD_SIZE, has_time_in_seconds, is_unit_of_no_time
 
 MIN_BLOCK = 32  # samples: no record is shorter, and a state that changes faster numbers none
 MIN_COUNTING_SHARE = 0.9  # of the first steps of a counter are equal: the others are restarts
@@ -27,13 +27,13 @@ MIN_IMPACT_BLOCK_SHARE = 0.5  # of blocks of equal length have an impact if they
 MAX_STATES = 4  # different numbers of a flag
 # Units of counts and of flags, in lower case: they number something, and nothing says that it is the records.
 COUNT_UNITS = frozenset("count counts bool boolean ttl bit bits flag logic - 1 # digital".split())
-# Words for what a column states about the measurement, its surroundings or the time of day.
+# Words, without accents, for what a column states about the measurement, its surroundings or the time of day.
 STATE_WORDS = frozenset(
     """
-    state states status flag flags mode zustand etat état estado stato tilstand trigger trig ttl alarm
-    range gain bereich quality qualität event occupied overload ovl
-    temp temperature temperatur température temperatura tair trail humidity rh feuchte luftfeuchte luftfeuchtigkeit
-    weather wetter météo vejr rain regen wind pressure druck
+    state states status flag flags mode zustand etat estado stato tilstand trigger trig ttl alarm
+    range gain bereich quality qualitat event occupied overload ovl
+    temp temperature temperatur temperatura tair trail humidity rh feuchte luftfeuchte luftfeuchtigkeit
+    weather wetter meteo vejr rain regen wind pressure druck
     gps gnss fix sat sats satellite satellites satelliten lat lon latitude longitude
     battery batt bat batterie akku batteri
     hour hours hh minute minutes mm stunde minuten direction dir richtung
@@ -42,7 +42,7 @@ STATE_WORDS = frozenset(
 # Words for what counts on within a passage.
 PASSAGE_WORDS = frozenset(
     """
-    axle axles wheel wheels wheelset bogie vehicle car wagon achse achsen achszähler rad räder essieu essieux aksel
+    axle axles wheel wheels wheelset bogie vehicle car wagon achse achsen achszahler rad rader essieu essieux aksel
     tacho odometer encoder pulse pulses impulse impulses puls pulser packet packets frame frames
     """.split()
 )
@@ -50,16 +50,14 @@ PASSAGE_WORDS = frozenset(
 
 @dataclass(frozen=True)
 class Measurement:
-    """What tells borders of records from states: ``kind`` of the test, its sampling ``rate`` [Hz], ``signals``, time.
+    """What tells borders of records from states: the ``kind`` of the test, its sampling ``rate`` [Hz], the ``signals``.
 
-    ``signals`` are the forces, or without one all samples that sensors use. ``has_running_time`` says that a time axis
-    in a known unit runs on through the record.
+    ``signals`` are the forces, or without one all samples that sensors use.
     """
 
     rate: float
     kind: str = "hammer"
     signals: Sequence[Column] = ()
-    has_running_time: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,6 +129,7 @@ def border_errors(
         is_certain = _numbers_records(form, measurement, is_state, is_text)
         if is_certain is None:
             continue
+        is_certain = is_certain and not has_time_in_seconds(record, measured)  # which runs on over every border
         problem = f"{place} {form.text}: it may number records, which would be read as one"
         remedy = (
             f"Export each record to a file of its own, or number them in a column 'record'; if it numbers none, write "
@@ -173,7 +172,7 @@ def _numbers_records(form: Form, measurement: Measurement, is_state: bool, is_te
         return None
     are_packets = form.are_alike and n_impact < MIN_IMPACT_BLOCK_SHARE * n_block
     is_end = form.is_wrap and n_impact < n_block
-    return form.is_certain and not (is_state or measurement.has_running_time or are_packets or is_end)
+    return form.is_certain and not (is_state or are_packets or is_end)
 
 
 def _count_blocks_with_impact(signal: Column, edges: np.ndarray) -> int:

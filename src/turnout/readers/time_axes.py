@@ -1,6 +1,6 @@
 """Time axes of a record: its time column, and every column that no sensor of the layout uses and that rises evenly."""
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Collection, Iterator, Sequence, Set
 from fractions import Fraction
 from functools import lru_cache
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
-from turnout.readers.rate_statements import Statement, statements_of, time_statement
+from turnout.readers.precision import EXACT_PRECISION, around
+from turnout.readers.rate_statements import USUAL_RATES, Statement, statements_of, time_statement
 from turnout.readers.rate_units import hertz_of, rate_unit, seconds_of, words_of
 from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
@@ -24,7 +25,14 @@ MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by le
 
 
 def all_statements(
-    record: RawRecord, k: int, n: int, measured: Set[int], where: str, source: Source
+    record: RawRecord,
+    k: int,
+    n: int,
+    measured: Set[int],
+    where: str,
+    source: Source,
+    promised: float | None = None,
+    checked: Collection[str] = (),
 ) -> list[Statement]:
     """All statements of a file about the sampling rate of a record: metadata, time axes and columns.
 
@@ -42,6 +50,10 @@ def all_statements(
         The record, for the message.
     source : Source
         The raw file.
+    promised : float or None
+        Rate that the layout states, or None. [Hz]
+    checked : collection of str
+        Names, without case, of which the layout says that they state nothing about the samples.
 
     Returns
     -------
@@ -53,11 +65,34 @@ def all_statements(
     ReadError
         If a time axis runs backwards, is not finite, jumps over missing samples, or is not even.
     """
-    return statements_of(record.entries, k, n) + time_statements(record, measured, where, source)
+    stated = statements_of(record.entries, k, n)
+    is_proven = any(s.is_defined and _is_rate(s, promised) for s in stated)
+    return stated + time_statements(record, measured, where, source, promised, checked, is_proven)
 
 
-def time_statements(record: RawRecord, measured: Set[int], where: str, source: Source) -> list[Statement]:
+def _is_rate(statement: Statement, promised: float | None) -> bool:
+    """Whether a statement says the rate for certain, and that of the layout if there is one."""
+    if statement.certainty != CERTAIN or not statement.intervals:
+        return False
+    if promised is None:
+        is_usual = USUAL_RATES[0] <= statement.usual.rate <= USUAL_RATES[1]
+        return len(statement.intervals) == 1 or (statement.is_clock and is_usual)
+    return statement.agrees_with(around(promised, EXACT_PRECISION))
+
+
+def time_statements(
+    record: RawRecord,
+    measured: Set[int],
+    where: str,
+    source: Source,
+    promised: float | None = None,
+    checked: Collection[str] = (),
+    is_proven: bool = False,
+) -> list[Statement]:
     """Statements of all time axes of a record, and of columns that repeat the rate in every row.
+
+    A time axis with the layout's rate that runs forward proves the order of the samples, and so does the step that the
+    format defines. Beside it a column that rises or falls evenly is no axis unless its name or its unit says so.
 
     Parameters
     ----------
@@ -69,6 +104,12 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
         The record, for the message.
     source : Source
         The raw file.
+    promised : float or None
+        Rate that the layout states, or None. [Hz]
+    checked : collection of str
+        Names, without case, of which the layout says that they state nothing about the samples.
+    is_proven : bool
+        Whether the format itself defines a step with that rate.
 
     Returns
     -------
@@ -85,9 +126,9 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
     starts: list[tuple[str, float, float, int]] = []
     axes = [] if record.time is None else [_time_column(record)]
     axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
-    axes += _columns(record, measured)
-    for place, time, is_in_seconds, certainty in axes:
-        if len(time) > 2:
+    axes += _columns(record, measured, checked)
+    for place, time, is_in_seconds, certainty in sorted(axes, key=lambda axis: axis[3] != CERTAIN):
+        if len(time) > 2 and not (is_proven and certainty == POSSIBLY):
             check_time(
                 np.asarray(time, dtype=float), where if place == "its time column" else f"{where}, {place}", source
             )
@@ -95,8 +136,9 @@ def time_statements(record: RawRecord, measured: Set[int], where: str, source: S
             statements.append(time_statement(place, rate, tolerance, is_in_seconds, certainty))
             if certainty == CERTAIN:
                 starts.append((place, float(time[0]), rate, len(time)))
+                is_proven = is_proven or _is_rate(statements[-1], promised)
     _check_same_start(starts, where, source)
-    _check_counters(record, measured, where, source)
+    _check_counters(record, measured, checked, is_proven, where, source)
     return statements + statements_of(_constant_columns(record, measured))
 
 
@@ -144,7 +186,15 @@ def is_axis_name(name: str, unit: str) -> bool:
 
 
 # Units of other quantities than time, beside those of sensors and of frequencies, that a column beside them may have.
-OTHER_UNITS = frozenset("km cm ° deg rad mrad A mA bar mbar hPa dB kg".split())
+OTHER_UNITS = frozenset(
+    """
+    km dm cm ft feet foot in inch inches yd yard mi mile miles mph kph kmh km/t kt kts knots ft/s in/s mm/s cm/s mm/min
+    m/min ° deg rad mrad gon grad rev U turns °/s deg/s rad/s °/m
+    A kA mA µA VA kVA W kW MW mW Wh kWh J kJ Ω ohm kΩ Ohm mV/V µV/V V/V mV/mA mAh Ah
+    Nm N·m N*m kNm lbf kgf lb lbs kg g/m³ N/mm² kN/m kN/m² Pa hPa kPa MPa bar mbar psi mmHg
+    dB dBA dB(A) ‰ % lx m² m³ l/min mm²
+    """.split()
+)
 
 
 @lru_cache(maxsize=4096)
@@ -191,7 +241,9 @@ def _unit_of_count(column: Column, declared: str) -> Fraction | None:
     return unit_of_axis(first, declared, float(second - first))
 
 
-def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.ndarray, bool, int]]:
+def _columns(
+    record: RawRecord, measured: Set[int], checked: Collection[str] = ()
+) -> Iterator[tuple[str, np.ndarray, bool, int]]:
     """(place, values, whether in seconds, certainty) of the columns that are time axes."""
     for i, (name, unit, column) in enumerate(zip(record.names, record.units, record.samples)):
         if i in measured or column.dtype.kind not in "fiumM" or len(column) <= 2:
@@ -206,7 +258,8 @@ def _columns(record: RawRecord, measured: Set[int]) -> Iterator[tuple[str, np.nd
         known = rate_unit(unit) or next((rate_unit(w) for w in words_of(name)[1:][-1:] if seconds_of(w)), None)
         is_time_unit = known is not None and known.is_step
         by_name = is_time_name(name)
-        if not by_name and not rises_evenly(column[:HEAD_SIZE]):
+        is_axis = by_name or (rises_evenly(column[:HEAD_SIZE]) and (is_time_unit or not _is_checked(name, checked)))
+        if not is_axis:
             continue
         unit_of_count = _unit_of_count(column, name) if by_name and not is_time_unit else None
         scale = known.scale if is_time_unit and known else unit_of_count or 1
@@ -267,19 +320,27 @@ MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measu
 
 REVERSE_REMEDY = (
     "Sort the rows by this column and export them again; if it is no time and no count, give it the unit of its "
-    "quantity in the layout"
+    "quantity in the layout, or name it under 'checked_entries'"
 )
 
 
-def _check_counters(record: RawRecord, measured: Set[int], where: str, source: Source) -> None:
+def _is_checked(name: str, checked: Collection[str]) -> bool:
+    return name.strip().casefold() in checked
+
+
+def _check_counters(
+    record: RawRecord, measured: Set[int], checked: Collection[str], is_proven: bool, where: str, source: Source
+) -> None:
     """ReadError if a column that counts the samples leaves one out, or shows that they are in another or reverse order.
 
-    A counter that begins again is no gap: it counts within a record, or has reached its largest number.
+    A column that falls shows nothing if a time axis runs forward. A counter that begins again is no gap: it counts
+    within a record, or has reached its largest number.
     """
     for i, (name, column) in enumerate(zip(record.names, record.samples)):
-        if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
+        if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE or _is_checked(name, checked):
             continue
-        if not is_unit_of_no_time(record.units[i]) and _is_on_line(-np.asarray(column[:HEAD_SIZE], dtype=float)):
+        may_be_reversed = not is_proven and not is_unit_of_no_time(record.units[i])
+        if may_be_reversed and _is_on_line(-np.asarray(column[:HEAD_SIZE], dtype=float)):
             problem = f"column {name!r} falls evenly from its first sample on: the samples may be in reverse order"
             raise source.error(where, problem, REVERSE_REMEDY, "clock_backwards")
         if _counts_in_disorder(column):
