@@ -21,7 +21,7 @@ from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import lost_entry_errors, usable_conditions
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
-from turnout.readers.rate_agreement import rate_remark, resolve
+from turnout.readers.rate_agreement import ABSCISSA_REMEDY, check_unknown_step, rate_remark, resolve
 from turnout.readers.rate_vocabulary import CERTAIN
 from turnout.readers.record_borders import Measurement, border_errors
 from turnout.readers.repeated_blocks import repeated_block
@@ -262,10 +262,15 @@ class _Conversion:
         sensor_rows = self.assignments.sensor_rows(record, where)
         checked = self.entry_check.checked
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source, description.rate, checked)
+        check_unknown_step(record, statements, description.rate, where, source)
         rate = resolve(statements, description.rate, where, source)
         if problem := delay_problem(record, sorted(sensor_rows), rate):
             raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
+        for mapping in channel_maps:
+            name = record.names[mapping.index]
+            if problem := record.other_axes.get(name, ""):
+                raise source.error(f"{where}, channel {name!r}", problem, ABSCISSA_REMEDY, reason="wrong_rate")
         of_marks = list(mark_errors(record, _units_in_use(record, channel_maps, description), where, source))
         measurement = _measurement(record, channel_maps, description.kind, rate)
         of_borders = list(border_errors(record, sensor_rows, checked, measurement, where, source))

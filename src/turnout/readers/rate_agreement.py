@@ -6,7 +6,7 @@ from turnout.errors import ReadError
 from turnout.readers.precision import EXACT_PRECISION, Interval, around
 from turnout.readers.rate_statements import MAX_CLOCK_DRIFT, USUAL_RATES, Statement
 from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY
-from turnout.readers.source import Source
+from turnout.readers.source import RawRecord, Source
 
 MAX_WIDTH = 1e-3  # relative: a statement of fewer digits does not tell the rate; the layout or another one must
 
@@ -219,3 +219,44 @@ def _no_rate_error(statements: Sequence[Statement], where: str, source: Source) 
     if statements:
         problem += f"; {statements[0].text!r} in {statements[0].place} may"
     return source.error(where, problem, RATE_REMEDY, reason="wrong_rate")
+
+
+ABSCISSA_REMEDY = "Export the channel over the time, in s"
+
+
+def check_unknown_step(
+    record: RawRecord, statements: Sequence[Statement], promised: float | None, where: str, source: Source
+) -> None:
+    """Check that a step in a unit that is not known is one in s: the layout or another statement has that rate.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    statements : sequence of Statement
+        All statements of the file about the sampling rate; they are compared with each other elsewhere.
+    promised : float or None
+        Rate that the layout states, or None. [Hz]
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Raises
+    ------
+    ReadError
+        If the layout has another rate, or nothing else states one.
+    """
+    steps = [s for s in statements if s.is_defined and s.intervals]
+    if not record.unknown_step or not steps:
+        return
+    problem = f"the unit {record.unknown_step!r} of its step is not known"
+    if promised is None:
+        if not any(s.certainty == CERTAIN and s.intervals and not s.is_defined for s in statements):
+            remedy = f"{ABSCISSA_REMEDY}, or give the rate in the layout"
+            raise source.error(where, f"{problem}, and nothing else states the rate", remedy, "wrong_rate")
+        return
+    layout = around(promised, EXACT_PRECISION)
+    if other := next((s for s in steps if not s.agrees_with(layout)), None):
+        problem = f"{problem}: in s it is {other.usual.rate:.9g} Hz, instead of {promised:.9g} Hz of the layout"
+        raise source.error(where, problem, ABSCISSA_REMEDY, "wrong_rate")

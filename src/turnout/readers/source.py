@@ -235,7 +235,8 @@ class RawRecord:
     ``unit_conflicts`` are statements about units of channels that contradict each other, by index. ``not_numbers`` are
     variables that are no channels, name -> what they hold, for messages about missing channels. ``audio`` is "whole"
     for an audio file of whole numbers, which are fractions of full scale, "floating" for one of floating-point numbers,
-    which may be none, and "" for any other file.
+    which may be none, and "" for any other file. ``other_axes`` are channels that are not sampled over the time, by
+    name, and why. ``unknown_step`` is a unit that is not known, of a step that the entries state in s.
     """
 
     names: tuple[str, ...]
@@ -258,6 +259,8 @@ class RawRecord:
     unit_conflicts: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     audio: str = ""
     not_numbers: Mapping[str, str | UnreadObject] = field(default_factory=lambda: EMPTY_MAPPING)
+    other_axes: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
+    unknown_step: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

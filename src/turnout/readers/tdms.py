@@ -30,7 +30,7 @@ from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_text, without_drawings
-from turnout.readers.tdms_abscissas import check_steps, seconds_of_abscissa, unit_of_abscissa
+from turnout.readers.tdms_abscissas import UNIT_NAME, check_steps, seconds_of_abscissa, unit_of_abscissa, unknown_unit
 from turnout.readers.time_texts import parse_time
 
 nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
@@ -300,7 +300,7 @@ def _complete_record(
         if channel.path in problems:
             problem, reason = problems[channel.path]
             raise source.error(f"{where}, channel {channel.name!r}", problem, ONE_WRITE_REMEDY, reason)
-    check_steps(channels, where, source)
+    other_axes = check_steps(channels, where, source)
     samples = [_scaled_numbers(c, where, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
     undecided = {
@@ -311,7 +311,7 @@ def _complete_record(
     return RawRecord(
         names=tuple(c.name for c in channels),
         samples=samples,
-        entries=(*of_file, *of_remarks, *_entries(channels, groups)),
+        entries=(*of_file, *of_remarks, *_entries(channels, groups, other_axes)),
         units=tuple(next((str(c.properties[n]) for n in UNIT_PROPERTIES if c.properties.get(n)), "") for c in channels),
         **start_fields(
             *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
@@ -324,6 +324,8 @@ def _complete_record(
         conditions=facts.conditions(0, 1),
         aliases=tuple((f"{c.group_name}/{c.name}",) for c in channels),
         undecided=undecided,
+        other_axes=other_axes,
+        unknown_step=next((u for c in channels if c.name not in other_axes and (u := unknown_unit(c.properties))), ""),
     )
 
 
@@ -350,17 +352,28 @@ def _scale_text(*levels: Mapping[str, Any]) -> str:
     return scale_text(merged)
 
 
-def _entries(channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]]) -> Iterator[Entry]:
-    """Properties of the groups and of the channels."""
+def _entries(
+    channels: Sequence[nptdms.TdmsChannel], groups: Mapping[str, Mapping[str, Any]], other_axes: Mapping[str, str]
+) -> Iterator[Entry]:
+    """Properties of the groups and of the channels, of those over another axis than the time without the axis."""
     places: list[tuple[str, Mapping[str, Any]]] = [
         (f"property of the group {name!r}", values) for name, values in groups.items()
     ]
-    places += [(f"property of the channel {c.name!r}", c.properties) for c in channels]
+    places += [
+        (f"property of the channel {c.name!r}", _without_axis(c.properties) if c.name in other_axes else c.properties)
+        for c in channels
+    ]
     for place, values in places:
         for entry in entries_of({name: _in_utc(value) for name, value in values.items()}, ""):
-            is_step, unit = entry.name == "wf_increment", unit_of_abscissa(values)
+            if entry.name == UNIT_NAME and unknown_unit(values):
+                continue  # it is compared with the rate, and none of the samples
+            is_step, unit = entry.name == "wf_increment", "s" if unknown_unit(values) else unit_of_abscissa(values)
             name = f"{entry.name} [{unit}]" if is_step and unit else entry.name
             yield Entry(f"{place}: {entry.name}", name, entry.value, is_defined=is_step)
+
+
+def _without_axis(properties: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in properties.items() if not name.startswith("wf_")}
 
 
 def _scaled_numbers(channel: nptdms.TdmsChannel, where: str, source: Source) -> Column:

@@ -54,6 +54,44 @@ def test_samples_over_another_quantity_than_time_are_rejected(name, unit, tmp_pa
     assert not rates and "and not over the time" in errors[0]
 
 
-def test_a_step_in_an_unknown_unit_is_rejected(tmp_path):
-    rates, errors = outcome(tmp_path, {"wf_increment": 1e3 / RATE, "wf_xunit_string": "qwxz"}, rate=RATE)
-    assert not rates and "the unit 'qwxz' of its step is not known" in errors[0]
+def test_a_step_in_an_unknown_unit_that_is_none_in_seconds_is_rejected(tmp_path):
+    for rate in (RATE, None):
+        rates, errors = outcome(tmp_path, {"wf_increment": 1e3 / RATE, "wf_xunit_string": "qwxz"}, rate=rate)
+        assert not rates and "the unit 'qwxz' of its step is not known" in errors[0]
+
+
+UNKNOWN_UNITS = ("Time", "t", "Zeit", "relative", "s (rel)", "UTC", "HH:MM:SS", "qwxz")
+
+
+@pytest.mark.parametrize("unit", UNKNOWN_UNITS)
+@pytest.mark.parametrize("name", ["Time", "", "qwxz"])
+def test_a_step_in_an_unknown_unit_that_has_the_rate_of_the_layout_in_seconds_is_one(unit, name, tmp_path):
+    waveform = {"wf_increment": 1 / RATE, "wf_xunit_string": unit, "wf_xname": name}
+    assert outcome(tmp_path, waveform, rate=RATE) == ([RATE], [])
+    assert outcome(tmp_path, waveform | {"Sampling rate": "25600 Hz"}) == ([RATE], [])
+    for rate in (20000.0, 25.6):
+        rates, errors = outcome(tmp_path, waveform, rate=rate)
+        assert not rates and "its step is not known" in errors[0]
+    rates, errors = outcome(tmp_path, waveform)
+    assert not rates and "nothing else states the rate" in errors[0]
+
+
+@pytest.mark.parametrize("name", ["Frequenz", "Frequency response time", "Frekvens"])
+def test_a_known_unit_of_time_counts_more_than_the_name_of_the_axis(name, tmp_path):
+    waveform = {"wf_increment": 1 / RATE, "wf_xunit_string": "s", "wf_xname": name}
+    assert outcome(tmp_path, waveform, rate=RATE) == ([RATE], [])
+
+
+@pytest.mark.parametrize(("unit", "step"), [("Hz", 25.0), ("m", 0.01), ("rpm", 10.0)])
+def test_only_channels_in_use_are_sampled_over_the_time(unit, step, tmp_path):
+    other = {"wf_increment": step, "wf_xunit_string": unit, "wf_xname": "qwxz"}
+    with nptdms.TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        channels = [("force", SAMPLES[0], {"wf_increment": 1 / RATE}), ("rail", SAMPLES[1], {"wf_increment": 1 / RATE})]
+        channels.append(("psd", np.abs(SAMPLES[1]), other))
+        writer.write_segment([nptdms.ChannelObject("g", *channel) for channel in channels])
+    for quantity, n_record in (("ignored", 1), ("acceleration", 0)):
+        unit = None if quantity == "ignored" else "m/s²"
+        description = RawDescription((*SENSORS, RawChannel("psd", "psd", quantity, unit=unit)), rate=RATE)
+        result = read("a.tdms", tmp_path, description)
+        assert len(result.recordings) == n_record and len(result.errors) == 1 - n_record
+        assert n_record or "and not over the time" in str(result.errors[0])
