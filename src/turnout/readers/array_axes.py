@@ -25,7 +25,7 @@ def with_records_first(array: np.ndarray, n_channel: int, facts: Metadata, where
 
     An entry ``dims`` decides. Without it the longest axis is that of the samples, and that of the channels has as many
     entries as there are channels. Without a number of channels the order is (record, channel, sample), or (sample,
-    channel, record) as MATLAB saves it.
+    channel, record) as MATLAB saves it: so it is where there are as many records as channels, which is a remark.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def with_records_first(array: np.ndarray, n_channel: int, facts: Metadata, where
     Raises
     ------
     ReadError
-        If no axis fits the channels, or two do.
+        If no axis fits the channels, or the samples are in the middle between as many records as channels.
     """
     if order := _stated_order(facts):
         moved = array.transpose([order.index(axis) for axis in AXIS_WORDS])
@@ -63,13 +63,41 @@ def with_records_first(array: np.ndarray, n_channel: int, facts: Metadata, where
     fitting = [i for i in other_axes if array.shape[i] == n_channel]
     if n_channel and not fitting:
         raise source.error(where, f"{array.shape} samples do not match {n_channel} channels", AXES_REMEDY)
-    first, second = (array.shape[i] for i in other_axes)
-    if first == second > 1:
+    is_open = _is_square(array, sample)
+    if is_open and sample == 1:
         problem = f"it has the shape {array.shape}: nothing says which axis is that of the records and of the channels"
         raise source.error(where, problem, AXES_REMEDY)
-    channel = fitting[0] if fitting else 1
+    channel = fitting[0] if fitting and not is_open else 1
     (record,) = set(range(3)) - {sample, channel}
     return array.transpose(record, channel, sample)
+
+
+def axes_problem(array: np.ndarray, facts: Metadata) -> str:
+    """Why an array of three dimensions may have its records and its channels the other way round.
+
+    Parameters
+    ----------
+    array : (a, b, c) array
+        The samples as they are in the file.
+    facts : Metadata
+        Metadata of the array.
+
+    Returns
+    -------
+    str
+        "" if the file states the order of its axes, or there are not as many records as channels.
+    """
+    sample = max((2, 0, 1), key=lambda i: array.shape[i])
+    if _stated_order(facts) or not _is_square(array, sample):
+        return ""
+    order = "record, channel, sample" if sample == 2 else "sample, channel, record"
+    return f"it has the shape {array.shape}, and nothing states the order of its axes: it is read as ({order})"
+
+
+def _is_square(array: np.ndarray, sample: int) -> bool:
+    """Whether an array has as many records as channels, and more than one."""
+    first, second = (n for i, n in enumerate(array.shape) if i != sample)
+    return bool(first == second > 1)
 
 
 def _stated_order(facts: Metadata) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from turnout.errors import ReadError
+from turnout.readers.array_axes import AXES_REMEDY
 from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistics, channel_error
 from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
@@ -161,6 +162,8 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
         nothing says whether it is applied, and the first with missing samples.
     """
     yield from raw.remarks
+    first = next((r for r in raw.records if isinstance(r, RawRecord)), None)
+    yield from [] if first is None else _axes_remarks(first, (), f"record 1 of {len(raw.records)}", source)
     yield from lost_entry_errors(raw.records, source)
     records = [(k, record) for k, record in enumerate(raw.records) if isinstance(record, RawRecord)]
     unread = {k: record.unread_start for k, record in records if record.unread_start}
@@ -299,10 +302,19 @@ class _Conversion:
         of_rate = rate_remark(statements, rate, where, source)
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
+        of_marks += _axes_remarks(record, checked, where, source)
         channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, source: Source) -> Iterator[ReadError]:
+    """Remarks on arrays of which nothing states the order of the axes."""
+    for name, problem in record.undecided_axes.items():
+        if name.strip().casefold() not in checked:
+            remedy = f"{AXES_REMEDY}; if it is right, write 'checked_entries: {name}' into the layout"
+            yield source.error(f"{where}, variable {name!r}", problem, remedy, reason="entry_unknown")
 
 
 def _measurement(record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float) -> Measurement:

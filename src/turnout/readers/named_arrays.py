@@ -27,7 +27,7 @@ import numpy as np
 
 from turnout.counts import first_texts
 from turnout.errors import ReadError
-from turnout.readers.array_axes import with_records_first
+from turnout.readers.array_axes import axes_problem, with_records_first
 from turnout.readers.array_metadata import Alphabetical, Metadata, list_of_texts
 from turnout.readers.array_names import (
     channel_names,
@@ -229,7 +229,10 @@ def _group_records(
             with_records_first(array, len(channel_names(facts)), facts, where, source) if is_of_records else [array]
         )
         count = (k, n) if array.ndim == 2 else (0, len(blocks))
-        return [_record(b, facts, count[0] + i, count[1], where, source) for i, b in enumerate(blocks)]
+        problem = axes_problem(array, facts) if is_of_records else ""
+        axes = {name: problem} if problem else {}
+        records = [_record(b, facts, count[0] + i, count[1], where, source) for i, b in enumerate(blocks)]
+        return [replace(record, undecided_axes=axes) for record in records]
     channels = vectors(variables)
     if not channels:
         return []

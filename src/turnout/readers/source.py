@@ -237,6 +237,8 @@ class RawRecord:
     for an audio file of whole numbers, which are fractions of full scale, "floating" for one of floating-point numbers,
     which may be none, and "" for any other file. ``other_axes`` are channels that are not sampled over the time, by
     name, and why. ``unknown_step`` is a unit that is not known, of a step that the entries state in s.
+    ``undecided_axes`` are arrays of three dimensions of which nothing states the order of the axes, by name, and how
+    they are read.
     """
 
     names: tuple[str, ...]
@@ -261,6 +263,7 @@ class RawRecord:
     not_numbers: Mapping[str, str | UnreadObject] = field(default_factory=lambda: EMPTY_MAPPING)
     other_axes: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
     unknown_step: str = ""
+    undecided_axes: Mapping[str, str] = field(default_factory=lambda: EMPTY_MAPPING)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", tuple(self.units) or ("",) * len(self.names))

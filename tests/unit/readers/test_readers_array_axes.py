@@ -1,5 +1,6 @@
 """Axes of an array of three dimensions: which of them is that of the records, the channels and the samples."""
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -40,12 +41,9 @@ def test_the_number_of_channels_and_the_longest_axis_decide(order, n_record, for
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_as_many_records_as_channels_are_rejected_unless_the_file_states_the_axes(order, tmp_path):
-    """Formerly, force of impacts 1 and 2 could become force and rail of impact 1."""
+def test_the_file_states_the_axes_of_as_many_records_as_channels(order, tmp_path):
     samples = samples_of(2)
     array = samples.transpose(order)
-    with pytest.raises(Exception, match=r"nothing says which axis is that of the records.*dims"):
-        outcome(tmp_path, array, channels=["force", "rail"])
     for words in (AXES, ("impacts", "Kanal", "time"), ("hit no", "Channels", "samples")):
         stated = [words[i] for i in order]
         for dims in (stated, ",".join(stated)):
@@ -64,5 +62,39 @@ def test_without_names_of_channels_the_records_come_first(tmp_path):
     for array in (samples, samples.transpose(2, 1, 0)):
         result = outcome(tmp_path, array, sensors=sensors)
         assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples]
-    with pytest.raises(Exception, match="nothing says which axis"):
-        outcome(tmp_path, samples_of(2), sensors=sensors)
+    for array in (samples_of(2), samples_of(2).transpose(2, 1, 0)):
+        result = outcome(tmp_path, array, sensors=sensors)
+        assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples_of(2)]
+        assert [e.reason for e in result.errors] == ["entry_unknown"]
+
+
+@pytest.mark.parametrize("format", ["npz", "mat"])
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
+def test_as_many_records_as_channels_in_the_usual_order_are_a_remark(order, format, tmp_path):
+    array = samples_of(2).transpose(order)
+    result = outcome(tmp_path, array, format=format, channels=["force", "rail"])
+    assert [r.samples.tolist() for r in result.recordings] == [x.tolist() for x in samples_of(2)]
+    assert [e.reason for e in result.errors] == ["entry_unknown"]
+    order_text = "(record, channel, sample)" if order[0] == 0 else "(sample, channel, record)"
+    assert order_text in str(result.errors[0]) and "checked_entries: data" in str(result.errors[0])
+    description = RawDescription(SENSORS, rate=RATE, checked_entries=("Data",))
+    assert not read(f"a.{format}", tmp_path, description).errors
+
+
+@pytest.mark.parametrize("order", [(0, 2, 1), (1, 2, 0)])
+def test_samples_between_as_many_records_as_channels_are_rejected(order, tmp_path):
+    with pytest.raises(Exception, match=r"nothing says which axis is that of the records.*dims"):
+        outcome(tmp_path, samples_of(2).transpose(order), channels=["force", "rail"])
+
+
+@pytest.mark.parametrize("place", ["file", "rail", "both"])
+@pytest.mark.parametrize("dtype", ["S1", "f8"])
+def test_an_attribute_without_a_value_does_not_cost_the_file(place, dtype, tmp_path):
+    force, rail = samples_of(1)[0]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["force"], file["rail"] = force, rail
+        for owner in {"file": [file], "rail": [file["rail"]], "both": [file, file["rail"]]}[place]:
+            owner.attrs["note"] = h5py.Empty(dtype)
+        file["nothing"] = h5py.Empty(dtype)
+    result = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE))
+    assert [r.samples.tolist() for r in result.recordings] == samples_of(1).tolist() and not result.errors
