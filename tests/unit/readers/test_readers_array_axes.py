@@ -95,6 +95,6 @@ def test_an_attribute_without_a_value_does_not_cost_the_file(place, dtype, tmp_p
         file["force"], file["rail"] = force, rail
         for owner in {"file": [file], "rail": [file["rail"]], "both": [file, file["rail"]]}[place]:
             owner.attrs["note"] = h5py.Empty(dtype)
-        file["nothing"] = h5py.Empty(dtype)
+        file["nothing"] = h5py.Empty("f8")
     result = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE))
     assert [r.samples.tolist() for r in result.recordings] == samples_of(1).tolist() and not result.errors

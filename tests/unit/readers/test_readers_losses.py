@@ -124,10 +124,10 @@ def test_a_jump_of_a_counter_is_an_error_and_its_restart_is_accepted(gap, tmp_pa
     (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
     reason, message = reason_of(tmp_path, "a.csv", ignored)
     assert reason == "truncated" and "samples are missing" in message and str(gap - 1) in message
-    for count, reasons in ((np.arange(N), []), (np.arange(N) % 256, []), (1 + np.arange(N) % 1000, ["entry_unknown"])):
+    for count in (np.arange(N), np.arange(N) % 256, 1 + np.arange(N) % 1000):  # over one impact
         (tmp_path / "a.csv").write_text(text_of(map("{};{}".format, count, rows_of()), "n;force [N];rail [m/s²]"))
         result = read("a.csv", tmp_path, ignored)
-        assert len(result.recordings) == 1 and [e.reason for e in result.errors] == reasons
+        assert len(result.recordings) == 1 and not result.errors
 
 
 @pytest.mark.parametrize("name, unit", [("n", ""), ("qwxz", ""), ("qwxz", "qwx"), ("Čas", "ms")])
