@@ -208,6 +208,18 @@ class TestTerm:
         assert np.all(force == 0.0)
 
 
+@pytest.mark.parametrize("term", TERMS, ids=lambda t: t.name)
+def test_a_fault_of_one_type_of_recordings_is_a_form_of_the_same_fault_in_all(term):
+    """It is named only where the recordings tell; any other effect has no general form."""
+    if set(term.recording_types) == {"hammer", "passage"}:
+        assert not term.general_form
+        return
+    general = effects_by_name()[term.general_form]
+    assert set(term.recording_types) < set(general.recording_types)
+    assert issubclass(term, general) and term.parameters == general.parameters
+    assert term.smallest_reportable == general.smallest_reportable
+
+
 @pytest.mark.parametrize("term", [t for t in TERMS if t.column_type == "support"], ids=lambda t: t.name)
 def test_the_pseudo_force_is_the_static_force_of_its_links_and_ports(term):
     """Rail and sleeper are pressed down and at rest: the force of the springs, with the signs of the track."""

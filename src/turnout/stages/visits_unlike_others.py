@@ -14,8 +14,9 @@ import numpy as np
 if TYPE_CHECKING:
     from turnout.stages.stored_visits import StoredVisit
 
-MIN_OTHER_VISITS = 2  # with which the level of a channel is compared
-MAX_RATIO = 3.0  # of the mean square that a fit leaves, over the median of the other visits
+MIN_OTHER_VISITS = 2  # with which the level of a channel is compared: one alone does not tell which is right
+# Of the mean square that a fit leaves, over the median of the other visits: docs/decisions/mistakes-in-campaigns.md
+MAX_RATIO = 3.0
 
 
 def notes_on_channels(turnout_id: str, stored: Iterable[StoredVisit]) -> list[str]:

@@ -28,6 +28,7 @@ from turnout.mismatch.engine.thresholds import THRESHOLDS, threshold_rows
 from turnout.mismatch.engine.two_effects import PairEvidence
 from turnout.mismatch.engine.verdict import ANSWERS, Verdict
 from turnout.mismatch.engine.verification import Verification
+from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 from turnout.physics import MountResonance, Parameter
 
 TABLES = (
@@ -68,6 +69,16 @@ def test_a_fault_is_of_one_type_of_recordings_only_by_a_margin(general, special,
     verdict = judge(lags, 2.0, MismatchSettings())
     assert (verdict.answer, verdict.names) == ("named", names) and words in verdict.reason
     assert verdict.probability > 0.9  # both are the same fault
+
+
+def test_candidates_of_a_case_know_their_general_form_if_it_is_in_the_library():
+    with_both = PlannedCase(small_plan(), families=("sensor_gain", "hammer_gain")).candidates
+    assert {(c.family, c.effect.general_form) for c in with_both} == {
+        ("sensor_gain", ""),
+        ("hammer_gain", "sensor_gain"),
+    }
+    alone = PlannedCase(small_plan(), families=("hammer_gain",)).candidates
+    assert {(c.family, c.effect.general_form) for c in alone} == {("hammer_gain", "")}
 
 
 def test_lags_of_two_channels_stay_a_choice():
