@@ -1,6 +1,6 @@
 """Simulated passages over the turnout of the demonstration, with the truth about each train."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -112,8 +112,3 @@ def sensor_recording(run: Run, rows, noise, rng, with_other_track=True):
     channels = tuple(Channel(n, "acceleration", x) for n, x in zip(names, positions))
     sensors = [PassageSensor(n, n, x, t) for n, x, t in zip(names, positions, tracks)]
     return Recording(samples, RATE, channels, "passage"), sensors
-
-
-def scale_run(run: Run, factor) -> Run:
-    """The same run with all accelerations multiplied."""
-    return replace(run, samples=run.samples * factor)

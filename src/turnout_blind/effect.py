@@ -7,7 +7,7 @@ them. The scorer counts every name for it as wrong, unless ``score/names.py`` or
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from turnout_blind.site import Site
+    from turnout_blind.true_site import World
 
 LOCKS = ("place", "wheel", "train", "sensor", "wavelength", "frequency", "clock", "condition", "amplitude")
 # "history": in histories, and in single campaigns in the panel that it needs; "switch": in switch panels alone
@@ -78,6 +79,30 @@ class Effect:
         """
         where, parameters = self.draw(rng, site, self.ladder[rung])
         return ConcealedEffect(self.kind, self.locked_to, where, parameters, rung)
+
+    def in_recordings_of(self, recording_type: str, kind: str) -> Effect:
+        """The same fault of a channel in recordings of one type alone.
+
+        Parameters
+        ----------
+        recording_type : str
+            "hammer" or "passage".
+        kind : str
+            Name of the new effect.
+
+        Returns
+        -------
+        Effect
+            It leaves recordings of the other type as they are.
+        """
+
+        def act(world: World, site: Site, where: Mapping[str, Any], p: Mapping[str, Any]) -> None:
+            self.act(world, site, where, p)
+            faults = world.channels[where["sensor"]]
+            everywhere = faults.pop()
+            faults.append(lambda of, rng: everywhere(of, rng) if of == recording_type else lambda x, rate: x)
+
+        return replace(self, kind=kind, act=act)
 
 
 def load_effects(*folders: str | Path) -> dict[str, Effect]:

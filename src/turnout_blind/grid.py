@@ -60,32 +60,6 @@ class Grid:
         return self.sponge_rate * depth**3
 
 
-def stable_step(grid: Grid, rail: Rail) -> float:
-    r"""Largest stable time step of the leapfrog march [s].
-
-    .. math:: \Delta t < 2 / \sqrt{4 c^2 / h^2 + \kappa G A / \rho I}, \quad c^2 = \max(EI/\rho I, \kappa GA/m)
-
-    Parameters
-    ----------
-    grid : Grid
-        Grid of the rail.
-    rail : Rail
-        Profile of the rail.
-
-    Returns
-    -------
-    float
-        Time step. [s]
-
-    Examples
-    --------
-    >>> bool(1.7e-5 < stable_step(Grid(), Rail()) < 2.1e-5)
-    True
-    """
-    fastest = max(rail.bending / rail.rotary, rail.shear / rail.mass)
-    return 2.0 / np.sqrt(4.0 * fastest / grid.step**2 + rail.shear / rail.rotary)
-
-
 def spread(grid: Grid, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """Weights of the cubic B-spline at some positions: a load 4 steps wide.
 

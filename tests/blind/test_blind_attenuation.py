@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from tests.blind.test_blind_physics import BENDING_ONLY, on_supports, winkler
+from tests.oracles.uniform_world import uniform_world
 
 from turnout_blind.grid import Rail
 from turnout_blind.march import TIME_STEP
 from turnout_blind.record import HAMMER_DURATION, PRETRIGGER, sensor_positions
 from turnout_blind.run import simulate_impacts
 from turnout_blind.site import RAIL_DAMPING, draw_site
-from turnout_blind.true_site import uniform_world
 
 
 def fading(x, omega, k, c, rail):

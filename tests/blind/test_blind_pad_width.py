@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.oracles.uniform_world import uniform_world
 
 from turnout.simulate.frequency_response import responses
 from turnout.simulate.matrices import assemble
@@ -11,7 +12,6 @@ from turnout.simulate.rail import Rail
 from turnout.simulate.track import Track
 from turnout_blind.march import TIME_STEP
 from turnout_blind.run import simulate_impacts
-from turnout_blind.true_site import uniform_world
 
 LINES = np.geomspace(36.0, 900.0, 22)
 IMPACTS, SENSORS = (0.0, 0.9), (0.0, 0.9, 2.1)

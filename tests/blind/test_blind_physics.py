@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.oracles.uniform_world import uniform_world
 
 from turnout_blind.grid import Rail, interpolation_weights, lost_compliance
 from turnout_blind.march import TIME_STEP, _ballast_force, hertz_force
 from turnout_blind.run import simulate_impacts, simulate_passage
-from turnout_blind.true_site import SPACING, uniform_world
+from turnout_blind.true_site import SPACING
 from turnout_blind.vehicle import GRAVITY, Car, Train
 
 CAR = Car(32e3, 1.8e6, 3000.0, 3000.0, 1500.0, 1.2e6, 60e3, 0.5e6, 80e3, 2.5, 8.0, 12.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.oracles.uniform_world import uniform_world
 
 import turnout_blind.switch as module
 from turnout.config.load import load_configuration
@@ -27,7 +28,6 @@ from turnout_blind.run import simulate_impacts, simulate_passage
 from turnout_blind.site import PLAIN, SWITCH, draw_site
 from turnout_blind.strata import plan_cases
 from turnout_blind.switch import Switch, TrueBlade
-from turnout_blind.true_site import uniform_world
 
 GEOMETRY = Switch(2.2, 8.1, 0.015, 2.5, 2.7, 0.012, 4.6, 3e8, 2e4)
 SUPPORTS = {"pad": 2.5e8, "pad_damping": 2e4, "mass": 190.0, "ballast": 9e7, "ballast_damping": 6e4}

@@ -39,10 +39,6 @@ FUNCTIONS = {
         lambda u: spectra.cross_spectra(FORCE * u(n=1), RESPONSE * u(**ACCELERATION), 1000.0 * u(s=-1)),
         [{"s": -1}, {"n": 2, "s": 1}, {"m": 2, "s": -3}, {"n": 1, "m": 1, "s": -1}],
     ),
-    "spectral_density": (
-        lambda u: spectra.spectral_density(RESPONSE[0] * u(m=1), 1000.0 * u(s=-1), 50),
-        [{"s": -1}, {"m": 2, "s": 1}, {}],
-    ),
     "h1": (lambda u: [frf.h1(G_FF * u(n=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
     "h2": (lambda u: [frf.h2(G_AA * u(m=2), G_FA * u(m=1, n=1))], [{"m": 1, "n": -1}]),
     "hv": (
@@ -65,7 +61,6 @@ FUNCTIONS = {
         lambda u: [filters.band_pass(RESPONSE * u(m=1), 20.0 * u(s=-1), 90.0 * u(s=-1), 1000.0 * u(s=-1))],
         [{"m": 1}],
     ),
-    "reduce_rate": (lambda u: [filters.reduce_rate(RESPONSE * u(n=1), 4)], [{"n": 1}]),
     "exponential_window": (lambda u: [spectra.exponential_window(50, 3, 4.0 * u(s=-1), 100.0 * u(s=-1))], [{}]),
     "correct_poles": (lambda u: [spectra.correct_poles(POLE * u(s=-1), 7.0 * u(s=-1))], [{"s": -1}]),
     "force_pulse": (lambda u: [force_pulse("half-sine", np.arange(9) * 1e-4 * u(s=1), 7e-4 * u(s=1))], [{}]),

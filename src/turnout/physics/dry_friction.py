@@ -63,21 +63,6 @@ class DryFriction(PhysicsTerm):
         ends = ((("rail", self.support), 1.0), (("sleeper", self.support), -1.0))
         return (Port(ends, FrictionLaw(self.limit, SLIP_RATE), label=f"friction at support {self.support}"),)
 
-    def damping_at(self, velocity_amplitude: float) -> float:
-        r"""Equivalent viscous damping of slip at an amplitude V well above v0, :math:`4 F_0 / (\pi V)`.
-
-        Parameters
-        ----------
-        velocity_amplitude : float
-            Amplitude of the relative velocity of rail and sleeper. [m/s]
-
-        Returns
-        -------
-        float
-            Damping. [N s/m]
-        """
-        return 4.0 * self.limit / (np.pi * velocity_amplitude)
-
     def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
         """The friction force at the relative velocity of rail and sleeper in the base simulation."""
         deflection = motion.rail - motion.sleeper

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from turnout.physics.hypothesis import ChannelSite, Hypothesis
-from turnout.physics.requirement import IMPACTS, PASSAGES
-from turnout.physics.time_offset import STARTS, TimeOffset
+from turnout.physics.one_recording_type import OneRecordingType
+from turnout.physics.time_offset import TimeOffset
 
 
 @dataclass(frozen=True)
-class HammerDelay(TimeOffset):
+class HammerDelay(OneRecordingType, TimeOffset):
     r"""One channel lags by the same time in hammer tests, :math:`T = e^{-2\pi i f \Delta t}`, and in no passage."""
 
     name = "hammer_delay"
@@ -22,10 +20,3 @@ class HammerDelay(TimeOffset):
     site_check = "Check clock and filter of this channel in the logger of the hammer tests"
     recording_types = ("hammer",)
     general_form = "time_offset"
-    requirements = (IMPACTS, PASSAGES)
-
-    @classmethod
-    def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
-        """A lag or lead of this channel, which passages can tell from one in all recordings."""
-        if site.has_passages and site.hammer_pairs:
-            yield Hypothesis(STARTS, {"channel_name": site.name}, site.where, site.n_sites)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from turnout.physics.hypothesis import ChannelSite, Hypothesis
-from turnout.physics.requirement import IMPACTS, PASSAGES
-from turnout.physics.sensor_gain import STARTS, SensorGain
+from turnout.physics.one_recording_type import OneRecordingType
+from turnout.physics.sensor_gain import SensorGain
 
 
 @dataclass(frozen=True)
-class HammerGain(SensorGain):
+class HammerGain(OneRecordingType, SensorGain):
     r"""One channel shows :math:`g` times the true signal in every hammer test, and the true one in passages.
 
     A negative g is a wrong polarity.
@@ -27,10 +25,3 @@ class HammerGain(SensorGain):
     site_check = "Check range and sensitivity of this channel in the logger of the hammer tests"
     recording_types = ("hammer",)
     general_form = "sensor_gain"
-    requirements = (IMPACTS, PASSAGES)
-
-    @classmethod
-    def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
-        """Another gain of this channel in the hammer tests; its passages show the true one."""
-        if site.has_passages and site.hammer_pairs:
-            yield Hypothesis(STARTS, {"channel_name": site.name}, site.where, site.n_sites)

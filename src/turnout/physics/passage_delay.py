@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from turnout.physics.hypothesis import ChannelSite, Hypothesis
-from turnout.physics.requirement import IMPACTS, PASSAGES
-from turnout.physics.time_offset import STARTS, TimeOffset
+from turnout.physics.one_recording_type import OneRecordingType
+from turnout.physics.time_offset import TimeOffset
 
 
 @dataclass(frozen=True)
-class PassageDelay(TimeOffset):
+class PassageDelay(OneRecordingType, TimeOffset):
     r"""One channel lags by the same time in every passage, :math:`T = e^{-2\pi i f \Delta t}`, and in no hammer test.
 
     A filter before this channel alone is such a lag. The lag of a clock that runs fast or slow grows during the record.
@@ -25,10 +23,3 @@ class PassageDelay(TimeOffset):
     site_check = "Check clock and filter of this channel in the logger of the passages"
     recording_types = ("passage",)
     general_form = "time_offset"
-    requirements = (PASSAGES, IMPACTS)
-
-    @classmethod
-    def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
-        """A lag or lead of this channel, which hammer tests can tell from one in all recordings."""
-        if site.has_passages and site.hammer_pairs:
-            yield Hypothesis(STARTS, {"channel_name": site.name}, site.where, site.n_sites)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
-from turnout.physics.hypothesis import ChannelSite, Hypothesis
-from turnout.physics.requirement import IMPACTS, PASSAGES
-from turnout.physics.sensor_gain import STARTS, SensorGain
+from turnout.physics.one_recording_type import OneRecordingType
+from turnout.physics.sensor_gain import SensorGain
 
 
 @dataclass(frozen=True)
-class PassageGain(SensorGain):
+class PassageGain(OneRecordingType, SensorGain):
     r"""One channel shows :math:`g` times the true signal in every passage, and the true one in hammer tests.
 
     A negative g is a wrong polarity.
@@ -27,10 +25,3 @@ class PassageGain(SensorGain):
     site_check = "Check range and sensitivity of this channel in the logger of the passages"
     recording_types = ("passage",)
     general_form = "sensor_gain"
-    requirements = (PASSAGES, IMPACTS)
-
-    @classmethod
-    def hypotheses(cls, site: ChannelSite) -> Iterator[Hypothesis]:
-        """Another gain of this channel in the passages; its hammer tests show the true one."""
-        if site.has_passages and site.hammer_pairs:
-            yield Hypothesis(STARTS, {"channel_name": site.name}, site.where, site.n_sites)

@@ -69,9 +69,7 @@ def exchanged_channels(record: RawRecord, indices: Sequence[int], channels: Sequ
         for i, text in _descriptions(entry, record).items():
             if i in indices and (quantity := _quantity_of_description(text, quantities)):
                 described.setdefault(i, {})[quantity] = text
-    wanted = [
-        (i, c) for i, c in zip(indices, channels) if len(described.get(i, ())) == 1 and not (c.unit or "").endswith("!")
-    ]
+    wanted = [(i, c) for i, c in zip(indices, channels) if len(described.get(i, ())) == 1 and not c.overrules_file]
     for (i, a), (k, b) in combinations(wanted, 2):
         if a.quantity != b.quantity and b.quantity in described[i] and a.quantity in described[k]:
             texts = f"{described[i][b.quantity]!r} and {described[k][a.quantity]!r}"

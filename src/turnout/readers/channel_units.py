@@ -8,9 +8,9 @@ from turnout.errors import ReadError
 from turnout.readers.inversions import INVERSION
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import words_of
+from turnout.readers.sensitivity_comparison import sensitivity_problem
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
-from turnout.readers.stated_sensitivities import sensitivity_problem
 from turnout.readers.stated_units import contradicting_unit, is_meaningless
 from turnout.records import RawChannel
 from turnout.units import Conversion, conversion, to_si
@@ -47,22 +47,21 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
         If the unit or the scale is not known, or if the file contradicts the layout.
     """
     file_unit = record.units[index]
-    is_overruled = (raw.unit or "").endswith("!")
     try:
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
         remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
-    if (scale_error := undecided_error(record, index, place, source)) and not is_overruled:
+    if (scale_error := undecided_error(record, index, place, source)) and not raw.overrules_file:
         raise scale_error
-    if not is_overruled:
+    if not raw.overrules_file:
         _check_stated_units(record, index, raw, place, source)
-    if raw.sensitivity is not None and not is_overruled:
+    if raw.sensitivity is not None and not raw.overrules_file:
         stated = record.entries, raw.sensitivity, raw.sensitivity_unit, raw.quantity, record.names, index
         if problem := sensitivity_problem(*stated):
             remedy = f"Correct the layout; if it is right, set 'unit: {raw.unit or file_unit}!' for this channel"
             raise source.error(place, problem, remedy, reason="scale_unknown")
-    if record.audio and not is_overruled:
+    if record.audio and not raw.overrules_file:
         _check_full_scale(record, index, raw.unit or "", place, source)
     return conversion_to_si
 

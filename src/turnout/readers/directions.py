@@ -80,21 +80,14 @@ def opposite_directions(record: RawRecord, channels: Sequence[RawChannel]) -> It
     tuple of (int, str, str)
         Index of the channel; name of the entry, which may be the channel's own; its text.
     """
-    wanted = [
-        i
-        for i, name in enumerate(record.names)
-        if any(c.source in (i, name, *_aliases(record, i)) and c.quantity in DIRECTED and c.sign > 0 for c in channels)
-    ]
+    rows = {record.row_of(c.source) for c in channels if c.quantity in DIRECTED and c.sign > 0}
+    wanted = sorted(row for row in rows if row is not None)
     yield from ((i, record.names[i], record.names[i]) for i in wanted if is_against_axis(record.names[i]))
     for entry in record.entries:
         if entry.is_piece or not _is_direction_name(entry.name) or not (text := _opposite_text(entry)):
             continue
         owners = owners_of(entry, record.entries, record.names)
         yield from ((i, entry.name, text) for i in wanted if not owners or i in owners)
-
-
-def _aliases(record: RawRecord, i: int) -> tuple[str, ...]:
-    return record.aliases[i] if i < len(record.aliases) else ()
 
 
 def _opposite_text(entry: Entry) -> str:

@@ -15,9 +15,9 @@ from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, w
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
+from turnout.readers.sensitivity_comparison import other_sensitivities, uncompared_sensitivities
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import without_checked_signs
-from turnout.readers.stated_sensitivities import other_sensitivities, uncompared_sensitivities
 from turnout.readers.stated_starts import is_start_name
 from turnout.readers.stated_units import with_stated_units
 from turnout.readers.stated_zones import OR

@@ -3,7 +3,7 @@
 It assigns the channels of a file to those of the layout, converts units and checks what the layout states.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
@@ -13,56 +13,33 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_axes import AXES_REMEDY
-from turnout.readers.blocks import LARGEST_NUMBER, BlockReader, ChannelStatistics, channel_error
+from turnout.readers.blocks import BlockReader, ChannelStatistics
 from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.channel_units import undecided_error
 from turnout.readers.entry_check import EntryCheck
-from turnout.readers.lazy import Column
 from turnout.readers.lost_entries import lost_entry_errors, usable_conditions
-from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.rate_agreement import ABSCISSA_REMEDY, check_unknown_step, rate_remark, resolve
 from turnout.readers.rate_vocabulary import CERTAIN
 from turnout.readers.record_borders import Measurement, border_errors
-from turnout.readers.repeated_blocks import repeated_block
-from turnout.readers.simultaneous_records import add_shared, shared_channels, simultaneous_errors
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
+from turnout.readers.sample_faults import (
+    count_missing,
+    decisive_fault,
+    faults_by_channel,
+    repeat_error,
+    repetition_errors,
+)
+from turnout.readers.simultaneous_records import simultaneous_errors
+from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, unfilled_buffer
 from turnout.readers.thousands_marks import mark_errors
-from turnout.readers.time_axes import all_statements, is_count_or_time
+from turnout.readers.time_axes import all_statements
 from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
-MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
-
 VALID_REMEDY = "Export the measured samples alone; if the entry means something else, name it in 'checked_entries'"
-
-
-def _missing_sample_errors(
-    record: RawRecord, mappings: Sequence[ChannelMapping], statistics: ChannelStatistics, where: str, source: Source
-) -> dict[int, ReadError]:
-    """Errors by index of the channels with samples that the file states to be missing, or that are a code for it."""
-    errors: dict[int, ReadError] = {}
-    fills = fill_values(record.entries, record.names)
-    for i, mapping in enumerate(mappings):
-        column = record.samples[mapping.index]
-        counts = [(_count_equal(column, x), x, "which the file states for missing ones") for x in fills[mapping.index]]
-        for extreme in (statistics.lowest[i], statistics.highest[i]):
-            code = missing_code((extreme - mapping.offset) / mapping.scale)
-            if code is not None:
-                counts.append((count_alone(column, code), code, "a usual code for a missing one"))
-        if problems := [f"{n} of {len(column)} samples are {x:.7g}, {meaning}" for n, x, meaning in counts if n]:
-            place = f"{where}, channel {mapping.channel.name!r}"
-            errors[i] = source.error(place, problems[0], MISSING_REMEDY, reason="not_finite")
-    return errors
-
-
-def _count_equal(column: Column, value: float) -> int:
-    """Number of samples that equal a value."""
-    blocks = (column[start : start + BLOCK_SIZE] for start in range(0, len(column), BLOCK_SIZE))
-    return sum(int(np.count_nonzero(block == value)) for block in blocks)
 
 
 def convert_records(
@@ -169,7 +146,7 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     unread = {k: record.unread_start for k, record in records if record.unread_start}
     yield from start_errors([(k, record.started_at) for k, record in records], unread, "UTC", source)
     yield from zone_errors(raw.records, "UTC", source)
-    yield from _repetitions(records, source)
+    yield from repetition_errors(records, source)
     reported: set[tuple[str, str]] = set()
     for k, record in records:
         fills = fill_values(record.entries, record.names)
@@ -178,44 +155,10 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
             if (error := undecided_error(record, i, where, source)) and (name, "scale") not in reported:
                 reported.add((name, "scale"))
                 yield error
-            if (name, "samples") not in reported and (n := _missing_count(column, fills[i])):
+            if (name, "samples") not in reported and (n := count_missing(column, fills[i])):
                 reported.add((name, "samples"))
                 problem = "1 sample is missing" if n == 1 else f"{n} samples are missing"
                 yield source.error(where, problem, "Export the record again from the logger", reason="not_finite")
-
-
-def _repetitions(records: Sequence[tuple[int, RawRecord]], source: Source) -> Iterator[ReadError]:
-    """Errors of blocks of samples, channels and records that a file holds twice."""
-    in_memory = {
-        k: [x.astype(float) for x in record.samples if isinstance(x, np.ndarray) and x.dtype.kind in "fiu"]
-        for k, record in records
-    }
-    for k, samples in in_memory.items():
-        repeat = (
-            repeat_error(np.array(samples), f"record {k + 1}", source) if len(set(map(len, samples))) == 1 else None
-        )
-        yield from [repeat] if repeat else []
-    errors: dict[int, ReadError] = {}
-    names = {k: record.names for k, record in records}
-    for first, second, row, is_whole in shared_channels(list(in_memory.items())):
-        add_shared(errors, (first, second), "" if is_whole else names[first][row], source)
-    yield from errors.values()
-
-
-def _missing_count(column: Column, fills: Sequence[float]) -> int:
-    """Number of samples that are no finite numbers, equal a fill value or are a code for a missing sample."""
-    if column.dtype.kind not in "fiu":
-        return 0
-    count = 0
-    extremes: list[float] = []
-    for start in range(0, len(column), BLOCK_SIZE):
-        block = np.asarray(column[start : start + BLOCK_SIZE])
-        is_measured = (np.abs(block) < LARGEST_NUMBER) & ~np.isin(block, fills)
-        count += int(np.count_nonzero(~is_measured))
-        if is_measured.any():
-            extremes += [float(block[is_measured].min()), float(block[is_measured].max())]
-    codes = {missing_code(x) for x in (min(extremes), max(extremes))} - {None} if extremes else set()
-    return count + sum(count_alone(column, code) for code in codes if code is not None)
 
 
 def _count_errors(raw: RawFile, description: RawDescription, source: Source) -> Iterator[ReadError]:
@@ -284,9 +227,9 @@ class _Conversion:
         samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
         from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
         statistics = from_record(block_reader, n_sample) if is_long else from_samples(samples)
-        faults = _faults(record, channel_maps, statistics, n_sample, where, source)
+        faults = faults_by_channel(record, channel_maps, statistics, n_sample, where, source)
         usable = [i for i in range(len(channel_maps)) if i not in faults]
-        if fault := _decisive_fault(description, channel_maps, faults):
+        if fault := decisive_fault(description, channel_maps, faults):
             raise fault
         if repeat := None if is_long else repeat_error(samples, where, source):
             raise repeat
@@ -331,76 +274,6 @@ def _units_in_use(
     """Units of the channels that are read, by their numbers: of the layout, else of the file."""
     stated = {channel.name: (channel.unit or "").removesuffix("!") for channel in description.channels}
     return {m.index: stated.get(m.channel.name) or record.units[m.index] for m in channel_maps}
-
-
-REPEAT_REMEDY = (
-    "Export the record again; if its rows were appended twice, delete the second ones. If the logger's own file has "
-    "them, a buffer was written twice and the samples in its place are lost"
-)
-
-
-def repeat_error(samples: np.ndarray, where: str, source: Source) -> ReadError | None:
-    """The error of a record that holds a block of samples twice.
-
-    Parameters
-    ----------
-    samples : (n_channel, n_sample) array of float
-        Samples of its channels.
-    where : str
-        The record, for the message.
-    source : Source
-        The raw file.
-
-    Returns
-    -------
-    ReadError or None
-        None without a repeated block.
-    """
-    block = repeated_block(samples)
-    if block is None:
-        return None
-    start, copy, n = block
-    problem = f"its samples {copy} to {copy + n - 1} repeat the samples {start} to {start + n - 1} to the last digit"
-    return source.error(where, problem, REPEAT_REMEDY, reason="duplicate")
-
-
-def _decisive_fault(
-    description: RawDescription, channel_maps: Sequence[ChannelMapping], faults: Mapping[int, ReadError]
-) -> ReadError | None:
-    """The fault that makes a record useless: of a channel that is needed, or where no response is left."""
-    channels = [c.channel for c in channel_maps]
-    is_hammer = description.kind == "hammer"
-    needed = {c.name for c in channels if is_hammer and c.quantity == "force"} | set(description.required)
-    decisive = [e for i, e in faults.items() if channels[i].name in needed]
-    auxiliary = ("force", "temperature") if is_hammer else ()
-    has_response = any(c.quantity not in auxiliary for i, c in enumerate(channels) if i not in faults)
-    return next(iter(decisive if has_response else [*decisive, *faults.values()]), None)
-
-
-def _faults(
-    record: RawRecord,
-    channel_maps: Sequence[ChannelMapping],
-    statistics: ChannelStatistics,
-    n_sample: int,
-    where: str,
-    source: Source,
-) -> dict[int, ReadError]:
-    """Error of each channel that cannot be used, by its index: those with missing samples first."""
-    of_statistics = {
-        i: e
-        for i, channel_statistics in enumerate(statistics.by_channel())
-        if (e := channel_error(n_sample, channel_statistics, channel_maps[i].channel, where, source))
-    }
-    of_axes = {
-        i: source.error(f"{where}, channel {mapping.channel.name!r}", AXIS_PROBLEM, AXIS_REMEDY, "channel_missing")
-        for i, mapping in enumerate(channel_maps)
-        if mapping.channel.quantity in ("force", "acceleration") and is_count_or_time(record.samples[mapping.index])
-    }
-    return _missing_sample_errors(record, channel_maps, statistics, where, source) | of_axes | of_statistics
-
-
-AXIS_PROBLEM = "its samples rise in equal steps: they are times or count the samples, and no sensor measured them"
-AXIS_REMEDY = "Correct 'source' of this channel in the layout; export each channel without a time of its own beside it"
 
 
 def _sample_count(record: RawRecord, where: str, promised: int | None, source: Source) -> int:

@@ -15,7 +15,7 @@ from turnout.readers.rate_units import words_of
 STRONG, WEAK, NONE = 2, 1, 0
 MIN_STEM = 4  # letters: a shorter one is part of too many other words
 
-# Sensitivity of a sensor, of which ``stated_sensitivities`` compares the value.
+# Sensitivity of a sensor, of which ``sensitivity_comparison`` compares the value.
 SENSITIVITY_STEMS = r"sensitiv|empfind|sensibi|gevoelig|folsom|citliv|czu[l\u0142]|kanslig|herkkyy|erzekeny|hassasiyet"
 
 # Stems (English, German, French, Danish, Swedish, Dutch, Spanish, Italian, Czech, Polish); "$" is the end of a word.

@@ -41,6 +41,7 @@ from turnout.readers.channel_groups import STATED_SCALES, with_channel_groups
 from turnout.readers.channel_maps import kind_of
 from turnout.readers.channel_matrices import with_records_of_channels
 from turnout.readers.clock_texts import with_durations
+from turnout.readers.column_forms import HEAD_SIZE, rises_evenly
 from turnout.readers.entries import MAX_ENTRIES, UnreadObject
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.metadata_names import (
@@ -58,7 +59,6 @@ from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
-from turnout.readers.time_axes import HEAD_SIZE, rises_evenly
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER
+from turnout.readers.column_forms import HEAD_SIZE
 from turnout.readers.lazy import Column
 from turnout.readers.rate_statements import MIN_EPOCH, TIME_SCALES
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.time_axes import HEAD_SIZE, has_time_in_seconds, is_unit_of_no_time
+from turnout.readers.time_axes import has_time_in_seconds, is_unit_of_no_time
 
 MIN_BLOCK = 32  # samples: no record is shorter, and a state that changes faster numbers none
 MIN_COUNTING_SHARE = 0.9  # of the first steps of a counter are equal: the others are restarts

@@ -270,6 +270,22 @@ class RawRecord:
         if not len(self.names) == len(self.samples) == len(self.units):
             raise ValueError(f"{len(self.names)} names, {len(self.samples)} channels, {len(self.units)} units")
 
+    def row_of(self, channel: str | int) -> int | None:
+        """Row of the channel with a name, a further name or a number of the layout.
+
+        Parameters
+        ----------
+        channel : str or int
+            Source of a channel of the layout.
+
+        Returns
+        -------
+        int or None
+            The first such row; None if the record does not have the channel.
+        """
+        aliases = (*self.aliases, *((),) * len(self.names))
+        return next((i for i, name in enumerate(self.names) if channel in (i, name, *aliases[i])), None)
+
 
 @dataclass(frozen=True)
 class RawFile:

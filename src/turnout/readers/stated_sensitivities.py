@@ -1,6 +1,5 @@
-"""Sensitivities that a file states for its sensors, compared with those of the layout."""
+"""Sensitivities that a file states for its sensors, in entries of its metadata and in names of channels."""
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -14,8 +13,6 @@ from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME
-from turnout.records import RawChannel
-from turnout.units import to_si
 
 SENSITIVITY = re.compile(SENSITIVITY_STEMS)
 # What is beside a sensitivity: the frequency and the day at which it was measured, its tolerance, that of the trigger,
@@ -35,37 +32,6 @@ NUMBER_AND_RATIO = re.compile(rf"(?<![\w.,])({NUMBER})\s?[\[(]?\s?({RATIO})")
 RATIO_AND_NUMBER = re.compile(rf"(?<![\w/])({RATIO})[\])]?[\s:=]+({NUMBER})(?![\w/])")
 ENGINEERING_UNIT = re.compile(r"/\s?(?:EU|units?)$", re.IGNORECASE)  # that of the channel
 MAX_TEXT = 1000  # characters of a text that are searched
-# Words beside that of the sensitivity that speak of no sensor in particular, without case and accents.
-GENERAL_WORDS = frozenset(
-    "sensor sensors transducer channel channels kanal kanale capteur aufnehmer sensitivity nominal calibrated "
-    "calibration kalibriert nenn value wert of the der des du de".split()
-)
-# Words for the sensors of a quantity.
-SENSOR_WORDS = {
-    "force": re.compile(r"hammer|force|kraft|load"),
-    "acceleration": re.compile(r"acc|beschl"),
-    "velocity": re.compile(r"velocity|geophon|geschw|vitesse"),
-    "displacement": re.compile(r"displ|deflection|weg"),
-    "strain": re.compile(r"strain|dehnung"),
-}
-MAX_SENSITIVITY_DEVIATION = 0.1  # relative: a certificate and a logger's nominal sensitivity differ by less
-PREFIX_RATIOS = tuple(10.0**p for p in (-6, -3, 0, 3, 6))  # of units of one sensitivity
-
-
-def sensitivity_entries(entries: Iterable[Entry]) -> tuple[Entry, ...]:
-    """Entries of the metadata that state the sensitivity of a sensor.
-
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Metadata of a record.
-
-    Returns
-    -------
-    tuple of Entry
-        Without those about a trigger, a frequency, a tolerance, a temperature or a date.
-    """
-    return tuple(entry for entry in entries if is_sensitivity_name(entry.name))
 
 
 def is_sensitivity_name(name: str) -> bool:
@@ -108,164 +74,6 @@ def with_named_sensitivities(record: RawRecord) -> RawRecord:
     return replace(record, entries=(*record.entries, *entries), units=units) if entries else record
 
 
-def sensitivity_problem(
-    entries: Iterable[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str] = ("",), index: int = 0
-) -> str:
-    """The problem of a message if the metadata state sensitivities of a channel and none is that of the layout.
-
-    Only entries count whose unit can be that of the quantity, or that belong to the channel.
-
-    Parameters
-    ----------
-    entries : iterable of Entry
-        Metadata of a record.
-    sensitivity : float
-        Sensitivity of the channel in the layout.
-    unit : str
-        Its unit.
-    quantity : str
-        Quantity of the channel in the layout.
-    names : sequence of str
-        Names of the channels of the file.
-    index : int
-        The channel among them.
-
-    Returns
-    -------
-    str
-        "" if the file states none, or one that agrees within a tenth; without a unit, up to a prefix such as "m".
-
-    Examples
-    --------
-    >>> stated = [Entry("head", "Sensitivity", "10.2 mV/(m/s²)")]
-    >>> sensitivity_problem(stated, 100.0, "mV/g", "acceleration")
-    ''
-    >>> bool(sensitivity_problem(stated, 35.3, "mV/g", "acceleration"))
-    True
-    """
-    of_channel = _comparison(list(entries), sensitivity, unit, quantity, names, index)
-    if any(agrees for agrees, _ in of_channel):
-        return ""
-    certain = [entry for _, entry in of_channel if _is_certain(entry, entries, names)]
-    if not certain:
-        return ""
-    listed = "; ".join(dict.fromkeys(f"{entry.name}: {entry.value}" for entry in certain[:3]))
-    return f"the file states {listed[:100]!r}, and the layout's sensitivity of {sensitivity:g} {unit} is none of these"
-
-
-def _comparison(
-    entries: Sequence[Entry], sensitivity: float, unit: str, quantity: str, names: Sequence[str], index: int
-) -> list[tuple[bool, Entry]]:
-    """(whether it agrees, entry) of each sensitivity that can be compared: those of the channel, else all others."""
-    compared = [
-        (bool(owners), agrees, entry)
-        for entry, owners, stated in _stated_of_channel(entries, names, index)
-        for number, own_unit in stated
-        if (agrees := _agrees(number, own_unit, sensitivity, unit, quantity, bool(owners), entry)) is not None
-    ]
-    of_channel = [statement for statement in compared if statement[0]] or compared
-    return [(agrees, entry) for _, agrees, entry in of_channel]
-
-
-def _is_certain(entry: Entry, entries: Iterable[Entry], names: Sequence[str]) -> bool:
-    """Whether a sensitivity stands under such a name or at a channel, and not in a free text of no channel."""
-    if is_sensitivity_name(entry.name) or named_channels(str(entry.value), names):
-        return True
-    return bool(owners_of(entry, list(entries), names))
-
-
-def other_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[Entry]:
-    """Entries of free text that state another sensitivity than the layout and name no channel.
-
-    Parameters
-    ----------
-    record : RawRecord
-        The record as it is in the file.
-    channels : sequence of RawChannel
-        Channels of the layout; only those with a sensitivity count, and whose unit does not end with "!".
-
-    Yields
-    ------
-    Entry
-        None if another entry states the sensitivity of the layout.
-    """
-    if not states_sensitivity(record.entries):
-        return
-    for channel in channels:
-        row = None if (channel.unit or "").endswith("!") or not channel.sensitivity else _row_of(record, channel)
-        if row is None:
-            continue
-        in_layout = channel.sensitivity or 1.0, channel.sensitivity_unit or "", channel.quantity
-        compared = _comparison(record.entries, *in_layout, record.names, row)
-        if compared and not any(agrees for agrees, _ in compared):
-            yield from (e for _, e in compared if not _is_certain(e, record.entries, record.names))
-
-
-def uncompared_sensitivities(record: RawRecord, channels: Sequence[RawChannel]) -> Iterator[Entry]:
-    """Entries about the sensitivity of a sensor that cannot be compared with that of any channel of the layout.
-
-    Parameters
-    ----------
-    record : RawRecord
-        The record as it is in the file.
-    channels : sequence of RawChannel
-        Channels of the layout; only those with a sensitivity count, and whose unit does not end with "!".
-
-    Yields
-    ------
-    Entry
-        None that speaks of another sensor, or that has no value.
-    """
-    wanted = [(i, c) for c in channels if c.sensitivity and (i := _row_of(record, c)) is not None]
-    if not wanted or not states_sensitivity(record.entries):
-        return
-    unclear: dict[int, Entry] = {}
-    compared: set[int] = set()
-    for i, channel in wanted:
-        for entry, owners, stated in _stated_of_channel(record.entries, record.names, i):
-            is_overruled = (channel.unit or "").endswith("!") or bool(sensitivities_in_text(entry.name))
-            if is_overruled or any(_is_compared(x, unit, channel, bool(owners), entry) for x, unit in stated):
-                compared.add(id(entry))
-            elif owners or (is_sensitivity_name(entry.name) and _is_general(entry.name, channel.quantity)):
-                if not _may_be_sensitivity(entry, stated):
-                    continue
-                is_other = any(_sensitivity_scale(quantity, x, unit) for x, unit in stated for quantity in SENSOR_WORDS)
-                unclear |= {} if is_other and not owners else {id(entry): entry}
-    yield from (entry for key, entry in unclear.items() if key not in compared)
-
-
-# What is said about a sensitivity beside its value.
-ABOUT_SENSITIVITY = re.compile(r"check|valid|drift|calibrated|kalibriert|gepruft")
-
-
-def _may_be_sensitivity(entry: Entry, stated: Sequence[tuple[float, str]]) -> bool:
-    """Whether the value of an entry under the name of a sensitivity may be one: it has a digit, and is no gain of 1."""
-    if not re.search(r"\d", str(entry.value)):
-        return False  # "see certificate"
-    if ABOUT_SENSITIVITY.search(plain_word(entry.name)) and not any(unit for _, unit in stated):
-        return False
-    return not (GAIN_OF_ONE.fullmatch(str(entry.value).strip()))
-
-
-GAIN_OF_ONE = re.compile(r"(?:1(?:[.,]0+)?\s?V|1000(?:[.,]0+)?\s?mV)\s?/\s?(?:V|EU|units?)", re.IGNORECASE)
-
-
-def _is_compared(number: float, unit: str, channel: RawChannel, is_own: bool, entry: Entry) -> bool:
-    """Whether a stated sensitivity can be compared with that of a channel of the layout."""
-    in_layout = channel.sensitivity or 1.0, channel.sensitivity_unit, channel.quantity
-    return _agrees(number, unit, *in_layout, is_own, entry) is not None
-
-
-def _row_of(record: RawRecord, channel: RawChannel) -> int | None:
-    """Row of a channel of the layout among those of the file."""
-    rows = (i for i, name in enumerate(record.names) if channel.source in (i, name, *_aliases(record, i)))
-    return next(rows, None)
-
-
-def _aliases(record: RawRecord, i: int) -> tuple[str, ...]:
-    return record.aliases[i] if i < len(record.aliases) else ()
-
-
 def states_sensitivity(entries: Iterable[Entry]) -> bool:
     """Whether an entry of the metadata states the sensitivity of a sensor, by its name or in its text.
 
@@ -281,10 +89,25 @@ def states_sensitivity(entries: Iterable[Entry]) -> bool:
     return any(is_sensitivity_name(entry.name) or _ratios_beside(entry) for entry in entries)
 
 
-def _stated_of_channel(
+def sensitivities_of_channel(
     entries: Sequence[Entry], names: Sequence[str], index: int
 ) -> Iterator[tuple[Entry, frozenset[int], list[tuple[float, str]]]]:
-    """Each entry about a sensitivity that may be of a channel, with its owners and its numbers with their units."""
+    """Entries about a sensitivity that may be that of a channel.
+
+    Parameters
+    ----------
+    entries : sequence of Entry
+        Metadata of a record.
+    names : sequence of str
+        Names of the channels of the file.
+    index : int
+        The channel among them.
+
+    Yields
+    ------
+    tuple of (Entry, frozenset of int, list of (float, str))
+        The entry, the channels that it names, and its numbers with their units.
+    """
     for entry in entries:
         is_named = is_sensitivity_name(entry.name)
         if not is_named and not _ratios_beside(entry):
@@ -395,40 +218,3 @@ def _unit_beside(entry: Entry, entries: Sequence[Entry]) -> str:
         if is_of_unit and isinstance(other.value, str) and container_of(other) == container_of(entry):
             return other.value.strip()
     return ""
-
-
-def _agrees(
-    number: float, own_unit: str, sensitivity: float, unit: str, quantity: str, is_own: bool, entry: Entry
-) -> bool | None:
-    """Whether a stated sensitivity is that of the layout; None if it cannot be compared or is of another sensor."""
-    if not own_unit:
-        if not is_own and not _is_general(entry.name, quantity):
-            return None
-        ratio = abs(number) / sensitivity
-        is_tenfold = abs(ratio / 10.0 ** round(math.log10(ratio)) - 1.0) <= MAX_SENSITIVITY_DEVIATION
-        # Where the ratio is a power of ten, the reciprocal would make a factor of ten look like another unit.
-        ratios = (ratio,) if is_tenfold else (ratio, 1.0 / (abs(number) * sensitivity))
-        return any(abs(r / prefix - 1.0) <= MAX_SENSITIVITY_DEVIATION for r in ratios for prefix in PREFIX_RATIOS)
-    stated, in_layout = _sensitivity_scale(quantity, number, own_unit), _sensitivity_scale(quantity, sensitivity, unit)
-    if stated and in_layout:
-        same_kind = stated[0] == in_layout[0]
-        return abs(stated[1] / in_layout[1] - 1.0) <= MAX_SENSITIVITY_DEVIATION if same_kind else None
-    is_of_other_quantity = any(_sensitivity_scale(other, number, own_unit) for other in SENSOR_WORDS)
-    return False if is_own and is_of_other_quantity else None
-
-
-def _sensitivity_scale(quantity: str, number: float, unit: str) -> tuple[str, float] | None:
-    """(electrical unit, SI per electrical unit) of a sensitivity; None if the unit is none of the quantity."""
-    for electrical in ("V", "count"):
-        try:
-            return electrical, to_si(quantity, electrical, abs(number), unit).scale
-        except ValueError:
-            continue
-    return None
-
-
-def _is_general(name: str, quantity: str) -> bool:
-    """Whether the name of a sensitivity speaks of no other sensor than one of the quantity."""
-    words = [plain_word(word) for word in spaced_words(re.sub(r"[\[(].*?[\])]", "", name)).split()]
-    specific = [w for w in words if w not in GENERAL_WORDS and not SENSITIVITY.search(w) and not w.isdigit()]
-    return not specific or any(SENSOR_WORDS[quantity].search(w) for w in specific if quantity in SENSOR_WORDS)

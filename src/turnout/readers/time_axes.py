@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from turnout.readers.column_forms import HEAD_SIZE, MIN_AXIS_SIZE, counts_in_disorder, is_on_line, rises_evenly
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
 from turnout.readers.precision import EXACT_PRECISION, around
@@ -17,11 +18,7 @@ from turnout.readers.stated_units import known_unit
 from turnout.readers.time_numbers import unit_of_axis
 from turnout.readers.timing import check_time, rate_of_time, seconds_since_first
 
-HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
-MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
-MAX_JUMP_SHARE = 0.02  # gaps per step among the first samples: with more a column rises too unevenly for a time axis
 MAX_RATE_DIFFERENCE = 1e-3  # relative: axes of other rates have other units or contradict each other
-MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
 
 
 def all_statements(
@@ -290,34 +287,6 @@ def has_time_in_seconds(record: RawRecord, measured: Set[int]) -> bool:
     return is_known or any(is_in_seconds for *_, is_in_seconds, _ in _columns(record, measured))
 
 
-def is_count_or_time(column: Column) -> bool:
-    """Whether a column rises evenly at its beginning and at its end, as times and counts do and no measured signal.
-
-    Parameters
-    ----------
-    column : (n,) array or LazyColumn
-        Samples of a channel as they are in the file.
-
-    Returns
-    -------
-    bool
-        False for fewer than 64 samples.
-
-    Examples
-    --------
-    >>> is_count_or_time(np.arange(100)), is_count_or_time(np.sin(0.01 * np.arange(1000)))
-    (True, False)
-    """
-    n_sample = len(column)
-    if n_sample < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
-        return False
-    step = float(column[1:2][0]) - float(column[:1][0])
-    return step > 0.0 and all(_is_on_line(column[k : k + HEAD_SIZE]) for k in (0, max(0, n_sample - HEAD_SIZE)))
-
-
-MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measures nothing
-
-
 REVERSE_REMEDY = (
     "Sort the rows by this column and export them again; if it is no time and no count, give it the unit of its "
     "quantity in the layout, or name it under 'checked_entries'"
@@ -340,10 +309,10 @@ def _check_counters(
         if i in measured or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE or _is_checked(name, checked):
             continue
         may_be_reversed = not is_proven and not is_unit_of_no_time(record.units[i])
-        if may_be_reversed and _is_on_line(-np.asarray(column[:HEAD_SIZE], dtype=float)):
+        if may_be_reversed and is_on_line(-np.asarray(column[:HEAD_SIZE], dtype=float)):
             problem = f"column {name!r} falls evenly from its first sample on: the samples may be in reverse order"
             raise source.error(where, problem, REVERSE_REMEDY, "clock_backwards")
-        if _counts_in_disorder(column):
+        if counts_in_disorder(column):
             problem = f"the samples are not in the order in which column {name!r} counts them"
             raise source.error(where, problem, "Sort the rows by this column and export them again", "clock_backwards")
         steps = np.diff(np.asarray(column[:HEAD_SIZE], dtype=float))
@@ -357,48 +326,7 @@ def _check_counters(
             raise source.error(where, problem, remedy, reason="truncated")
 
 
-def _counts_in_disorder(column: Column) -> bool:
-    """Whether a column holds consecutive whole numbers, each once, in no order."""
-    head = np.asarray(column[:HEAD_SIZE], dtype=float)
-    if (np.diff(head) > 0).all() or not (head == np.rint(head)).all() or len(np.unique(head)) < len(head):
-        return False
-    count = np.sort(np.asarray(column[:], dtype=float))
-    return bool((np.diff(count) == 1.0).all()) and not (np.diff(head) == -1.0).all()
-
-
 MIN_COUNTING_SHARE = 0.9  # of the first steps of a counter are 1; it may begin again some times
-
-
-def rises_evenly(head: np.ndarray) -> bool:
-    """Whether the first samples of a column are those of a time axis: on a rising line, in other steps than 1.
-
-    Parameters
-    ----------
-    head : (n,) array
-        The first numbers of a column.
-
-    Returns
-    -------
-    bool
-        False for whole numbers in steps of 1, which count the samples, and for fewer than 8 numbers.
-    """
-    return _is_on_line(head) and not (np.diff(np.asarray(head, dtype=float)) == 1.0).all()
-
-
-def _is_on_line(samples: np.ndarray) -> bool:
-    """Whether samples lie on a rising line; one jump may be in it, and a few in many samples."""
-    samples = np.asarray(samples, dtype=float)
-    if len(samples) < MIN_AXIS_SIZE or not np.isfinite(samples).all():
-        return False
-    steps = np.diff(samples)
-    if (steps <= 0).any():
-        return False
-    step = float(np.median(steps))
-    line = samples[0] + (samples[-1] - samples[0]) * np.arange(len(samples)) / (len(samples) - 1)
-    n_jump = np.count_nonzero(np.abs(steps - step) > 0.5 * step)
-    return bool(
-        np.abs(samples - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= max(1, MAX_JUMP_SHARE * len(steps))
-    )
 
 
 def _constant_columns(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:

@@ -8,7 +8,7 @@ from turnout.readers.entry_owners import owners_of
 from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
-from turnout.readers.stated_sensitivities import sensitivity_entries
+from turnout.readers.stated_sensitivities import is_sensitivity_name
 from turnout.records import RawChannel
 from turnout.units import IGNORED
 
@@ -42,14 +42,13 @@ def converting_entries(record: RawRecord, channels: Sequence[RawChannel]) -> Ite
     ]
     if not wanted:
         return
-    entries = list(record.entries)
-    of_sensors = set(map(id, sensitivity_entries(entries)))
-    for entry in entries:
-        if entry.is_defined or entry.is_piece or not (id(entry) in of_sensors or RANGE.search(plain_word(entry.name))):
+    for entry in record.entries:
+        is_scale = is_sensitivity_name(entry.name) or RANGE.search(plain_word(entry.name))
+        if entry.is_defined or entry.is_piece or not is_scale:
             continue
         if not _is_number(entry.value):
             continue
-        owners = owners_of(entry, entries, record.names)
+        owners = owners_of(entry, record.entries, record.names)
         yield from ((i, entry) for i in wanted if not owners or i in owners)
 
 

@@ -30,6 +30,11 @@ class RawChannel:
     limit: float | None = None
     resolution: float | None = None
 
+    @property
+    def overrules_file(self) -> bool:
+        """Whether its unit holds whatever the file states: it ends with "!"."""
+        return (self.unit or "").endswith("!")
+
 
 @dataclass(frozen=True)
 class RawDescription:

@@ -209,18 +209,18 @@ def _event_lines(contents: FileContents) -> list[str]:
         unit = next(c.unit for c in contents.channels if c.name == contents.event_channel)
         sizes = sorted(abs(e.size) for e in contents.events)
         span = f"peaks {sizes[0]:.4g} to {sizes[-1]:.4g} {unit or '(no unit)'} in {contents.event_channel!r}"
-        return [_line("impacts", f"{len(sizes)}, {span}"), _line("", _event_times(contents, "s"))]
+        return [_line("impacts", f"{len(sizes)}, {span}"), _line("", _event_times(contents))]
     if contents.kind == "trains":
         stretches = f"{len(contents.events)}, parts with strong vibration for longer than elsewhere"
-        return [_line("trains", stretches), _line("", _event_times(contents, "s"))]
+        return [_line("trains", stretches), _line("", _event_times(contents))]
     return [_line("impacts", "none found; no train found either")]
 
 
-def _event_times(contents: FileContents, unit: str) -> str:
-    moments = {f"{e.time:.4g} {unit}" for e in contents.events}
+def _event_times(contents: FileContents) -> str:
+    moments = {f"{e.time:.4g} s" for e in contents.events}
     if len(moments) == 1 and len({e.record for e in contents.events}) == len(contents.events) > 1:
         return f"one in each of {len(contents.events)} records, at {moments.pop()}"
-    times = [f"record {e.record} at {e.time:.4g} {unit}" for e in contents.events[:MAX_EVENTS]]
+    times = [f"record {e.record} at {e.time:.4g} s" for e in contents.events[:MAX_EVENTS]]
     return ", ".join(times) + (" ..." if len(contents.events) > MAX_EVENTS else "")
 
 

@@ -177,33 +177,3 @@ def lower_coherence_limit(estimate: ArrayLike, n: int, level: float = 0.95) -> n
     0.8 0.8
     """
     return true_coherence_with_quantile(estimate, n, level)
-
-
-def zero_coherence_level(n: int, level: float = 0.95) -> float:
-    """Estimate that incoherent signals exceed with probability 1 - level.
-
-    .. math:: 1 - (1 - p)^{1/(n-1)}
-
-    Parameters
-    ----------
-    n : int
-        Independent records averaged.
-    level : float
-        p, probability that an estimate is below the result. [-]
-
-    Returns
-    -------
-    float
-        1 for a single record. [-]
-
-    References
-    ----------
-    Carter, Knapp and Nuttall 1973, IEEE Trans. Audio Electroacoust. 21(4), 337-344: the distribution for true coherence
-    0.
-
-    Examples
-    --------
-    >>> [round(zero_coherence_level(n), 2) for n in (3, 10, 30)]
-    [0.78, 0.28, 0.1]
-    """
-    return 1.0 if n < 2 else 1.0 - (1.0 - level) ** (1.0 / (n - 1))

@@ -94,37 +94,6 @@ def band_pass(
     return apply_sections(sections, np.asarray(x, dtype=float), axis=-1)
 
 
-def reduce_rate(x: np.ndarray, factor: int) -> np.ndarray:
-    """Every ``factor``-th sample after a linear-phase anti-alias filter without delay, along the last axis.
-
-    Parameters
-    ----------
-    x : (..., n) array of float
-        Samples. [any unit]
-    factor : int
-        Old rate over new rate. [-]
-
-    Returns
-    -------
-    (..., m) array of float
-        One sample for every ``factor`` of them. [same unit]
-
-    Raises
-    ------
-    ValueError
-        ``factor`` is not a whole number of 1 or more.
-
-    Examples
-    --------
-    >>> print(reduce_rate(np.full(400, 2.5), 4).shape)
-    (100,)
-    """
-    x = np.asarray(x, dtype=float)
-    if int(factor) != factor or factor < 1:
-        raise ValueError(f"need a whole factor of 1 or more, got {factor}")
-    return x if factor == 1 else scipy.signal.resample_poly(x, 1, int(factor), axis=-1, padtype="line")
-
-
 # Skewed pulse x^p e^(p (1-x)): it rises fast and decays slowly; above 2 % of its peak until x = SKEW_END.
 SKEW_EXPONENT = 3.0
 SKEW_END = 3.5791

@@ -73,48 +73,6 @@ def cross_spectra(
     return rfftfreq(n_fft, 1.0 / rate), g_xx, g_yy, g_xy
 
 
-def spectral_density(x: np.ndarray, rate: float, n_segment: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """One-sided power spectral density averaged over adjoining segments without window.
-
-    Parameters
-    ----------
-    x : (n_sample,) array of float
-        [any unit u]
-    rate : float
-        Sampling rate. [Hz]
-    n_segment : int
-        Samples per segment; an incomplete last segment is ignored.
-
-    Returns
-    -------
-    frequency, density : (n_frequency,) array of float
-        [Hz], [u²/Hz]
-    n : int
-        Number of segments averaged: what ``density_interval`` needs.
-
-    Raises
-    ------
-    ValueError
-        Fewer samples than one segment.
-
-    Examples
-    --------
-    A sine of amplitude 3 that fits its segment carries the power 9/2, all in one line of 5 Hz width.
-
-    >>> t = np.arange(4000) / 1000.0
-    >>> frequency, density, n = spectral_density(3.0 * np.sin(2 * np.pi * 50.0 * t), 1000.0, 200)
-    >>> print(f"{density[10] * 5.0:.3f} at {frequency[10]:.0f} Hz from {n} segments")
-    4.500 at 50 Hz from 20 segments
-    """
-    x = np.asarray(x, dtype=float)
-    n = x.size // n_segment
-    if n < 1:
-        raise ValueError(f"{x.size} samples hold no segment of {n_segment}")
-    segments = x[: n * n_segment].reshape(n, n_segment)
-    frequency, density, _, _ = cross_spectra(segments, segments, rate, n_segment)
-    return frequency, density, n
-
-
 def density_interval(n: int, level: float = 0.95) -> tuple[float, float]:
     r"""Factors that turn an averaged spectral density into its confidence limits.
 

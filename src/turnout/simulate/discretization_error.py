@@ -15,7 +15,7 @@ from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
 BANDS = ((5.0, 40.0), (40.0, 120.0), (120.0, 300.0), (300.0, 600.0), (600.0, 1000.0))
 # Convergence orders of the waveform. Order three of Radau is measured (2.9 to 3) where its error is above 0.1 %. Below
@@ -44,21 +44,6 @@ class NumericalError:
     def total(self) -> np.ndarray:
         """(n_sensor, n_band) sum of both errors."""
         return self.step + self.mesh
-
-    def allows(self, mismatch: np.ndarray | float) -> np.ndarray:
-        """(n_sensor, n_band) whether the error allows a diagnosis: it is below a third of the relative ``mismatch``.
-
-        Parameters
-        ----------
-        mismatch : (n_sensor, n_band) array of float, or float
-            Relative difference between model and recording.
-
-        Returns
-        -------
-        (n_sensor, n_band) array of bool
-            Whether the diagnosis is allowed.
-        """
-        return self.total < np.asarray(mismatch) / 3.0
 
     def __str__(self) -> str:
         lines = ["sensor      " + "".join(f"{a:>8.0f}-{b:<6.0f}" for a, b in self.bands) + " Hz"]
@@ -104,8 +89,8 @@ def numerical_error(case: PassageCase) -> NumericalError:
     base, finer_step = samples(case.track, substeps), samples(case.track, 2 * substeps)
     elements = 2 * _base_track(case.track).elements_per_bay
     finer_mesh = samples(_with_elements(case.track, elements), substeps)
-    step, level_step = compare_recordings(base, finer_step, rate, BANDS)
-    mesh, level_mesh = compare_recordings(base, finer_mesh, rate, BANDS)
+    step, level_step = compare_recordings(base, finer_step, rate)
+    mesh, level_mesh = compare_recordings(base, finer_mesh, rate)
     step, mesh = (
         _extrapolate_error(step, STEP_ORDER[options.get("scheme", "radau")]),
         _extrapolate_error(mesh, MESH_ORDER),
@@ -118,10 +103,8 @@ def _extrapolate_error(difference: np.ndarray, order: int) -> np.ndarray:
     return difference * 2.0**order / (2.0**order - 1.0)
 
 
-def compare_recordings(
-    coarse: np.ndarray, fine: np.ndarray, rate: float, bands: Sequence[tuple[float, float]] = BANDS
-) -> tuple[np.ndarray, np.ndarray]:
-    """Relative waveform difference and level difference [dB] of two (n_sensor, n) recordings in each band.
+def compare_recordings(coarse: np.ndarray, fine: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Relative waveform difference and level difference [dB] of two (n_sensor, n) recordings in each of ``BANDS``.
 
     Parameters
     ----------
@@ -131,8 +114,6 @@ def compare_recordings(
         Signals of the finer run; the longer of the two is cut.
     rate : float
         Sampling rate. [Hz]
-    bands : sequence of (float, float)
-        Lowest and highest frequency of each band. [Hz]
 
     Returns
     -------
@@ -143,8 +124,8 @@ def compare_recordings(
     window = np.hanning(n)
     a, b = (np.fft.rfft(window * signal[:, :n]) for signal in (coarse, fine))
     frequency = np.fft.rfftfreq(n, 1.0 / rate)
-    waveform, level = np.zeros((coarse.shape[0], len(bands))), np.zeros((coarse.shape[0], len(bands)))
-    for k, (low, high) in enumerate(bands):
+    waveform, level = np.zeros((coarse.shape[0], len(BANDS))), np.zeros((coarse.shape[0], len(BANDS)))
+    for k, (low, high) in enumerate(BANDS):
         inside = (frequency >= low) & (frequency < high)
         power = np.sum(np.abs(b[:, inside]) ** 2, axis=1)
         waveform[:, k] = np.sqrt(np.sum(np.abs(a - b)[:, inside] ** 2, axis=1) / power)
@@ -175,7 +156,7 @@ def end_error(case: PassageCase, extra: float = 30.0) -> np.ndarray:
     shifted_options = options | {"terms": tuple(shift_supports(term, count) for term in options.get("terms", ()))}
     base = simulate_passage(smooth, case.vehicle, case.speed, sensors, **options)
     longer = simulate_passage(_lengthen(smooth, extra), case.vehicle, case.speed, sensors, **shifted_options)
-    return compare_recordings(base.samples, longer.samples, rate, BANDS)[0]
+    return compare_recordings(base.samples, longer.samples, rate)[0]
 
 
 def _without_prepared(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -179,38 +179,3 @@ def propagation(frequency: np.ndarray | Sequence[float], track: Track) -> np.nda
         multiplier, _ = _bay_transfer(2.0 * np.pi * f, track.rail, spacing, stiffness[line])
         wavenumber[line] = 1j * np.log(multiplier[[1, 0]]) / spacing
     return wavenumber
-
-
-def pinned_pinned_frequency(rail: Rail, spacing: float) -> float:
-    r"""First pinned-pinned resonance [Hz]: half a wave of the free rail between two supports.
-
-    Timoshenko: the lower root of :math:`a\omega^4 - b\omega^2 + c = 0` with
-    :math:`a = \rho I m/\kappa GA,\ b = m + mB^2EI/\kappa GA + \rho I B^2,\ c = EI B^4,\ B = \pi/L`;
-    Euler-Bernoulli: :math:`\frac{\pi}{2L^2}\sqrt{EI/m}`.
-
-    Parameters
-    ----------
-    rail : Rail
-        Profile of the rail.
-    spacing : float
-        Distance of two supports. [m]
-
-    Returns
-    -------
-    float
-        Frequency. [Hz]
-
-    Examples
-    --------
-    >>> from turnout.simulate.rail import Rail
-    >>> rail = Rail(6.4155e6, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5)
-    >>> f"{pinned_pinned_frequency(rail, 0.6):.0f} Hz"
-    '1070 Hz'
-    """
-    b_wave = np.pi / spacing
-    if rail.beam == "euler":
-        return float(0.5 * np.pi / spacing**2 * np.sqrt(rail.bending_stiffness / rail.mass))
-    a = rail.rotary_inertia * rail.mass / rail.shear_stiffness
-    b = rail.mass * (1.0 + b_wave**2 * rail.bending_stiffness / rail.shear_stiffness) + rail.rotary_inertia * b_wave**2
-    c = rail.bending_stiffness * b_wave**4
-    return float(np.sqrt(2.0 * c / (b + np.sqrt(b * b - 4.0 * a * c))) / (2.0 * np.pi))

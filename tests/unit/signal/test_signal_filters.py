@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import freqz_sos
 
-from turnout.signal.filters import FAMILIES, band_pass, butterworth_sections, force_pulse, reduce_rate
+from turnout.signal.filters import FAMILIES, band_pass, butterworth_sections, force_pulse
 from turnout.signal.spectra import correct_poles, exponential_window, force_window
 
 RATE = 20_000.0
@@ -29,15 +29,6 @@ def test_causal_filter_is_silent_before_the_onset_and_zero_phase_is_symmetric():
 def test_impossible_edges_are_rejected(edges):
     with pytest.raises(ValueError, match="cannot pass"):
         butterworth_sections(*edges, RATE)
-
-
-def test_a_reduction_of_the_rate_keeps_the_band_and_removes_aliases():
-    t = np.arange(8000) / RATE
-    kept, folded = np.sin(2 * np.pi * 200 * t), np.sin(2 * np.pi * 4200 * t)
-    y = reduce_rate(kept + folded, 5)
-    assert y[100:-100] == pytest.approx(kept[::5][100:-100], abs=2e-3)
-    with pytest.raises(ValueError, match="whole factor"):
-        reduce_rate(kept, 2.5)
 
 
 def test_an_exponential_window_shifts_a_pole_and_the_correction_restores_it():

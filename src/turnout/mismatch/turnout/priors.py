@@ -3,8 +3,7 @@
 Standard deviations of priors, limits of observations and searches, steps of computations. Settings that users change
 are in ``turnout.config.settings.mismatch``. A source is a page below ``docs``, a publication, or one word: "convention"
 (a usual value), "numerical" (accuracy or time of a computation).
-Those of running surface and wheels are in ``surface_priors``, those of the search for defects in ``defect_priors``;
-``prior_table`` lists all.
+Those of running surface and wheels are in ``surface_priors``, those of the search for defects in ``defect_priors``.
 """
 
 import math
