@@ -28,6 +28,8 @@ class ReadError(TurnoutError):
         What to do: a sentence without its full stop.
     reason : str
         One of ``turnout.reasons.REASONS``: the code of the quarantine row.
+    record : int or None
+        Number of the record that is concerned, from 0; None for the whole file.
 
     Examples
     --------
@@ -37,11 +39,34 @@ class ReadError(TurnoutError):
     A7_1.uff, record 7 of 30: ends after 1312 of 4096 samples. Copy the file again.
     """
 
-    def __init__(self, path: PathLike | str, where: str, problem: str, remedy: str, reason: str = "unreadable"):
+    def __init__(
+        self,
+        path: PathLike | str,
+        where: str,
+        problem: str,
+        remedy: str,
+        reason: str = "unreadable",
+        record: int | None = None,
+    ):
         super().__init__(f"{path}, {where}: {problem}. {remedy}.")
         if reason not in REASONS:
             raise ValueError(f"reason {reason!r} is not in turnout.reasons.REASONS")
         self.path, self.where, self.problem, self.remedy, self.reason = str(path), where, problem, remedy, reason
+        self.record = record
+
+    def in_record(self, record: int) -> "ReadError":
+        """The same error of one record.
+
+        Parameters
+        ----------
+        record : int
+            Number of the record, from 0.
+
+        Returns
+        -------
+        ReadError
+        """
+        return ReadError(self.path, self.where, self.problem, self.remedy, self.reason, record)
 
 
 class PartlyComputed(Exception):

@@ -139,14 +139,8 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
             for i, v in enumerate(value):
                 if isinstance(v, Mapping):
                     yield from entries_of(v, f"{path}[{i}]")
-        elif value is not None and not isinstance(value, ReadError) and _size(value) <= MAX_ENTRIES:
+        elif value is not None and not isinstance(value, ReadError) and getattr(value, "size", 1) <= MAX_ENTRIES:
             yield Entry(path, name, value)
-
-
-def _size(value: Any) -> int:
-    """Number of values; above the bound for an ``h5py.Empty``, which holds none and has no size."""
-    size = getattr(value, "size", 1)
-    return MAX_ENTRIES + 1 if size is None else int(size)
 
 
 def decoded_json(text: str) -> Any:

@@ -11,6 +11,7 @@ from turnout.errors import ReadError
 from turnout.readers.directions import opposite_directions
 from turnout.readers.entries import Entry, UnreadObject
 from turnout.readers.entry_candidates import DURATION, RATE, SCALE, UNIT, Candidate
+from turnout.readers.entry_owners import named_channels
 from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, window_entries
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
@@ -125,7 +126,8 @@ class EntryCheck:
         Raises
         ------
         ReadError
-            If an entry with the unit of a rate, or words of a scale or a unit, is not explained.
+            If an entry with the unit of a rate, or with words of a scale or a unit that may be those of a channel in
+            use, is not explained.
         """
         n_sample = len(record.samples[0])
         key = (record.units, rate, n_sample)
@@ -142,9 +144,13 @@ class EntryCheck:
             return directions
         units = self._units + with_stated_units(record).units
         facts = RecordFacts(rate, n_sample, len(record.names), n_record, units, record.names)
-        unexplained = list(unexplained_entries(new_entries, facts, self._are_certain))
+        unexplained = [
+            (entry, candidate)
+            for entry, candidate in unexplained_entries(new_entries, facts, self._are_certain)
+            if not (candidate.unit and candidate.unit in self._units_of_unused(entry, record))
+        ]
         for entry, candidate in unexplained:
-            if not candidate.is_weak and not (is_rate_stated and candidate.statement == RATE):
+            if not self._is_remark(entry, candidate, record, is_rate_stated):
                 self._seen.difference_update(_key_of(e) for e in new_entries if _is_plain(e))  # for the next records
                 raise self._error(where, [(entry, candidate)], REASONS_OF[candidate.statement])
         of_converter = list(self._converter_errors(where, record))
@@ -241,6 +247,21 @@ class EntryCheck:
             )
             channel = f"{where}, channel {record.names[i]!r}"
             yield self.source.error(channel, problem, remedy, reason="entry_unknown")
+
+    def _is_remark(self, entry: Entry, candidate: Candidate, record: RawRecord, is_rate_stated: bool) -> bool:
+        """Whether the record is used although nothing explains an entry."""
+        if candidate.is_weak or candidate.statement not in (SCALE, UNIT):
+            return candidate.is_weak or (candidate.statement == RATE and is_rate_stated)
+        return bool(self._unused_owners(entry, record))
+
+    def _units_of_unused(self, entry: Entry, record: RawRecord) -> set[str]:
+        """Units, as the reader found them, of the unused channels at which an entry stands."""
+        return {record.units[i] for i in self._unused_owners(entry, record) if i < len(record.units)}
+
+    def _unused_owners(self, entry: Entry, record: RawRecord) -> frozenset[int]:
+        """Channels, and behind them other columns, at which an entry stands if the layout uses none of them."""
+        owners = named_channels(entry.place, (*record.names, *record.not_numbers))
+        return owners if owners.isdisjoint(record.row_of(c.source) for c in self._channels) else frozenset()
 
     def _is_new(self, entry: Entry) -> bool:
         """Whether an equal entry has not been checked; arrays are always new."""

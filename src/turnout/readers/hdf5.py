@@ -61,7 +61,7 @@ def _variables(group: h5py.Group, path: str, source: Source, size_check: Hdf5Siz
     mapping_type = (
         dict if is_order_tracked else Alphabetical
     )  # members are in the order of creation only if it was tracked
-    variables = mapping_type({name: _attribute(value) for name, value in group.attrs.items()})
+    variables = mapping_type(_attributes(group))
     units: dict[str, str] = {}
     stated: dict[str, dict] = {}
     members = h5py.h5g.open(group.id, b"/") if isinstance(group, h5py.File) else group.id
@@ -78,7 +78,7 @@ def _variables(group: h5py.Group, path: str, source: Source, size_check: Hdf5Siz
             size_check.check_dataset(member.id, f"{path}/{name}")
         try:
             with source.parsed_by("HDF5", f"dataset {name!r} in {path or '/'!r}"):
-                attributes = {k: _attribute(v) for k, v in member.attrs.items()}
+                attributes = _attributes(member)
                 _check_written(member, attributes, source)
                 large = (
                     source.lazy and is_large(member) and member.dtype.names is None and name.lower() not in TIME_NAMES
@@ -86,7 +86,8 @@ def _variables(group: h5py.Group, path: str, source: Source, size_check: Hdf5Siz
                 numbers = _with_packing(member, attributes, source)
                 if large and isinstance(numbers, PackedDataset):
                     numbers = replace(numbers, fills=(*numbers.fills, *unstated_fills(numbers.dataset)))
-                variables[name] = lazy_array(numbers) if large else _values(numbers)
+                if member.shape is not None:
+                    variables[name] = lazy_array(numbers) if large else _values(numbers)
         except ReadError as error:
             variables[name] = error
             continue
@@ -211,6 +212,11 @@ def _texts(value: Any) -> Any:
     if isinstance(value, bytes):
         return decode_text(value)
     return np.array([_texts(v) for v in value.ravel()], dtype=object).reshape(value.shape)
+
+
+def _attributes(member: h5py.Group | h5py.Dataset) -> dict[str, Any]:
+    """Attributes of a group or a dataset by name; one without a value (``h5py.Empty``) states nothing."""
+    return {name: _attribute(value) for name, value in member.attrs.items() if not isinstance(value, h5py.Empty)}
 
 
 def _attribute(value: Any) -> Any:

@@ -39,6 +39,7 @@ from turnout.readers.time_axes import all_statements
 from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
+REMARKS = ("rate_ambiguous", "entry_unknown")  # once for all records of a file
 VALID_REMEDY = "Export the measured samples alone; if the entry means something else, name it in 'checked_entries'"
 
 
@@ -97,15 +98,14 @@ def convert_records(
             started_at = start if start and is_plausible(start) else None
             recording, channel_errors = conversion.recording(record, k, started_at)
             recordings.append(recording)
-            remarked = {
-                e.problem for e in errors if e.reason in ("rate_ambiguous", "entry_unknown")
-            }  # once for all records
-            errors.extend(error for error in channel_errors if error.problem not in remarked)
+            remarked = {e.problem for e in errors if e.reason in REMARKS}
+            new = [error for error in channel_errors if error.problem not in remarked]
+            errors.extend(error if error.reason in REMARKS else error.in_record(k) for error in new)
         except ReadError as error:
-            errors.append(error)
+            errors.append(error.in_record(k))
     simultaneous = simultaneous_errors(recordings, source)
     recordings = [r for r in recordings if r.record not in simultaneous]
-    errors.extend(simultaneous.values())
+    errors.extend(error.in_record(k) for k, error in simultaneous.items())
     errors.extend(_count_errors(raw, description, source))
     errors.extend(raw.remarks)
     stated = [entry_check.without_checked(r) if isinstance(r, RawRecord) else r for r in raw.records]
@@ -263,9 +263,8 @@ def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, sourc
 def _measurement(record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float) -> Measurement:
     """The signals of a record, which tell numbers of records from states and counts."""
     used = [m for m in channel_maps if m.channel.quantity != "ignored"]
-    signals = [record.samples[m.index] for m in used if m.channel.quantity == "force"]
-    signals = signals or [record.samples[m.index] for m in used]
-    return Measurement(rate, kind, signals)
+    forces = [record.samples[m.index] for m in used if m.channel.quantity == "force"]
+    return Measurement(rate, kind, forces or [record.samples[m.index] for m in used], bool(forces))
 
 
 def _units_in_use(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER
 from turnout.readers.column_forms import HEAD_SIZE
@@ -24,6 +25,8 @@ WRAP_PERIODS = frozenset((*(10**k for k in range(2, 10)), 2**16, 2**24, 2**32)) 
 BYTE_PERIOD = 2**8  # samples: a counter of one byte, too short for a record at usual rates
 TURN_PERIOD = 360  # degrees, at which an angle begins again
 IMPACT_SHARE = 0.2  # of its peak, which the force reaches in a block with an impact
+WEAK_IMPACT_SHARE = 0.02  # of its peak: a person hits no record more softly than that beside others
+IMPACT_TO_NOISE = 20.0  # standard deviations of the noise, which in 10^7 samples of noise alone are below 6
 MIN_IMPACT_BLOCK_SHARE = 0.5  # of blocks of equal length have an impact if they are records, and no packets
 MAX_STATES = 4  # different numbers of a flag
 # Units of counts and of flags, in lower case: they number something, and nothing says that it is the records.
@@ -53,12 +56,13 @@ PASSAGE_WORDS = frozenset(
 class Measurement:
     """What tells borders of records from states: the ``kind`` of the test, its sampling ``rate`` [Hz], the ``signals``.
 
-    ``signals`` are the forces, or without one all samples that sensors use.
+    ``signals`` are the forces, or without one all samples that sensors use: then ``are_forces`` is False.
     """
 
     rate: float
     kind: str = "hammer"
     signals: Sequence[Column] = ()
+    are_forces: bool = True
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,7 @@ def border_errors(
     """Remarks on columns that may number several records which were read as one.
 
     Each record of a hammer test has an impact: a column numbers none if there is an impact in one of its blocks only.
+    It may number some if each block has one, however weak.
 
     Parameters
     ----------
@@ -170,20 +175,32 @@ def _numbers_records(form: Form, measurement: Measurement, is_state: bool, is_te
     n_block = len(form.edges) + 1
     n_impact = max((_count_blocks_with_impact(x, form.edges) for x in measurement.signals), default=n_block)
     if n_impact < 2:
-        return None
+        is_hit = any(_count_blocks_with_impact(x, form.edges, is_weak=True) == n_block for x in measurement.signals)
+        return False if measurement.are_forces and is_hit else None
     are_packets = form.are_alike and n_impact < MIN_IMPACT_BLOCK_SHARE * n_block
     is_end = form.is_wrap and n_impact < n_block
     return form.is_certain and not (is_state or are_packets or is_end)
 
 
-def _count_blocks_with_impact(signal: Column, edges: np.ndarray) -> int:
-    """Number of blocks in which a signal rises to ``IMPACT_SHARE`` of its peak; all of them without a signal."""
+def _count_blocks_with_impact(signal: Column, edges: np.ndarray, is_weak: bool = False) -> int:
+    """Number of blocks in which a signal rises to ``IMPACT_SHARE`` of its peak; all of them without a signal.
+
+    With ``is_weak`` it is a force that rises above its noise, in the direction of its peak: afterwards an amplifier
+    swings to the other side.
+    """
     values = np.asarray(signal[:], dtype=float)
     is_number = np.abs(values) < LARGEST_NUMBER
     if not is_number.any():
         return len(edges) + 1
-    level = np.where(is_number, np.abs(values - np.median(values[is_number])), 0.0)
-    is_high = level >= IMPACT_SHARE * level.max()
+    level = np.where(is_number, values - np.median(values[is_number]), 0.0)
+    least = IMPACT_SHARE * np.abs(level).max()
+    if is_weak:
+        level = level * np.sign(level[np.argmax(np.abs(level))])
+        noise = MAD_TO_SD * float(np.median(np.abs(level)))
+        least = max(WEAK_IMPACT_SHARE * level.max(), IMPACT_TO_NOISE * noise)
+    else:
+        level = np.abs(level)
+    is_high = level >= least
     if not level.max() > 0.0 or edges[-1] >= len(values):
         return len(edges) + 1
     begins = np.flatnonzero(is_high & ~np.concatenate([[False], is_high[:-1]]))  # an impact on a border counts once

@@ -89,8 +89,7 @@ def read_or_quarantine(
     for damage in cast("tuple[ReadError, ...]", result.errors):
         if damage.reason == "entry_unknown" and damage.remedy in remarked:
             continue
-        record = getattr(damage, "record", None)
-        quarantine.append(quarantine_row(damage, base, unit_kind, "read", record, result.sha256[:32]))
+        quarantine.append(quarantine_row(damage, base, unit_kind, "read", damage.record, result.sha256[:32]))
     for earlier_path, recording_id in (ids_by_path or {}).items():
         if recording_id == result.sha256[:32]:
             duplicate = ReadError(

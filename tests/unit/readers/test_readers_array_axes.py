@@ -87,6 +87,42 @@ def test_samples_between_as_many_records_as_channels_are_rejected(order, tmp_pat
         outcome(tmp_path, samples_of(2).transpose(order), channels=["force", "rail"])
 
 
+@pytest.mark.parametrize("dtype", ["S1", "f8", "i4", h5py.string_dtype()])
+@pytest.mark.parametrize("name", ["note", "started_at", "rate", "units", "rail_temperature", "time"])
+@pytest.mark.parametrize("is_grouped", [False, True])
+def test_a_dataset_without_a_value_does_not_cost_the_file(is_grouped, name, dtype, tmp_path):
+    samples = samples_of(2)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in range(2 if is_grouped else 1):
+            group = file.create_group(f"record_{k:03d}") if is_grouped else file
+            group["force"], group["rail"] = samples[k]
+            group[name] = h5py.Empty(dtype)
+        file[f"{name}2"] = h5py.Empty(dtype)
+    result = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE))
+    assert [r.samples.tolist() for r in result.recordings] == samples[: 2 if is_grouped else 1].tolist()
+    assert result.errors == ()
+
+
+def test_attributes_of_a_dataset_without_a_value_count(tmp_path):
+    """A dataset without a value is a common place for attributes: its rate is compared with that of the layout."""
+    force, rail = samples_of(1)[0]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["force"], file["rail"], file["settings"] = force, rail, h5py.Empty("f8")
+        file["settings"].attrs["sampling rate [Hz]"] = 2.0 * RATE
+    (error,) = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE)).errors
+    assert error.reason == "wrong_rate"
+
+
+@pytest.mark.parametrize("name", ["scale_factor", "add_offset", "_FillValue", "valid_range", "unit"])
+def test_packing_without_a_value_is_none(name, tmp_path):
+    force, rail = samples_of(1)[0]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["force"], file["rail"] = force, rail
+        file["force"].attrs[name] = h5py.Empty("f8")
+    result = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE))
+    assert [r.samples.tolist() for r in result.recordings] == samples_of(1).tolist() and not result.errors
+
+
 @pytest.mark.parametrize("place", ["file", "rail", "both"])
 @pytest.mark.parametrize("dtype", ["S1", "f8"])
 def test_an_attribute_without_a_value_does_not_cost_the_file(place, dtype, tmp_path):

@@ -313,6 +313,16 @@ def test_a_dead_response_of_several_is_the_only_channel_that_is_left_out(tmp_pat
     assert error.reason == "dead_channel" and repr(dead) in error.where
 
 
+@pytest.mark.parametrize("kind", ["hammer", "passage"])
+def test_an_error_states_its_record_and_one_of_the_file_none(kind, tmp_path, in_si):
+    """Record 2 has a dead channel; a fourth record that the layout states is missing in the file as a whole."""
+    samples = np.random.default_rng(1).normal(size=(3, 2, 100))
+    samples[1, 1] = 0.0
+    name = archive(tmp_path, fs=51200.0, data=samples, channels=["force", "rail"], units=["N", "m/s²"])
+    errors = read(name, tmp_path, replace(in_si, kind=kind, n_records=4)).errors
+    assert [(e.reason, e.record) for e in errors] == [("dead_channel", 1), ("truncated", None)]
+
+
 def test_a_dead_required_channel_is_an_error_of_the_record(tmp_path, in_si):
     """A section without its response has no modes, whatever else was recorded."""
     channels = (*in_si.channels, RawChannel("sleeper", "sleeper", "acceleration"))

@@ -53,8 +53,6 @@ def outcome(path, columns, rate=RATE, checked=(), step=None):
 @pytest.mark.parametrize("slope", [1e-3, -1e-3])
 @pytest.mark.parametrize("unit", UNITS)
 def test_a_column_in_any_unit_beside_a_time_column_is_no_axis(unit, slope, rate, format, tmp_path):
-    if (unit, format) == ("psi", "parquet"):
-        pytest.skip("'psi' in the metadata of a field is not understood")
     columns = {"time [s]": INDEX / RATE, f"x [{unit}]": 80.0 + slope * INDEX}
     assert outcome(tmp_path / f"a.{format}", columns, rate) == (1, [])
 

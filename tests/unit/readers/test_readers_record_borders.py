@@ -244,6 +244,30 @@ def test_three_impacts_that_a_column_numbers_are_an_error_under_any_name(format,
     assert outcome_of_hit(tmp_path / f"a.{format}", name, column, force=THREE_HITS) == (0, ["wrong_length"])
 
 
+WEAK_HITS = np.concatenate([HIT[:n] * share for n, share in zip(LONG, (1.0, 0.1, 0.05))])
+
+
+@pytest.mark.parametrize("name", ["qwxz", "Axles", "State"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_three_impacts_of_which_one_is_much_stronger_are_a_remark(name, sign, tmp_path):
+    column = np.repeat([1, 2, 3], LONG)
+    assert outcome_of_hit(tmp_path / "a.csv", name, column, force=sign * WEAK_HITS) == (1, ["entry_unknown"])
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        -60.0 * np.exp(-np.maximum(INDEX - 330, 0) / 9000.0) * (INDEX > 330),  # an amplifier swings to the other side
+        150.0 * np.exp(-(((INDEX - 800) / 8.0) ** 2)),  # the hammer rebounds
+        0.0 * INDEX,
+    ],
+)
+def test_one_impact_and_what_follows_it_are_no_records(after, tmp_path):
+    column = np.repeat([1, 2, 3], LONG)
+    assert outcome_of_hit(tmp_path / "a.csv", "qwxz", column, force=HIT + after) == (1, [])
+    assert outcome_of_hit(tmp_path / "a.csv", "qwxz", column, force=np.rint((HIT + after) / 10.0) * 10.0) == (1, [])
+
+
 def test_records_of_a_power_of_two_are_told_from_a_counter_that_ends_by_their_impacts(tmp_path):
     force = np.concatenate([HIT[:4096]] * 5 + [HIT[: N_HIT - 5 * 4096]])
     assert outcome_of_hit(tmp_path / "a.csv", "n", INDEX % 4096, force=force) == (0, ["wrong_length"])

@@ -91,6 +91,7 @@ def test_a_dead_channel_removes_one_file_and_the_quarantine_states_a_remedy(tmp_
     rows = hammer_unit(unit, turnout, tmp_path, algo="1")
     assert {q["reason_code"] for q in rows["quarantine"]} == {"dead_channel"}
     assert all("CLP_2" in q["path"] and q["remedy"] for q in rows["quarantine"])
+    assert [q["record"] for q in rows["quarantine"]] == list(range(10))
     assert rows["models"][0]["status"] == "accepted" and len(rows["impacts"]) == 20
 
 
