@@ -80,14 +80,14 @@ class Effect:
         where, parameters = self.draw(rng, site, self.ladder[rung])
         return ConcealedEffect(self.kind, self.locked_to, where, parameters, rung)
 
-    def in_recordings_of(self, recording_type: str, kind: str) -> Effect:
+    def in_recordings_of(self, recording_type: str, new_kind: str) -> Effect:
         """The same fault of a channel in recordings of one type alone.
 
         Parameters
         ----------
         recording_type : str
             "hammer" or "passage".
-        kind : str
+        new_kind : str
             Name of the new effect.
 
         Returns
@@ -102,7 +102,7 @@ class Effect:
             everywhere = faults.pop()
             faults.append(lambda of, rng: everywhere(of, rng) if of == recording_type else lambda x, rate: x)
 
-        return replace(self, kind=kind, act=act)
+        return replace(self, kind=new_kind, act=act)
 
 
 def load_effects(*folders: str | Path) -> dict[str, Effect]:

@@ -225,22 +225,14 @@ def small_plan(
     return Plan(turnout, sensors, hammer_points, trains if passages else (), reserved)
 
 
-def turnout_plan(
-    temperatures: Sequence[float] = (5.0, 25.0), speeds: Sequence[float] = (22.0, 25.0, 28.0, 32.0, 36.0)
-) -> Plan:
+def turnout_plan() -> Plan:
     """A whole turnout: eight hammer points, twenty passages of two coupled cars each, twelve sensors over 27 m.
-
-    Parameters
-    ----------
-    temperatures : sequence of float
-        Rail temperatures. [°C]
-    speeds : sequence of float
-        Speeds. [m/s]
 
     Returns
     -------
     Plan
     """
+    temperatures, speeds = (5.0, 25.0), (22.0, 25.0, 28.0, 32.0, 36.0)  # [°C], [m/s]
     turnout = TurnoutTrack(uniform_track(72.0), {"main": ((),)})
     positions = np.round(21.6 + 2.4 * np.arange(12) + 0.3 * (np.arange(12) % 3), 3)
     sensors = tuple(Sensor(f"S{k + 1}", float(x), "rail" if k % 4 else "sleeper") for k, x in enumerate(positions))

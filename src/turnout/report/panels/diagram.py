@@ -5,10 +5,14 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from typing import Any
 
+WIDTH, HEIGHT = 920, 200  # px
+MIN_LABEL_DISTANCE, LIFT = 42, 26  # px: nearer labels stand one above the other
 HATCH = (
     '<defs><pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
     '<rect width="6" height="6" class="hatch-ground"/><path d="M0 0V6" class="hatch-line"/></pattern></defs>'
@@ -29,8 +33,6 @@ def diagram(
     sections: Sequence[Mapping[str, Any]],
     states: Mapping[str, str],
     train_states: Mapping[str, str] | None = None,
-    width: int = 920,
-    height: int = 200,
 ) -> str:
     """SVG of the turnout with its measured sections.
 
@@ -42,10 +44,6 @@ def diagram(
         Most urgent state of the charts of hammer tests by section id: the colour of its circle.
     train_states : mapping, optional
         The same of the charts of trains: the colour of a square beside it. A section without such a chart has none.
-    width : int
-        Width. [px]
-    height : int
-        Height. [px]
 
     Returns
     -------
@@ -57,17 +55,17 @@ def diagram(
     low, high = min([toe, *positions]) - 4.0, max([toe, *positions]) + 4.0
 
     def px(metres: float) -> float:
-        return 20 + (width - 40) * (metres - low) / (high - low)
+        return 20 + (WIDTH - 40) * (metres - low) / (high - low)
 
-    main, spread = height * 0.36, height * 0.30
+    main, spread = HEIGHT * 0.36, HEIGHT * 0.30
 
     def py(metres: float, diverging: bool) -> float:
         share = max(0.0, (metres - toe) / (high - toe)) if diverging else 0.0
         return main + spread * share**1.6
 
-    curve = " ".join(f"L{px(m):.1f} {py(m, True):.1f}" for m in _steps(toe, high))
+    curve = " ".join(f"L{px(m):.1f} {py(m, True):.1f}" for m in np.linspace(toe, high, 25))
     elements = [
-        f'<svg class="diagram" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'<svg class="diagram" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
         'role="group" aria-label="Measured sections of the turnout, coloured by state">'
         f'{HATCH}<path class="rail" d="M{px(low):.1f} {main}H{px(high):.1f}"/>'
         f'<path class="rail" d="M{px(toe):.1f} {main} {curve}"/>'
@@ -75,7 +73,7 @@ def diagram(
     for section, lift in zip(sections, _lifts(sections, px)):
         elements.append(_section_marker(section, states, train_states or {}, px, py, lift))
     elements.append(
-        f'<text class="label" x="24" y="{height - 8}">facing direction →, metres from the switch toe</text>'
+        f'<text class="label" x="24" y="{HEIGHT - 8}">facing direction →, metres from the switch toe</text>'
     )
     return "".join(elements) + "</svg>"
 
@@ -121,20 +119,14 @@ def _metres(section: Mapping[str, Any]) -> str:
     return "" if section["position_m"] is None else f"{section['position_m']:.1f} m"
 
 
-def _lifts(
-    sections: Sequence[Mapping[str, Any]], px: Callable[[float], float], min_distance: float = 42, height: int = 26
-) -> list[int]:
-    """Vertical shift of each label [px]: where labels are closer than ``min_distance``, every second one is shifted."""
+def _lifts(sections: Sequence[Mapping[str, Any]], px: Callable[[float], float]) -> list[int]:
+    """Vertical shift of each label [px]: where labels are close to each other, every second one is shifted."""
     lifts: list[int] = []
     last: dict[bool, tuple[float, int]] = {}
     for section in sections:
         diverging, x = section["track"] == "diverging", px(section["position_m"] or 0.0)
         before, lifted = last.get(diverging, (-1e9, 0))
-        lift = height if x - before < min_distance and not lifted else 0
+        lift = LIFT if x - before < MIN_LABEL_DISTANCE and not lifted else 0
         lifts.append(lift)
         last[diverging] = (x, lift)
     return lifts
-
-
-def _steps(low: float, high: float, n: int = 24) -> list[float]:
-    return [low + (high - low) * k / n for k in range(n + 1)]
