@@ -188,4 +188,4 @@ def test_rejections_and_remarks_of_reading_with_a_layout_are_listed_as_problems(
 )
 def test_impacts_at_the_same_time_of_each_record_are_stated_once(events, words):
     contents = SimpleNamespace(events=[SimpleNamespace(record=record, time=time) for record, time in events])
-    assert _event_times(contents, "s") == words
+    assert _event_times(contents) == words
