@@ -22,10 +22,11 @@ class Baseline:
     """Baseline of each chart; (n_chart,) arrays unless stated.
 
     ``frequency`` f0 [Hz] at ``reference`` temperature [°C]; ``slope`` and its standard error ``slope_se`` [%/°C];
-    ``curvature`` [%/°C²], 0 of a straight law (``turnout.trend.curvature``). ``count`` campaigns; ``freedom``: degrees
-    of freedom after f0, slope, a curvature that is not 0, and one level per further epoch. ``complete``
-    where the baseline is long enough. ``without_temperature``: campaigns with a frequency but no temperature.
-    ``inside`` is the (n_chart, n_campaign) mask of its campaigns.
+    ``curvature`` [%/°C²], 0 of a straight law (``turnout.trend.curvature``), and its ``curvature_error``, 0 for a
+    section whose siblings remove it. ``count`` campaigns; ``freedom``: degrees of freedom after f0, slope, a curvature
+    that is not 0, and one level per further epoch. ``complete`` where the baseline is long enough.
+    ``without_temperature``: campaigns with a frequency but no temperature. ``inside`` is the (n_chart, n_campaign) mask
+    of its campaigns.
     """
 
     frequency: np.ndarray
@@ -33,6 +34,7 @@ class Baseline:
     slope: np.ndarray
     slope_se: np.ndarray
     curvature: np.ndarray
+    curvature_error: np.ndarray
     count: np.ndarray
     freedom: np.ndarray
     complete: np.ndarray
@@ -126,8 +128,9 @@ def fit_baseline(
         slope_se = np.where((freedom > 0) & (weight > 0.0), np.sqrt(scatter / weight), np.nan)
         corrected = 100.0 * (frequency / f0 - 1.0) - slope[:, None] * (temperature - t0)
     missing = np.sum(np.isfinite(frequency) & ~np.isfinite(temperature), axis=1)
+    straight = np.zeros(len(slope))
     fitted = Baseline(
-        f0[:, 0], t0[:, 0], slope, slope_se, np.zeros(len(slope)), n_base, freedom, complete, missing, inside
+        f0[:, 0], t0[:, 0], slope, slope_se, straight, straight, n_base, freedom, complete, missing, inside
     )  # fmt: skip
     return fitted, corrected
 

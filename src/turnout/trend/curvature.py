@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.epochs import by_epoch, expand_epochs
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 # Prior standard deviation of the curvature about 0 [%/°C²], a choice: at 15 °C from the mean of the year 2.3 %, four
 # times the scatter of a campaign.
 CURVATURE_PRIOR_SD = 0.01
-MIN_DAYS = 300.0  # of a baseline with summer and winter: a curvature of one season says nothing of the other
+MAX_DAYS_OF_YEAR = 92.0  # without a campaign: a curvature of the other seasons says nothing of the one left out
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class CurvedLaw:
 
     ``slope`` b [%/°C] and ``quadratic`` c [%/°C²] are 0 where the law is straight (``is_curved`` False).
     ``spread_ratio`` is the standard deviation of the baseline about this law over that about a straight one, 1 there.
+    ``error`` is the root mean square error of c [%/°C²]: that of its estimate, and what the law leaves out of it.
     """
 
     slope: np.ndarray
@@ -32,6 +34,7 @@ class CurvedLaw:
     reference: np.ndarray
     is_curved: np.ndarray
     spread_ratio: np.ndarray
+    error: np.ndarray
 
     def term(self, temperature: np.ndarray) -> np.ndarray:
         """The law at each temperature.
@@ -58,6 +61,7 @@ def fit_curved_law(
     epoch: np.ndarray,
     autocorrelation: np.ndarray,
     reference: np.ndarray | None = None,
+    in_every_season: np.ndarray | None = None,
 ) -> CurvedLaw:
     r"""Curved temperature law of each chart, where its baseline shows one.
 
@@ -85,6 +89,8 @@ def fit_curved_law(
         Memory from campaign to campaign, nan where unknown.
     reference : (n_chart,) array of float, optional
         T_0; by default the mean of the baseline. [°C]
+    in_every_season : (n_chart,) array of bool, optional
+        Baselines that may give a curvature, from ``covers_the_year``; by default all.
 
     Returns
     -------
@@ -114,11 +120,47 @@ def fit_curved_law(
         statistic = gain / left * freedom * (1.0 - phi) / (1.0 + phi)
         information = np.sum(across * across, axis=1)
         from_data = information / (information + left / freedom / CURVATURE_PRIOR_SD**2)
+        precision = np.where(freedom > 0, np.nan_to_num(statistic / quadratic**2), 0.0) + CURVATURE_PRIOR_SD**-2
         share = np.where(freedom > 0, np.nan_to_num(from_data * np.maximum(1.0 - 1.0 / statistic, 0.0)), 0.0)
+        share = share if in_every_season is None else np.where(in_every_season, share, 0.0)
         is_curved = share > 0.0
         ratio = np.sqrt((left + (1.0 - share) ** 2 * gain) / (left + gain) * (freedom + 1) / freedom)
+        error = np.sqrt(1.0 / precision + np.nan_to_num((from_data - share) * quadratic) ** 2)
     slope, quadratic = (np.where(is_curved, share * term, 0.0) for term in (slope, quadratic))
-    return CurvedLaw(slope, quadratic, reference, is_curved, np.where(is_curved, ratio, 1.0))
+    return CurvedLaw(slope, quadratic, reference, is_curved, np.where(is_curved, ratio, 1.0), error)
+
+
+def covers_the_year(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Whether a baseline has campaigns in every season: at most ``MAX_DAYS_OF_YEAR`` of the year are without one.
+
+    Parameters
+    ----------
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    inside : (n_chart, n_campaign) array of bool
+        Campaigns of the baseline.
+
+    Returns
+    -------
+    (n_chart,) array of bool
+        False without a campaign.
+
+    Examples
+    --------
+    The second one lasts two years, but has winters alone.
+
+    >>> day = np.array([[0.0, 91.0, 182.0, 274.0], [0.0, 60.0, 365.0, 730.0]])
+    >>> covers_the_year(day, np.isfinite(day))
+    array([ True, False])
+    """
+    count = inside.sum(axis=1)
+    if not inside.shape[1]:
+        return count > 0
+    day = np.sort(np.where(inside, np.mod(time, DAYS_PER_YEAR), np.inf), axis=1)
+    latest = np.take_along_axis(day, np.maximum(count - 1, 0)[:, None], axis=1)
+    with np.errstate(invalid="ignore"):
+        gap = np.diff(np.hstack([latest - DAYS_PER_YEAR, day]), axis=1)
+    return (count > 0) & (np.max(np.where(np.isfinite(gap), gap, 0.0), axis=1) <= MAX_DAYS_OF_YEAR)
 
 
 def with_curved_laws(
@@ -132,7 +174,7 @@ def with_curved_laws(
 ) -> tuple[Baseline, np.ndarray]:
     """Baselines and values with the curved law of each section without siblings, which would remove what they share.
 
-    Baselines shorter than ``MIN_DAYS`` keep their straight law.
+    Baselines that leave out a season keep their straight law (``covers_the_year``).
 
     Parameters
     ----------
@@ -154,14 +196,12 @@ def with_curved_laws(
     Returns
     -------
     (Baseline, (n_chart, n_campaign) array of float)
-        The same objects where no section has a curved law.
+        The same objects where every section has siblings.
     """
-    first = np.min(np.where(base.inside, time, np.inf), axis=1, initial=np.inf)
-    latest = np.max(np.where(base.inside, time, -np.inf), axis=1, initial=-np.inf)
-    row = np.flatnonzero(lone & (latest - first >= MIN_DAYS))
+    last = int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1
+    row = np.flatnonzero(lone & base.inside.any(axis=1))
     if not len(row):
         return base, values
-    last = int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1
     campaigns = np.ix_(row, np.arange(last))
     law = fit_curved_law(
         values[campaigns],
@@ -170,15 +210,16 @@ def with_curved_laws(
         epoch[campaigns],
         autocorrelation[row],
         base.reference[row],
+        covers_the_year(time[campaigns], base.inside[campaigns]),
     )
-    if not law.is_curved.any():
-        return base, values
     slope, curvature, freedom, values = base.slope.copy(), base.curvature.copy(), base.freedom.copy(), values.copy()
+    curvature_error = base.curvature_error.copy()
+    curvature_error[row] = law.error
     slope[row] += law.slope
     curvature[row] = law.quadratic
     freedom[row] -= law.is_curved
     values[row] -= law.term(temperature[row])
-    return replace(base, slope=slope, curvature=curvature, freedom=freedom), values
+    return replace(base, slope=slope, curvature=curvature, curvature_error=curvature_error, freedom=freedom), values
 
 
 def _deviation(values: np.ndarray, inside: np.ndarray, epoch: np.ndarray) -> np.ndarray:

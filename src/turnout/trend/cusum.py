@@ -213,6 +213,19 @@ def _thresholds(length: np.ndarray, allowance: np.ndarray) -> np.ndarray:
     return np.array([threshold_for(float(n), float(k)) for n, k in pairs] or [0.0])[where.ravel()]
 
 
+LAW_QUANTILE = 2.0  # standard deviations of the temperature law's error that the allowance of the sum covers
+
+
+def _sigma_of_sum(residuals: Residuals, allowance: np.ndarray) -> np.ndarray:
+    """Standard deviation for the sum, so wide that ``LAW_QUANTILE`` errors of the law stay within the allowance. [%]
+
+    The error of the temperature law is the same at every campaign of a season, so a sum does not average it as it
+    averages the error of a campaign. ``allowance`` (n_chart,) is k in standard deviations of the residual.
+    """
+    excess = np.maximum((LAW_QUANTILE / allowance) ** 2 - 1.0, 0.0)
+    return np.sqrt(residuals.sigma**2 + excess[:, None] * residuals.temperature_variance)
+
+
 class _ChartSums:
     """Standardise residuals and sum them, for the sections first and then for the turnouts."""
 
@@ -228,12 +241,12 @@ class _ChartSums:
         _, n_learned = by_epoch(residuals.values, usable, epoch, int(epoch.max(initial=0)) + 1)
         later = epoch > first_epoch(p)[rows, None]
         extra = np.where(later, 1.0 / np.sqrt(np.maximum(expand_epochs(n_learned, epoch), 1)), 0.0)
+        k, factor = self.allowance[rows], self.factor[rows]
         with np.errstate(invalid="ignore", divide="ignore"):
-            z = residuals.residual / (residuals.sigma * self.factor[rows, None])
+            z = residuals.residual / (_sigma_of_sum(residuals, k * factor) * factor[:, None])
         active = np.isfinite(z) & ~window & p.baseline.complete[rows, None]
         fresh = np.diff(epoch, axis=1, prepend=0) > 0
         sums = {"z": z, "extra": extra}
-        k = self.allowance[rows]
         bands = p.charts["band"].to_numpy()[rows]
         for name, sign in (("down", 1.0), ("up", -1.0)):
             h = _thresholds(run_lengths(bands, name, settings), k)

@@ -9,7 +9,7 @@ import numpy as np
 from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.detectability import detectable_shift
 from turnout.trend.epochs import by_epoch
-from turnout.trend.residuals import first_epoch, slope_variance
+from turnout.trend.residuals import first_epoch, temperature_variance
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
@@ -163,7 +163,7 @@ def temperature_spread(charts: Charts) -> np.ndarray:
         Spread. [%]
     """
     p = charts.prepared
-    variance, n_epoch = _slope_variances(charts), int(p.epoch.max(initial=0)) + 1
+    variance, n_epoch = _temperature_variances(charts), int(p.epoch.max(initial=0)) + 1
     unknown = variance > p.spread[:, None] ** 2
     rows = np.flatnonzero(unknown.any(axis=1))  # few charts, or none
     added = np.where(unknown[rows], variance[rows], 0.0)
@@ -188,10 +188,10 @@ def is_temperature_known(charts: Charts) -> np.ndarray:
     (n_chart, n_campaign) array of bool
         True where the error is smaller.
     """
-    return _slope_variances(charts) <= charts.prepared.spread[:, None] ** 2
+    return _temperature_variances(charts) <= charts.prepared.spread[:, None] ** 2
 
 
-def _slope_variances(charts: Charts) -> np.ndarray:
+def _temperature_variances(charts: Charts) -> np.ndarray:
     """Variance that the error of the temperature slope adds to each value, (n_chart, n_campaign). [%²]"""
     p, n = charts.prepared, len(charts.prepared.panel.charts)
-    return np.vstack([slope_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])
+    return np.vstack([temperature_variance(p, charts.learning[:n]), charts.sigma[n:] ** 2 - p.spread[n:, None] ** 2])

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from turnout.trend.baseline import Baseline, fit_baseline, spread_and_autocorrelation, usual_interval
-from turnout.trend.curvature import fit_curved_law, with_curved_laws
+from turnout.trend.baseline import Baseline, baseline_window, fit_baseline, spread_and_autocorrelation, usual_interval
+from turnout.trend.curvature import covers_the_year, fit_curved_law, with_curved_laws
 from turnout.trend.epochs import by_epoch, epochs_of, expand_epochs
 from turnout.trend.panel import WHOLE_TURNOUT, Panel
 from turnout.trend.siblings import median_of_group, median_of_siblings
@@ -68,7 +68,7 @@ def prepare(panel: Panel, events: pd.DataFrame | None, settings: TrendSettings) 
     base, values = fit_baseline(panel.frequency, panel.temperature, time, epoch, settings)
     baseline_span = slice(0, int(np.max(np.flatnonzero(base.inside.any(axis=0)), initial=-1)) + 1)
     inside, epoch_base, time_base = base.inside[:, baseline_span], epoch[:, baseline_span], time[:, baseline_span]
-    centred = _centred_in_baseline(values[:, baseline_span], inside, epoch_base)
+    centred = np.where(inside, _centred_on_baseline(base, values, epoch)[:, baseline_span], np.nan)
     group = panel.charts["group"].to_numpy()
     median, n_siblings = median_of_siblings(centred, inside, group)
     enough = inside & (n_siblings >= settings.siblings_minimum)
@@ -80,19 +80,20 @@ def prepare(panel: Panel, events: pd.DataFrame | None, settings: TrendSettings) 
     with_siblings &= _has_sibling_gain(sd_sibling, sd_alone, group)
     curved, values = with_curved_laws(base, values, panel.temperature, time, epoch, phi_alone, ~with_siblings)
     if curved is not base:
-        base, centred = curved, _centred_in_baseline(values[:, baseline_span], inside, epoch_base)
+        base, centred = curved, np.where(inside, _centred_on_baseline(curved, values, epoch)[:, baseline_span], np.nan)
         sd_alone, phi_alone = spread_and_autocorrelation(centred, inside, epoch_base, base.freedom, time_base)
     section = Prepared(
         panel, panel.charts, time, base, values, epoch, started, pending, usual_interval(time, base.inside),
         np.where(with_siblings, sd_sibling, sd_alone), sd_alone, np.where(with_siblings, phi, phi_alone), with_siblings,
     )  # fmt: skip
-    return _with_turnout_charts(section, centred, inside, baseline_span, events, settings)
+    return _with_turnout_charts(section, events, settings)
 
 
-def _centred_in_baseline(values: np.ndarray, inside: np.ndarray, epoch: np.ndarray) -> np.ndarray:
-    """Values of the baseline less the mean of their epoch, nan outside."""
-    level, _ = by_epoch(np.where(inside, values, 0.0), inside, epoch, int(epoch.max(initial=0)) + 1)
-    return np.where(inside, values - expand_epochs(level, epoch), np.nan)
+def _centred_on_baseline(base: Baseline, values: np.ndarray, epoch: np.ndarray) -> np.ndarray:
+    """Values less the mean of the baseline in their epoch; nan in epochs without a campaign of the baseline."""
+    n_epoch = int(epoch.max(initial=0)) + 1
+    level, _ = by_epoch(np.where(base.inside, values, 0.0), base.inside, epoch, n_epoch)
+    return values - expand_epochs(level, epoch)
 
 
 def _has_sibling_gain(spread_siblings: np.ndarray, spread_alone: np.ndarray, group: np.ndarray) -> np.ndarray:
@@ -104,38 +105,40 @@ def _has_sibling_gain(spread_siblings: np.ndarray, spread_alone: np.ndarray, gro
     return (total > 0.0)[group]
 
 
-def _with_turnout_charts(
-    p: Prepared,
-    centred: np.ndarray,
-    inside: np.ndarray,
-    baseline_span: slice,
-    events: pd.DataFrame | None,
-    settings: TrendSettings,
-) -> Prepared:
-    """Append one chart per turnout, band and source: the median of its sections, to detect a change common to all."""
-    group = p.charts["group"].to_numpy()
-    median, count = median_of_group(centred, inside, group)
+def _with_turnout_charts(p: Prepared, events: pd.DataFrame | None, settings: TrendSettings) -> Prepared:
+    """Append one chart per turnout, band and source: the median of its sections, to detect a change common to all.
+
+    Its baseline follows the rule of the sections, over the campaigns in which enough of them have a value. Their own
+    baselines may hardly overlap, for instance where some sections are measured later or in summer only.
+    """
+    group, need = p.charts["group"].to_numpy(), settings.siblings_minimum + 1
     first = np.flatnonzero(np.diff(group, prepend=-1))
     charts = p.charts.iloc[first].assign(section_id=WHOLE_TURNOUT)
     time = p.time[first]
     epoch, pending, started = epochs_of(charts, time, events)
-    window = count >= settings.siblings_minimum + 1
-    members = np.add.reduceat(p.baseline.complete.astype(int), first) if len(first) else np.zeros(0, int)
-    complete = members >= settings.siblings_minimum + 1
-    inside_turnout = np.zeros((len(first), p.time.shape[1]), dtype=bool)
-    inside_turnout[:, baseline_span] = window
-    n_base = window.sum(axis=1)
+    centred = _centred_on_baseline(p.baseline, p.values, p.epoch)
+    enough, members = (
+        np.add.reduceat(flags.astype(int), first) if len(first) else flags[:0].astype(int)
+        for flags in (np.isfinite(centred), p.baseline.complete)
+    )
+    inside, is_long = baseline_window(enough >= need, time, settings.baseline_days, settings.baseline_campaigns)
+    complete = is_long & (members >= need)
+    span = slice(0, int(np.max(np.flatnonzero(inside.any(axis=0)), initial=-1)) + 1)
+    median, _ = median_of_group(centred[:, span], np.isfinite(centred[:, span]), group)
+    n_base = inside.sum(axis=1)
     freedom = n_base - 2
     spread, autocorrelation = spread_and_autocorrelation(
-        np.where(window, median, np.nan), window, epoch[:, baseline_span], freedom, time[:, baseline_span]
+        np.where(inside[:, span], median, np.nan), inside[:, span], epoch[:, span], freedom, time[:, span]
     )
     nothing, no_campaign = np.full(len(first), np.nan), np.zeros(len(first), int)
-    base = Baseline(nothing, nothing, nothing, nothing, nothing, n_base, freedom, complete, no_campaign, inside_turnout)
+    base = Baseline(
+        nothing, nothing, nothing, nothing, nothing, nothing, n_base, freedom, complete, no_campaign, inside
+    )  # fmt: skip
     joined = Baseline(*(np.concatenate([a, b]) for a, b in zip(vars(p.baseline).values(), vars(base).values())))
     return Prepared(
         p.panel, pd.concat([p.charts, charts], ignore_index=True), np.vstack([p.time, time]), joined, p.values,
         np.vstack([p.epoch, epoch]), stack_padded(p.started, started), np.append(p.pending, pending),
-        np.append(p.interval, usual_interval(time, inside_turnout)), np.append(p.spread, spread),
+        np.append(p.interval, usual_interval(time, inside)), np.append(p.spread, spread),
         np.append(p.spread_alone, spread), np.append(p.autocorrelation, autocorrelation),
         np.append(p.with_siblings, np.zeros(len(first), bool)),
     )  # fmt: skip
@@ -184,13 +187,15 @@ FREQUENCY_RESOLUTION = 0.001  # Hz, of frequencies in the registry; values that 
 class Residuals:
     """Residuals of charts, all in percent of f0.
 
-    (n_chart, n_campaign): ``values``, ``residual``, its ``sigma``, and ``centred``, the values less their own level.
-    (n_chart, n_epoch): ``level`` and ``shift``, the mean difference to the siblings.
+    (n_chart, n_campaign): ``values``, ``residual``, its ``sigma``, ``temperature_variance`` (the part of sigma² from
+    the errors of the temperature law), and ``centred``, the values less their own level. (n_chart, n_epoch): ``level``
+    and ``shift``, the mean difference to the siblings.
     """
 
     values: np.ndarray
     residual: np.ndarray
     sigma: np.ndarray
+    temperature_variance: np.ndarray
     level: np.ndarray
     shift: np.ndarray
     centred: np.ndarray
@@ -277,8 +282,9 @@ def section_residuals(
     enough &= p.with_siblings[:n, None]
     enough &= _has_sibling_level(window[:n], enough, epoch, first_epoch(p)[:n], settings.siblings_share)
     shift, residual_siblings = _centre(np.where(enough, e - median, np.nan), window[:n] & enough, epoch)
-    sigma = _sigma(p, enough, slope_variance(p, window[:n]))
-    return Residuals(p.values, np.where(enough, residual_siblings, e), sigma, level, shift, e)
+    variance = temperature_variance(p, window[:n])
+    sigma = _sigma(p, enough, variance)
+    return Residuals(p.values, np.where(enough, residual_siblings, e), sigma, variance, level, shift, e)
 
 
 def _has_sibling_level(
@@ -334,12 +340,17 @@ def turnout_residuals(
     young, young_count = median_of_group(sections.centred, np.isfinite(sections.centred), group)
     whole = np.where(count >= need, median, np.where((young_count >= need) & window[n:], young, np.nan))
     temperature, _ = median_of_group(p.panel.temperature, np.isfinite(p.panel.temperature), group)
-    law = fit_curved_law(whole, temperature, p.baseline.inside[n:], epoch, p.autocorrelation[n:])
+    inside = p.baseline.inside[n:]
+    seasons = covers_the_year(p.time[n:], inside)
+    law = fit_curved_law(whole, temperature, inside, epoch, p.autocorrelation[n:], in_every_season=seasons)
     whole = whole - law.term(temperature)
     level, residual = _centre(whole, window[n:] & np.isfinite(whole), epoch)
-    common, _ = median_of_group(slope_variance(p, window[:n]), settled[:n] & ~alarmed, group)
-    sigma = np.sqrt((law.spread_ratio * p.spread[n:])[:, None] ** 2 + np.nan_to_num(common))
-    return Residuals(whole, residual, np.where(sigma > 0.0, sigma, np.nan), level, np.zeros_like(level), residual)
+    common, _ = median_of_group(temperature_variance(p, window[:n]), settled[:n] & ~alarmed, group)
+    excess = _excess(temperature, window[n:], inside, epoch)
+    common = np.nan_to_num(common) + law.error[:, None] ** 2 * excess**2
+    sigma = np.sqrt((law.spread_ratio * p.spread[n:])[:, None] ** 2 + common)
+    sigma = np.where(sigma > 0.0, sigma, np.nan)
+    return Residuals(whole, residual, sigma, common, level, np.zeros_like(level), residual)
 
 
 def _centre(values: np.ndarray, window: np.ndarray, epoch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -349,11 +360,14 @@ def _centre(values: np.ndarray, window: np.ndarray, epoch: np.ndarray) -> tuple[
     return level, values - expand_epochs(level, epoch)
 
 
-def slope_variance(p: Prepared, window: np.ndarray) -> np.ndarray:
-    """Variance that the error of the temperature slope adds to each value.
+def temperature_variance(p: Prepared, window: np.ndarray) -> np.ndarray:
+    r"""Variance that the errors of the temperature law, of its slope b and its curvature c, add to each value.
 
-    Only temperatures outside the range of the baseline add to it; within that range the guard factor covers the error.
-    It matters, for instance, in the first summer after a baseline with nearly constant temperature.
+    .. math:: V = s_b^2 X + s_c^2 X^2, \quad X = \max(0, d^2 - \max_B d^2)
+
+    with the deviation d of a temperature from the mean of its epoch. Only temperatures outside the range of the
+    baseline B add to it; within that range the guard factor covers the errors. It matters, for instance, in the first
+    summer after a baseline with nearly constant temperature, or of winters alone.
 
     Parameters
     ----------
@@ -368,22 +382,27 @@ def slope_variance(p: Prepared, window: np.ndarray) -> np.ndarray:
         Variance. [%²]
     """
     n, base = len(window), p.baseline
-    _, deviation = _centre(p.panel.temperature, window & np.isfinite(p.panel.temperature), p.epoch[:n])
-    inside = base.inside[:n]
-    baseline_deviation = np.max(np.where(inside, deviation, 0.0) ** 2, axis=1, initial=0.0)
-    excess = np.maximum(np.nan_to_num(deviation) ** 2 - baseline_deviation[:, None], 0.0)
-    return np.nan_to_num(base.slope_se[:n, None]) ** 2 * excess
+    excess = _excess(p.panel.temperature, window, base.inside[:n], p.epoch[:n])
+    slope_se, curvature_error = np.nan_to_num(base.slope_se[:n, None]), base.curvature_error[:n, None]
+    return slope_se**2 * excess + curvature_error**2 * excess**2
 
 
-def _sigma(p: Prepared, enough: np.ndarray, slope_variance_excess: np.ndarray) -> np.ndarray:
+def _excess(temperature: np.ndarray, window: np.ndarray, inside: np.ndarray, epoch: np.ndarray) -> np.ndarray:
+    """Square of the deviation of each temperature from the mean of its epoch, beyond that of the baseline. [°C²]"""
+    _, deviation = _centre(temperature, window & np.isfinite(temperature), epoch)
+    in_baseline = np.max(np.nan_to_num(np.where(inside, deviation, 0.0)) ** 2, axis=1, initial=0.0)
+    return np.maximum(np.nan_to_num(deviation) ** 2 - in_baseline[:, None], 0.0)
+
+
+def _sigma(p: Prepared, enough: np.ndarray, added_variance: np.ndarray) -> np.ndarray:
     """Spread of each value [%]: that of the baseline, with or without siblings, and more where its own error is larger.
 
-    ``slope_variance_excess`` is the (n_section, n_campaign) variance from ``slope_variance``. [%²]
+    ``added_variance`` is the (n_section, n_campaign) variance from ``temperature_variance``. [%²]
     """
     n = len(enough)
     sigma = np.where(enough, p.spread[:n, None], p.spread_alone[:n, None])
     f0, inside = p.baseline.frequency[:n, None], p.baseline.inside[:n]
     error = np.nan_to_num(100.0 * p.panel.error / f0)
     usual = np.sum(np.where(inside, error**2, 0.0), axis=1) / np.maximum(inside.sum(axis=1), 1)
-    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0) + slope_variance_excess)
+    sigma = np.sqrt(sigma**2 + np.maximum(error**2 - usual[:, None], 0.0) + added_variance)
     return np.where(sigma > 100.0 * FREQUENCY_RESOLUTION / f0, sigma, np.nan)

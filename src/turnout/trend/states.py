@@ -98,7 +98,7 @@ def count_learned(charts: Charts, present: np.ndarray) -> np.ndarray:
 def baseline_until(p: Prepared, settings: TrendSettings) -> np.ndarray:
     """Time of the campaign that completed each baseline, nan where incomplete.
 
-    That of a whole turnout is complete when those of enough sections are.
+    That of a whole turnout is complete when it is long enough and those of enough sections are complete.
 
     Parameters
     ----------
@@ -117,7 +117,8 @@ def baseline_until(p: Prepared, settings: TrendSettings) -> np.ndarray:
     until = np.where(p.baseline.complete, until, np.inf)
     for whole, members in enumerate(_members(p.panel.charts["group"].to_numpy()), start=n_section):
         ends = np.sort(until[members])
-        until[whole] = ends[settings.siblings_minimum] if len(ends) > settings.siblings_minimum else np.inf
+        enough = ends[settings.siblings_minimum] if len(ends) > settings.siblings_minimum else np.inf
+        until[whole] = max(until[whole], enough)
     return np.where(np.isfinite(until), until, np.nan)
 
 
@@ -176,8 +177,8 @@ def _states(
         (~np.isfinite(last) & whole, "cannot_tell", "too_few_sections"),
         (~np.isfinite(last), "not_measured", "never"),
         (open_now & ~p.pending & ~(p.baseline.complete & constant & ~whole), "alarm", "threshold_crossed"),
-        (_is_to_confirm(charts, present) & ~p.pending, "confirm_now", "far_outside"),
         (too_few, "cannot_tell", "too_few_sections"),
+        (_is_to_confirm(charts, present) & ~p.pending, "confirm_now", "far_outside"),
         (is_old, "not_measured", "too_long_ago"),
         (p.baseline.complete & constant & ~whole, "cannot_tell", "constant"),
         (no_temperature, "cannot_tell", "no_temperature"),
