@@ -15,8 +15,10 @@ from turnout.trend.epochs import by_epoch, expand_epochs
 from turnout.trend.quantities import targets
 from turnout.trend.residuals import (
     Prepared,
+    Residuals,
     first_epoch,
     learning_campaigns,
+    nearer_residuals,
     section_residuals,
     stack_padded,
     turnout_residuals,
@@ -24,8 +26,9 @@ from turnout.trend.residuals import (
 from turnout.trend.threshold import run_lengths, threshold_for
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from turnout.config.settings.trend import TrendSettings
-    from turnout.trend.residuals import Residuals
 
 
 def cusum(
@@ -173,6 +176,7 @@ def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
     alarmed = first["down_open"] | first["up_open"]
     turnouts = turnout_residuals(p, sections, window, settled, alarmed, settings)
     second = chart_sums(slice(n, None), turnouts)
+    sections = _without_change_of_turnout(p, sections, first, alarm_campaigns(second), chart_sums)
     sums = {name: np.concatenate([first[name], second[name]]) for name in first}
     joint = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
     level, shift = (stack_padded(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
@@ -183,6 +187,48 @@ def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
     )  # fmt: skip
     charts.deviation = far_deviations(charts, settings)
     return charts
+
+
+def alarm_campaigns(sums: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Campaigns from the onset of each alarm, not included, to its last one.
+
+    Parameters
+    ----------
+    sums : mapping
+        ``down_open``, ``up_open``, ``down_began`` and ``up_began``, as ``cusum`` gives them.
+
+    Returns
+    -------
+    (n_chart, n_campaign) array of bool
+
+    Examples
+    --------
+    >>> never, began = np.zeros((1, 5), bool), np.array([[0, 1, 1, 1, 4]])
+    >>> is_open = np.array([[False, False, False, True, False]])
+    >>> alarm_campaigns({"down_open": is_open, "down_began": began, "up_open": never, "up_began": began})
+    array([[False, False,  True,  True, False]])
+    """
+    n_chart, n_campaign = sums["down_open"].shape
+    change = np.zeros((n_chart, n_campaign + 1), dtype=np.int64)
+    for direction in ("down", "up"):
+        chart, campaign = np.nonzero(sums[f"{direction}_open"])
+        np.add.at(change, (chart, sums[f"{direction}_began"][chart, campaign] + 1), 1)
+        np.add.at(change, (chart, campaign + 1), -1)
+    return np.cumsum(change, axis=1)[:, :-1] > 0
+
+
+def _without_change_of_turnout(
+    p: Prepared, sections: Residuals, sums: dict[str, np.ndarray], alarms: np.ndarray, chart_sums: _ChartSums
+) -> Residuals:
+    """Residuals of the sections, ``nearer_residuals`` in the ``alarms`` of their turnouts; ``sums`` are made again."""
+    common = alarms[p.panel.charts["group"].to_numpy()]
+    row = np.flatnonzero(common.any(axis=1))
+    if not len(row):
+        return sections
+    sections = nearer_residuals(p, sections, common)
+    for name, values in chart_sums(row, Residuals(*(array[row] for array in vars(sections).values()))).items():
+        sums[name][row] = values
+    return sections
 
 
 def _siblings_without_alarm(
@@ -234,7 +280,7 @@ class _ChartSums:
     ) -> None:
         self.p, self.allowance, self.window, self.factor, self.settings = p, allowance, window, factor, settings
 
-    def __call__(self, rows: slice, residuals: Residuals) -> dict[str, np.ndarray]:
+    def __call__(self, rows: slice | np.ndarray, residuals: Residuals) -> dict[str, np.ndarray]:
         p, settings, window = self.p, self.settings, self.window[rows]
         epoch = p.epoch[rows]
         usable = window & np.isfinite(residuals.values)

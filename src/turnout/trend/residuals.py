@@ -5,7 +5,7 @@ The residual of a section is its value less the level of the epoch and less the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -351,6 +351,40 @@ def turnout_residuals(
     sigma = np.sqrt((law.spread_ratio * p.spread[n:])[:, None] ** 2 + common)
     sigma = np.where(sigma > 0.0, sigma, np.nan)
     return Residuals(whole, residual, sigma, common, level, np.zeros_like(level), residual)
+
+
+def nearer_residuals(p: Prepared, sections: Residuals, common: np.ndarray) -> Residuals:
+    """Residuals of the sections, without siblings where their own level explains the value better.
+
+    Where a whole turnout is in alarm, most of its sections have changed, and the median follows them. A section that
+    has kept its level then differs from it as if it had changed the other way. One that follows the others, or its own
+    level, has no change that the chart of the turnout does not show.
+
+    Parameters
+    ----------
+    p : Prepared
+        Prepared charts.
+    sections : Residuals
+        Residuals of the sections.
+    common : (n_section, n_campaign) array of bool
+        Campaigns in which the whole turnout is in alarm.
+
+    Returns
+    -------
+    Residuals
+        Of the same sections.
+    """
+    n = len(common)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        from_level = np.abs(sections.centred) / p.spread_alone[:n, None]
+        from_siblings = np.abs(sections.residual) / p.spread[:n, None]
+        own_is_nearer = common & p.with_siblings[:n, None] & (from_level < from_siblings)
+    alone = _sigma(p, np.zeros(common.shape, dtype=bool), sections.temperature_variance)
+    return replace(
+        sections,
+        residual=np.where(own_is_nearer, sections.centred, sections.residual),
+        sigma=np.where(own_is_nearer, alone, sections.sigma),
+    )
 
 
 def _centre(values: np.ndarray, window: np.ndarray, epoch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

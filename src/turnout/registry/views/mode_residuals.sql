@@ -19,7 +19,7 @@ with valued as (
 corrected as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.state,
-        m.frequency_hz, b.with_siblings, b.sibling_shift_pct,
+        m.frequency_hz, b.with_siblings, b.sibling_shift_pct, b.sd_pct, b.sd_alone_pct,
         b.complete and c.state <> 'learning' as settled, c.is_sibling,
         100 * (m.frequency_hz / b.frequency_hz - 1)
             - b.slope_pct_per_c * (m.rail_temperature_c - b.rail_temperature_c)
@@ -63,14 +63,32 @@ siblings as (
             when not with_siblings then null
             when n_settled >= 3 then settled_median
             when not settled and len(all_pct) >= 4 then all_median
-        end as sibling_median_pct
+        end as median_pct
     from medians
+),
+common as (
+    select distinct s.turnout_id, s.section_id, s.band, s.source, s.measured_at_utc
+    from siblings s
+    join alarms a using (turnout_id, band, source)
+    where a.section_id = '*' and a.closed_by is distinct from 'recomputed'
+        and s.measured_at_utc > coalesce(a.began_at_utc, '-infinity'::timestamp)
+        and (a.closed_at_utc is null or s.measured_at_utc < a.closed_at_utc)
+),
+nearer as (
+    select
+        s.* exclude (median_pct),
+        case
+            when c.section_id is null or abs(corrected_pct) / sd_alone_pct
+                >= abs(corrected_pct - median_pct - sibling_shift_pct) / sd_pct then median_pct
+        end as sibling_median_pct
+    from siblings s
+    left join common c using (turnout_id, section_id, band, source, measured_at_utc)
 )
 select
     turnout_id, section_id, band, source, measured_at_utc, epoch, state, frequency_hz, corrected_pct,
     sibling_median_pct,
     coalesce(corrected_pct - sibling_median_pct - sibling_shift_pct, corrected_pct) as residual_pct
-from siblings;
+from nearer;
 
 -- columns of mode_residuals(since)
 -- turnout_id | varchar | | turnout
