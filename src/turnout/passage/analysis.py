@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import KMH
 from turnout.errors import REMARK_REASONS
 from turnout.passage.axle_count import best_count, count_without_distance
 from turnout.passage.axles import sensor_times
@@ -143,7 +144,8 @@ def _analyse_train(
     motion, axles, train_type = count
     passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
-    findings += _axle_count_doubts(passage, all_envelopes, is_multi_sensor)
+    findings += _axle_count_doubts(passage, axles, all_envelopes, is_multi_sensor)
+    findings += _out_of_search(passage, settings)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
     return replace(passage, status=_status(findings, "accepted"), findings=tuple(findings))
 
@@ -176,20 +178,51 @@ def _count_by_several_sensors(
     return *consistent, direction, count
 
 
-def _axle_count_doubts(passage: Passage, envelopes: SensorEnvelopes, is_multi_sensor: bool) -> list[Rejection]:
-    """Reasons to doubt the number of axles."""
+def _axle_count_doubts(
+    passage: Passage, axles: AxleFinding, envelopes: SensorEnvelopes, is_multi_sensor: bool
+) -> list[Rejection]:
+    """Reasons to doubt the number of axles.
+
+    The count of an unknown train is a cut between high and low peaks. Another cut that is nearly as clear may be right.
+    """
     doubts: list[Rejection] = []
     is_named = passage.type is not None and passage.type.type != UNKNOWN
     min_contrast = MIN_NAMED_CONTRAST if is_named else MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST
     if passage.contrast < min_contrast:
         text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
         doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
+    elif passage.contrast < MIN_CONTRAST * axles.rival_contrast:
+        lead = passage.contrast / axles.rival_contrast
+        text = (
+            f"{passage.n_axle} axles, whose weakest peak is {passage.contrast:.2f} times the next one; another number "
+            f"of axles divides the peaks nearly as clearly, {axles.rival_contrast:.2f} times"
+        )
+        doubts.append(Rejection("axles_uncertain", lead, MIN_CONTRAST, text))
     if is_multi_sensor and not is_named and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
         text = (
             f"{passage.n_axle} axles, but sensors record impacts at one moment, as of a crossing's nose or a deep dip"
         )
         doubts.append(Rejection("axles_uncertain", *impacts, text))
     return doubts
+
+
+def _out_of_search(passage: Passage, settings: PassageSettings) -> list[Rejection]:
+    """Finding where the speed lies outside the range in which trains are sought: the right speed was never tried.
+
+    One standard error beyond the range still belongs to it.
+    """
+    if passage.speed is None:
+        return []
+    speed, se = KMH * passage.speed.speed, KMH * passage.speed.se
+    limits = (settings.speed_minimum, settings.speed_maximum)
+    if limits[0] - se <= speed <= limits[1] + se:
+        return []
+    limit = min(limits, key=lambda v: abs(v - speed))
+    text = (
+        f"{passage.n_axle} axles at {speed:.1f} km/h, but trains are sought from {limits[0]:g} to {limits[1]:g} km/h: "
+        "speed and axles are guesses; set passage.speed_minimum or passage.speed_maximum"
+    )
+    return [Rejection("axles_uncertain", speed, limit, text)]
 
 
 def _consistent_sensors(

@@ -228,8 +228,15 @@ def best_count(
         typed, _ = _first_with_type(
             envelopes, motion, template_counts(envelopes, motion, patterns), error, patterns, settings
         )
-    likeliest = typed or first
-    return (motion, *likeliest) if likeliest else None
+    if typed is not None:
+        return (motion, *typed)
+    return (motion, _with_rival(first[0], candidates), first[1]) if first is not None else None
+
+
+def _with_rival(axles: AxleFinding, candidates: Sequence[AxleFinding]) -> AxleFinding:
+    """The count with the largest contrast of the ``candidates`` that have another number of axles."""
+    rivals = [c.contrast for c in candidates if len(c.offsets) != len(axles.offsets)]
+    return replace(axles, rival_contrast=max(rivals, default=0.0))
 
 
 def _motions_near(motion: Motion, envelopes: SensorEnvelopes, reach: float) -> list[Motion]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 GRID_STEP = 0.04  # m, step of the grid along the train
 MAX_COUNTS = 4  # of the peaks of one feature, those of the largest contrast
 WAVENUMBER = 1.1  # 1/m, of a standard rail on its foundation
+MAX_LEFT_HEIGHT = 0.6  # of the typical height of an axle: no count leaves a higher peak out
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,14 @@ class AxleFinding:
     """``offsets`` (n_axle,) [m] behind the stack's origin, ``height`` (n_axle,) of the peaks.
 
     ``contrast`` is the weakest accepted peak over the strongest rejected one: near 1 the count is a guess.
+    ``rival_contrast`` is the largest contrast of a count with another number of axles, 0 without one.
     """
 
     offsets: np.ndarray
     height: np.ndarray
     contrast: float
     feature: str = ""
+    rival_contrast: float = 0.0
 
 
 def along_train(
@@ -76,8 +79,8 @@ def axle_candidates(
     """Up to ``MAX_COUNTS`` counts of the peaks of ``profile`` (n,), the one with the largest contrast first.
 
     Peaks are at least ``spacing`` metres from each other. The lesser of prominence and twice the height must exceed
-    ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than 60
-    % of the typical height.
+    ``noise``. The cut lies where the ratio between neighbouring ranks is large. It never rejects peaks of more than
+    ``MAX_LEFT_HEIGHT`` of the typical height.
 
     Parameters
     ----------
@@ -107,7 +110,7 @@ def axle_candidates(
         return []
     typical = np.median(ranked[ranked >= 0.35 * ranked[min(2, n_sure - 1)]])
     following = np.maximum(np.append(ranked[1:], 0.0), max(0.25 * noise, 1e-12))
-    ratio = np.where((ranked >= noise) & (following < 0.6 * typical), ranked / following, 0.0)
+    ratio = np.where((ranked >= noise) & (following < MAX_LEFT_HEIGHT * typical), ranked / following, 0.0)
     ratio[0] = 0.0
     cuts = [k for k in np.argsort(-ratio, kind="stable")[:MAX_COUNTS] if ratio[k] > 0] or [n_sure - 1]
     positions = start + _refine_peaks(profile, peaks) * GRID_STEP

@@ -9,7 +9,7 @@ import scipy
 from scipy import ndimage
 
 from turnout.passage.axle_patterns import Pattern
-from turnout.passage.axles import GRID_STEP, AxleFinding
+from turnout.passage.axles import GRID_STEP, MAX_LEFT_HEIGHT, AxleFinding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 POSITION_SLACK = 0.35  # m, largest deviation of an axle from its position behind the previous one
 MIN_HEIGHT = 0.3  # of a typical peak: least height of an axle, and largest height of a peak that is no axle
 SCALES = 1.0 + 0.012 * np.arange(-4, 5)  # factors on the lengths, for an error of the speed
+PEAK_REACH = 0.6  # m, within which a peak belongs to an axle
 N_STARTS = 8  # first peaks that are tried as the first axle
 
 
@@ -30,8 +31,8 @@ def decode_profile(
     The search starts from each of the first peaks, at each of a few scales, and goes from axle to axle. The next axle
     is the highest point within 0.35 m of its position in the vehicle, measured from the previous axle. So an error of
     the speed does not accumulate. Where the pattern allows a choice, the vehicle that collects more is taken, less the
-    peaks that it leaves over within its length. The row ends where the peaks beyond it cost least. ``audible_length``
-    [m] is the length of the audible part.
+    peaks that it leaves over within its length. The row ends where the peaks beyond it cost least. A row that leaves a
+    peak as high as a wheel is a part of another train. ``audible_length`` [m] is the length of the audible part.
 
     Parameters
     ----------
@@ -71,6 +72,9 @@ def decode_profile(
         return None
     height = np.interp(positions, np.arange(profile.size) * GRID_STEP, profile)
     if np.mean(height >= MIN_HEIGHT) < 0.9:
+        return None
+    is_left = np.abs(np.subtract.outer(search.peak_position, positions)).min(axis=1) >= PEAK_REACH
+    if np.any(search.peak_height[is_left] > MAX_LEFT_HEIGHT * np.median(height)):
         return None
     return AxleFinding(start + positions, height, float(1.0 + value), feature)
 
@@ -133,7 +137,7 @@ class _RowSearch:
             gain += self._height(position) - MIN_HEIGHT
         positions = np.array(columns).T
         between = (self.peak_position > positions[:, :1] - 1.5) & (self.peak_position < positions[:, -1:] + 1.5)
-        is_collected = np.any(np.abs(self.peak_position - positions[:, :, None]) < 0.6, axis=1)
+        is_collected = np.any(np.abs(self.peak_position - positions[:, :, None]) < PEAK_REACH, axis=1)
         uncollected = np.sum(
             np.clip(np.minimum(self.peak_height, 1.0) - MIN_HEIGHT, 0, None) * (between & ~is_collected), axis=1
         )
@@ -156,7 +160,7 @@ class _RowSearch:
         if not self.positions.shape[1]:
             return
         excess = np.clip(np.minimum(self.peak_height, 1.0) - MIN_HEIGHT, 0.0, None)
-        is_near = np.abs(self.peak_position[None, :, None] - self.positions[:, None, :]) < 0.6
+        is_near = np.abs(self.peak_position[None, :, None] - self.positions[:, None, :]) < PEAK_REACH
         uncollected = np.sum(excess * ~is_near.any(axis=2), axis=1)
         n = np.sum(np.isfinite(self.positions), axis=1)
         value = np.where(n > 0, (self.score - uncollected) / np.maximum(n, 1), -np.inf)
