@@ -29,7 +29,8 @@ def slowness_from_sensors(
 
     Every axle has its own free time, so the train need not be known. The b_i are the offsets along the rail between a
     sensor and a wheel in its record. They do not average out over axles. Their spread is estimated from the sensors
-    where there are more than two, and is at least ``position_error`` [m].
+    where there are more than two, and is at least ``position_error`` [m]. So is the scatter of the single times about
+    the fit: a few axles leave no residual that could show it.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def slowness_from_sensors(
     direction : int
         +1 for a train towards larger positions, -1 against them.
     position_error : float
-        Least standard deviation of the offsets b_i. [m]
+        Least standard deviation of the offsets b_i, and of the position of an axle in the record of a sensor. [m]
     limit : float
         Four standard deviations of the prior of the acceleration: two sensors alone leave it open. [m/s²]
 
@@ -69,7 +70,7 @@ def slowness_from_sensors(
     weight = np.ones(sensor.size)
     level = times - centre
     start = np.nansum(level * travel[:, None]) / np.sum(np.isfinite(level) * travel[:, None] ** 2)
-    min_scale = 0.3 * position_error * abs(start)
+    min_scale = position_error * abs(start)
     prior = np.zeros((1, n_axle + 2))
     scale, curvature = min_scale, np.zeros(sensor.size)
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""A count of axles is not stated without doubt where wheels are left out, another count is as clear, or no speed fits."""
+"""A count of axles is in doubt where wheels are left out, another count is as clear, or the speed was not sought."""
 
 from dataclasses import replace
 

@@ -55,3 +55,22 @@ def test_the_error_from_sensors_is_the_scatter_of_their_slowness(positions):
     # the spread of more than two sensors is estimated and at least the given one: the error is somewhat large then
     assert (0.7 if positions.size > 2 else 0.88) < q.std() / q_se.mean() < 1.12
     assert q.mean() == pytest.approx(1.0 / SPEED, rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [8.0, 15.0])
+@pytest.mark.parametrize("axles", [(0.0, 5.0), (0.0, 3.0, 9.5, 12.5), tuple(3.0 * np.arange(24))])
+@pytest.mark.parametrize("places", [(3.6, 40.2), (20.0, 24.6, 28.1, 33.0)])
+def test_the_acceleration_of_few_axles_has_the_error_of_their_positions(places, axles, speed):
+    """Steady trains with axle positions off by 5 cm, as stated: an interval of 95 % holds 0 in 200 x 0.95 ± 9 draws.
+
+    Two axles leave no residual that could show the error.
+    """
+    rng, inside, errors, estimates = np.random.default_rng(1), 0, [], []
+    for _ in range(200):
+        positions = np.array(axles) + np.array(places)[:, None] + 0.05 * rng.standard_normal((len(places), len(axles)))
+        q, change, _, change_se, _, _ = slowness_from_sensors(positions / speed, places, 1, 0.05, 1.2)
+        inside += abs(change) <= 1.96 * change_se
+        errors.append(change_se / q**2)
+        estimates.append(-change / q**2)
+    assert inside >= 180
+    assert np.median(errors) < 2.0 * np.std(estimates) + 0.3 * (len(axles) == 2)  # m/s²; the prior is 0 ± 0.3
