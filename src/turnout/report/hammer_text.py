@@ -264,7 +264,7 @@ def _mode(mode: Mapping[str, Any]) -> str:
 
 
 def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Dynamic stiffness at the line nearest to the resonance; not with an exponential window, which changes it."""
+    """Dynamic stiffness at the resonance; not with an exponential window, which changes it."""
     row = next(iter(rows.get("receptances", ())), None)
     if row is None or row["window_decay_per_s"]:
         return []
@@ -275,9 +275,8 @@ def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mappin
     )
     if stiffness is None:
         return []
-    nearest = frequency[np.argmin(np.abs(frequency - mode["frequency_hz"]))]
     value, low, high = (f"{v / 1e6:#.4g}" for v in stiffness)
-    return [_line("", f"dynamic stiffness at {nearest:.0f} Hz {value} MN/m ({low} to {high}, 95 %)")]
+    return [_line("", f"dynamic stiffness at {mode['frequency_hz']:.1f} Hz {value} MN/m ({low} to {high}, 95 %)")]
 
 
 def _reason_lines(model: Mapping[str, Any]) -> list[str]:

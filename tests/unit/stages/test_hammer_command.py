@@ -23,7 +23,7 @@ DAY = date(2024, 5, 13)
 NOTES = "campaign,started_at_utc,rail_temperature_c\n2024-05-13,2024-05-13T09:00:00,11.5\n"
 NUMBER = r"(-?\d[\d.]*)"
 RESONANCE = re.compile(rf"  (ballast|railpad) +{NUMBER} ± {NUMBER} Hz, damping {NUMBER} ± {NUMBER}, n = (\d+)")
-STIFFNESS = re.compile(rf"at (\d+) Hz {NUMBER} MN/m \({NUMBER} to {NUMBER}, 95 %\)")
+STIFFNESS = re.compile(rf"at ([\d.]+) Hz {NUMBER} MN/m \({NUMBER} to {NUMBER}, 95 %\)")
 
 
 @pytest.fixture(autouse=True)
