@@ -13,8 +13,8 @@ def dynamic_stiffness(
         |\hat H_i - H_i| \le |\hat H_i| \sqrt{\frac{F_{2,\,2n-2}}{n-1} \frac{1-\gamma_i^2}{\gamma_i^2}}
 
     with the two neighbouring lines i and the distance t from the lower one in line spacings. Near a resonance K is a
-    parabola of the frequency, so its chord is off by :math:`\Delta f^2 / (8 \zeta f^2)` of K at most, at right angles to
-    K. At the nearest line |K| itself is off by :math:`\Delta f^2 / (8 \zeta^2 f^2)`.
+    parabola of the frequency, so its chord is off by :math:`\Delta f^2 / (8 \zeta f^2)` of K at most, and at right
+    angles to K. At the nearest line |K| itself is off by :math:`\Delta f^2 / (8 \zeta^2 f^2)`.
 
     Parameters
     ----------
