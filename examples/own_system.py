@@ -23,7 +23,12 @@ LAWS = {
     "dry_friction": (2, "dry friction opposes the motion", (0.0, 0.5)),
     "quadratic_spring": (3, "spring is stiffer on one side", (-2.0, 2.0)),
 }
-FREE_LAWS = ("cubic_spring", "quadratic_drag", "dry_friction", "quadratic_spring")
+# Parts of the free laws that are no candidates: with the laws above they follow many laws that no library has.
+FREE_PARTS = {
+    "absolute_quadratic_spring": (4, "spring force grows with the square of the displacement", (-2.0, 2.0)),
+    "state_damping": (5, "damping grows with the square of the displacement", (-2.0, 2.0)),
+}
+ALL_LAWS = {**LAWS, **FREE_PARTS}
 SOURCE = "Worden and Tomlinson 2001, Nonlinearity in structural dynamics, chapter 2"
 STICKING = 0.001  # of the largest velocity: below it dry friction is viscous; a larger share makes a body creep to rest
 
@@ -37,7 +42,11 @@ def law_force(law, y, v):
         return abs(v) * v
     if law == 2:
         return np.tanh(v / STICKING)
-    return y * y
+    if law == 3:
+        return y * y
+    if law == 4:
+        return abs(y) * y
+    return y * y * v
 
 
 @njit(cache=True)
@@ -84,15 +93,15 @@ class Law:
 
     def sentence(self):
         """The law in words."""
-        return f"{LAWS[self.name][1]} (amount {self.amount:.3g})"
+        return f"{ALL_LAWS[self.name][1]} (amount {self.amount:.3g})"
 
 
 def law_candidates(names, bounds=None):
     """A candidate for each law; its parameter is the amount."""
     candidates = []
     for name in names:
-        low, high = bounds or LAWS[name][2]
-        parameter = Parameter("amount", "-", 0.0, (low, high), LAWS[name][1], SOURCE)
+        low, high = bounds or ALL_LAWS[name][2]
+        parameter = Parameter("amount", "-", 0.0, (low, high), ALL_LAWS[name][1], SOURCE)
         candidates.append(
             Candidate.of(name, (parameter,), lambda psi, n=name: Law(n, psi["amount"]), ((0.1 * high,),),
                          frame="amplitude", component="mass")
@@ -130,7 +139,7 @@ class Mount(Case):
         self.reserved = tuple(self.observation(*r, tolerance) for r in reserved)
         self.nuisances = tuple(self.parameters(frequency, damping))
         self.candidates = law_candidates([n for n in LAWS if n not in without])
-        self.free_laws = law_candidates(FREE_LAWS, (-2.0, 2.0))
+        self.free_laws = law_candidates(ALL_LAWS, (-2.0, 2.0))
 
     def observation(self, name, condition, force, y, tolerance):
         """One record; a tenth of its samples count as independent."""
@@ -149,7 +158,7 @@ class Mount(Case):
     def predict(self, values, terms, observations):
         """Displacement of every record with these parameters and laws."""
         linear = np.array([values["frequency"], values["damping"], values.get("gain", 0.0)])
-        laws = np.array([LAWS[t.name][0] for t in terms], dtype=np.int64)
+        laws = np.array([ALL_LAWS[t.name][0] for t in terms], dtype=np.int64)
         amounts = np.array([t.amount for t in terms], dtype=float)
         return [
             simulate(self.recorded[o.name][0], 1.0 / self.rate, self.start(values, o.name), linear, laws, amounts,
@@ -197,7 +206,8 @@ def show(title, diagnosis):
         print(f"   {term.sentence()}")
     fit = diagnosis.verification
     if fit is None or fit.after is None:
-        print("   no law is named: check the noise and the step of the simulation first, then add what else may act")
+        print("   no law is named: check the noise, the step of the simulation, the ranges of the amounts,")
+        print("   and whether the records are too long for the stated frequency; then add what else may act")
         return
     print(f"   fit on the held-out record: {fit.before:.1f} % without it, {fit.after:.1f} % with it")
 

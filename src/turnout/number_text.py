@@ -3,9 +3,44 @@
 from __future__ import annotations
 
 import math
+import re
 
 LARGEST_ODDS = 1_000_000  # to 1: beyond, the number tells nobody anything
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_DECIMAL_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def decimal_number(text: str) -> float:
+    """The number that a person wrote: digits with a decimal point, with or without a sign and an exponent.
+
+    Python and YAML also read "24_6" as 246 and "0x18" as 24, which nobody means in a table or an option.
+
+    Parameters
+    ----------
+    text : str
+        Text of a cell, an option or a value; blanks around it do not count.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    ValueError
+        For any other text, "nan" and "inf" included.
+
+    Examples
+    --------
+    >>> decimal_number("24.6"), decimal_number(" -2e4 "), decimal_number(".5")
+    (24.6, -20000.0, 0.5)
+    >>> decimal_number("24_6")
+    Traceback (most recent call last):
+    ValueError: '24_6' is no decimal number
+    """
+    if not _DECIMAL_NUMBER.fullmatch(text.strip()):
+        raise ValueError(f"{text!r} is no decimal number")
+    return float(text)
 
 
 def number_text(value: float) -> str:

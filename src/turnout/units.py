@@ -45,6 +45,7 @@ PARAMETER_UNITS = {
     "%": ("-", 0.01),
     "dB": ("dB", 1.0),
     "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
     "µm": ("m", 1e-6),
     "kg": ("kg", 1.0),
@@ -54,15 +55,21 @@ PARAMETER_UNITS = {
     "t m²": ("kg m²", 1e3),
     "kg/m³": ("kg/m³", 1.0),
     "Pa": ("Pa", 1.0),
+    "MPa": ("Pa", 1e6),
+    "N/mm²": ("Pa", 1e6),
     "GPa": ("Pa", 1e9),
     "m⁴": ("m⁴", 1.0),
     "cm⁴": ("m⁴", 1e-8),
+    "mm⁴": ("m⁴", 1e-12),
     "m²": ("m²", 1.0),
     "cm²": ("m²", 1e-4),
+    "mm²": ("m²", 1e-6),
     "N": ("N", 1.0),
     "kN": ("N", 1e3),
     "N/m": ("N/m", 1.0),
+    "kN/m": ("N/m", 1e3),
     "MN/m": ("N/m", 1e6),
+    "kN/mm": ("N/m", 1e6),
     "N s/m": ("N s/m", 1.0),
     "kN s/m": ("N s/m", 1e3),
     "N s/m²": ("N s/m²", 1.0),
@@ -82,6 +89,32 @@ PARAMETER_UNITS = {
     "1/K": ("1/K", 1.0),
     "°C": ("°C", 1.0),
 }
+
+
+def parameter_unit(text: str) -> tuple[str, float] | None:
+    """SI unit and factor of a unit of parameter files, also where it is typed without superscripts or blanks.
+
+    Parameters
+    ----------
+    text : str
+        The unit as it is written.
+
+    Returns
+    -------
+    tuple of (str, float) or None
+        SI unit, and the factor that leads to it; None for an unknown unit.
+
+    Examples
+    --------
+    >>> parameter_unit("kN/mm"), parameter_unit("kg/m3"), parameter_unit("kNs/m"), parameter_unit("mn/m")
+    (('N/m', 1000000.0), ('kg/m³', 1.0), ('N s/m', 1000.0), None)
+    """
+    spelling = re.sub(r"[·*]", " ", text)
+    spelling = re.sub(r"(?<=m)\^?([234])(?![\d.])", lambda match: "²³⁴"[int(match[1]) - 2], spelling)
+    spelling = re.sub(r"(?<=N)s(?=/)", " s", spelling)
+    return PARAMETER_UNITS.get(" ".join(spelling.split()))
+
+
 SPELLINGS = {
     "V": "Volt Volts volt volts v",
     "mV": "Millivolt Millivolts millivolts",

@@ -8,6 +8,7 @@ whether stiffness and acceleration are in the range of a track.
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from turnout.errors import ReadError
     from turnout.units import Conversion
 
+YAML_FOLDERS = ("layouts", "overrides", "tracks", "vehicles")
 MAX_TYPES = 6  # of trains that a remark names
 TABLE_SUFFIXES = (".csv", ".ods", ".tsv", ".txt", ".xls", ".xlsx", ".yaml")
 GROUP = "Set up"
@@ -84,7 +86,14 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {fault}")
     for path in _unread_files(configuration.folder):
         print(f"  {path}: no command reads a file of this name. Rename it, or move it out of the configuration")
-    for remark in (*_event_remarks(configuration.events), *_position_remarks(configuration)):
+    from turnout.stages.layout_checks import mounting_remarks
+
+    for remark in (
+        *_unnamed_tracks(configuration),
+        *_event_remarks(configuration.events),
+        *_position_remarks(configuration),
+        *mounting_remarks(configuration),
+    ):
         print(f"  {remark}")
     if not configuration.ids:
         print("  no turnout yet: `turnout add ID LAYOUT` adds one")
@@ -118,10 +127,42 @@ def _faults(configuration: Configuration, formats: Collection[str], to_si: Calla
 
 
 def _unread_files(folder: Path) -> list[Path]:
-    """Tables and settings directly in the configuration that no command reads for their name, such as a copy."""
+    """Files of the configuration that no command reads for their name, such as a copy, and folders of such files."""
     from turnout.config.load import TABLES
 
-    return sorted(p for p in folder.iterdir() if p.suffix in TABLE_SUFFIXES and p.name not in (*TABLES, "config.yaml"))
+    tables = [p for p in folder.iterdir() if p.suffix in TABLE_SUFFIXES and p.name not in (*TABLES, "config.yaml")]
+    strays = [
+        path
+        for name in YAML_FOLDERS
+        for path in folder.joinpath(name).glob("*")
+        if path.is_file() and path.suffix not in (".yaml", ".md") and not _is_hidden(path)
+    ]
+    read_folders = (*YAML_FOLDERS, "schema", "passages")
+    folders = [p for p in folder.iterdir() if p.is_dir() and p.name not in read_folders and not _is_hidden(p)]
+    return sorted(tables + strays + [p for p in folders if any(p.glob("*.yaml"))])
+
+
+def _is_hidden(path: Path) -> bool:
+    """Whether a file is of an editor or of the system, not of a person."""
+    return path.name.startswith(".") or path.name.endswith("~")
+
+
+def _unnamed_tracks(configuration: Configuration) -> Iterator[str]:
+    """A remark on each track file that belongs to no turnout or layout by its name, and that no other track extends."""
+    from turnout.config.parameter_files import read_unchanged_parameters
+    from turnout.errors import ConfigError
+
+    names = {*configuration.ids, *(path.stem for path in (configuration.folder / "layouts").glob("*.yaml"))}
+    paths = sorted((configuration.folder / "tracks").glob("*.yaml"))
+    for path in paths:
+        with suppress(ConfigError):  # a fault of its own
+            names.add(str(read_unchanged_parameters(path).get("extends")))
+    for path in paths:
+        if path.stem not in names:
+            yield (
+                f"{path}: no turnout and no layout has this name, so it is used only where --track names it. "
+                "A turnout uses the track file of its id, else that of its layout"
+            )
 
 
 def _open_decisions(folder: Path) -> Iterator[str]:

@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 import traceback
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from difflib import get_close_matches
 from importlib import import_module
 from io import StringIO
@@ -121,7 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _main(words: Sequence[str]) -> int:
     use_one_thread()
     gc.set_threshold(COLLECTION_THRESHOLD)
-    args = _parse(words)
+    args = _parse_for_json(words) if "--json" in words else _parse(words)
     started = time.monotonic()
     if args.quiet:
         os.environ["TQDM_DISABLE"] = "1"
@@ -173,6 +173,20 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
         hint = f" Did you mean --{similar[0]}?" if similar else ""
         args.parser.error(f"unknown: {' '.join(unknown)}.{hint} '{args.parser.prog} --help' lists the options")
     return args
+
+
+def _parse_for_json(words: Sequence[str]) -> argparse.Namespace:
+    """As ``_parse``; a wrong command line also ends with a JSON object on standard output, which states its error."""
+    message = StringIO()
+    try:
+        with redirect_stderr(message):
+            return _parse(words)
+    except SystemExit as end:
+        print(message.getvalue(), end="", file=sys.stderr)
+        if end.code:
+            usage, _, error = message.getvalue().strip().partition(": error: ")
+            print(_json_text(words[0], int(end.code), error or usage))
+        raise
 
 
 def _run(args: argparse.Namespace) -> tuple[int, str]:
@@ -269,22 +283,29 @@ def _run_for_json(args: argparse.Namespace) -> tuple[int, str]:
     text = StringIO()
     with _standard_output_to_error(), redirect_stdout(text):
         code, message = _run(args)
-    document = {
-        "command": args.command,
-        "exit_code": code,
-        "text": text.getvalue().splitlines(),
-        "result": args.result,
-        "warnings": args.warnings or [],
-        "error": message or None,
-    }
-    is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
-    printed = json.dumps(document, default=str, ensure_ascii=not is_utf8, indent=1)
+    printed = _json_text(args.command, code, message, text.getvalue().splitlines(), args.result, args.warnings or [])
 
     def print_document(_: argparse.Namespace) -> int:
         print(printed)
         return code
 
     return _run(argparse.Namespace(**{**vars(args), "run": print_document}))
+
+
+def _json_text(
+    command: str, code: int, error: str, text: Sequence[str] = (), result: object = None, warnings: Sequence[str] = ()
+) -> str:
+    """The JSON object of a command, as text that standard output can show."""
+    document = {
+        "command": command,
+        "exit_code": code,
+        "text": text,
+        "result": result,
+        "warnings": warnings,
+        "error": error or None,
+    }
+    is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    return json.dumps(document, default=str, ensure_ascii=not is_utf8, indent=1)
 
 
 @contextmanager

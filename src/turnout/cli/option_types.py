@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from dataclasses import dataclass
+
+from turnout.number_text import decimal_number
 
 
 def at_least_one(text: str) -> int:
@@ -26,8 +29,8 @@ def at_least_one(text: str) -> int:
     4
     """
     try:
-        number = int(text)
-    except ValueError:
+        number = whole_number(text)
+    except argparse.ArgumentTypeError:
         number = 0
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
@@ -52,10 +55,9 @@ def whole_number(text: str) -> int:
     >>> whole_number("-3")
     -3
     """
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+    if not re.fullmatch(r"[+-]?\d+", text.strip(), re.ASCII):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(text)
 
 
 def above_zero(text: str) -> float:
@@ -124,7 +126,7 @@ def finite_number(text: str, lower_limit: float = -math.inf) -> float:
     -12.5
     """
     try:
-        number = float(text)
+        number = decimal_number(text)
     except ValueError:
         number = math.nan
     if not lower_limit < number < math.inf:

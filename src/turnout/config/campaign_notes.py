@@ -14,6 +14,7 @@ from turnout.config.frozen_mapping import Frozen
 from turnout.config.schema import decimal_point_hint
 from turnout.config.turnout import Campaign, TurnoutConfig
 from turnout.errors import ReadError
+from turnout.number_text import decimal_number
 
 NOTE_FILES = ("campaigns.csv", "trains.csv")
 COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator")
@@ -208,7 +209,7 @@ def _in_range(text: str, column: str, low: float, high: float) -> float | None:
     if not text:
         return None
     try:
-        value = float(text)
+        value = decimal_number(text)
     except ValueError:
         value = math.nan
     is_whole = column in WHOLE_NUMBERS

@@ -16,6 +16,7 @@ EXTRA_CELLS = "cells beyond the header"
 BROKEN_LINE = "a line that is no row"
 WRONG_SEPARATOR = "a row without commas"
 OTHER_SEPARATORS = (("semicolons", ";"), ("tabs", "\t"))
+EMPTY_ROW = ' \t,;"\xa0'  # characters of a row without content, as spreadsheets write it
 SEPARATOR_REMEDY = "Put commas between the columns, and a point before decimals"
 
 
@@ -192,8 +193,29 @@ def _numbered_lines(path: Path, name: str) -> list[tuple[int, str]]:
         line = data[: error.start].count(b"\n") + 1
         column = error.start - data.rfind(b"\n", 0, error.start)
         raise TableError(Place(name, line, column), "a byte that is not UTF-8", "Save the file as UTF-8") from None
+    return rows_of(text)
+
+
+def rows_of(text: str) -> list[tuple[int, str]]:
+    r"""The lines of a table that hold a header or a row: without comments, which begin with #, and without empty rows.
+
+    Parameters
+    ----------
+    text : str
+        The table. Its lines end with LF, CR LF or CR; other separators of lines are characters of a cell.
+
+    Returns
+    -------
+    list of (int, str)
+        Number of the line, from 1, and its text.
+
+    Examples
+    --------
+    >>> rows_of('# of 2025\nturnout,date\n,\n"",""\r\nt1,2025-01-01\n')
+    [(2, 'turnout,date'), (5, 't1,2025-01-01')]
+    """
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return [(n, line) for n, line in enumerate(lines, 1) if line.strip()]
+    return [(n, line) for n, line in enumerate(lines, 1) if line.strip(EMPTY_ROW) and not line.lstrip().startswith("#")]
 
 
 def _titles(header: str) -> tuple[str, ...]:

@@ -159,6 +159,7 @@ class Leaf:
 
     value: Any  # Scalar or tuple of Scalar: its key in the schema says which
     place: Place
+    text: str = ""  # as it is written, without quotes; "" of a list
 
 
 class Branch(dict):
@@ -388,7 +389,7 @@ def _tree(node: AnyNode, path: str, constructor: BaseConstructor, ancestors: tup
         return branch
     if node.id == "sequence":
         return Leaf(tuple(_scalar(item, path, constructor) for item in node.value), place)
-    return Leaf(_scalar(node, path, constructor), place)
+    return Leaf(_scalar(node, path, constructor), place, str(node.value))
 
 
 def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:

@@ -267,7 +267,7 @@ def day_problem(text: str) -> tuple[str, str] | None:
 
 
 def parse_utc(text: str) -> datetime:
-    """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a "Z"; ValueError for other text.
+    """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a "Z" or "+00:00"; ValueError for other text.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def parse_utc(text: str) -> datetime:
     Returns
     -------
     datetime
-        The time, naive as in the tables.
+        The time, naive as in the tables; with a zone if that is not UTC, which ``time_problem`` reports.
 
     Raises
     ------
@@ -286,10 +286,11 @@ def parse_utc(text: str) -> datetime:
 
     Examples
     --------
-    >>> parse_utc("2026-04-02T10:30Z").isoformat()
-    '2026-04-02T10:30:00'
+    >>> parse_utc("2026-04-02T10:30Z").isoformat(), parse_utc("2026-04-02T10:30+00:00").isoformat()
+    ('2026-04-02T10:30:00', '2026-04-02T10:30:00')
     """
-    return datetime.fromisoformat(text.removesuffix("Z"))
+    time = datetime.fromisoformat(text.removesuffix("Z"))
+    return time.replace(tzinfo=None) if time.utcoffset() == timedelta(0) else time
 
 
 def now() -> datetime:

@@ -5,10 +5,10 @@ import textwrap
 from dataclasses import fields
 from pathlib import Path
 
-from turnout.config.document import load, plain_values
+from turnout.config.document import Branch, Place, load, plain_values
 from turnout.config.key_text import describe_key, yaml_text
 from turnout.config.layout_schema import layout_keys
-from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries
+from turnout.config.schema import FleetWideKey, Group, Key, NamedEntries, fit_to_schema
 from turnout.config.settings import parts
 from turnout.config.settings_page import settings_page
 from turnout.config.settings_schema import default_of, settings_keys
@@ -41,7 +41,9 @@ def generate_files(folder: Path, docs: Path, defaults: bool = False) -> dict[Pat
         Path -> text; nothing is written.
     """
     path = Path(folder) / "config.yaml"
-    present = plain_values(load(path)) if path.exists() and not defaults else {}
+    tree = load(path) if path.exists() and not defaults else Branch(Place(str(path)))
+    fit_to_schema(settings_keys(), tree)
+    present = plain_values(tree)
     layout, override = layout_keys(), layout_keys()
     return {
         path: config_yaml(present),

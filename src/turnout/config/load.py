@@ -14,7 +14,7 @@ from turnout.config.file_names import file_key
 from turnout.config.frozen_mapping import Frozen
 from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
-from turnout.config.schema import NO_TURNOUT, check, fill_empty_groups, suggestion
+from turnout.config.schema import NO_TURNOUT, check, fit_to_schema, suggestion
 from turnout.config.settings_schema import check_ranges, settings_keys
 from turnout.config.turnout import TurnoutConfig
 from turnout.config.turnouts_table import NO_PROJECT, Row, read_table
@@ -64,8 +64,8 @@ def load_configuration(
     reading.errors += check_ranges(settings)
     rows, errors = read_table(paths["turnouts.tsv"], reading.name("turnouts.tsv"))
     reading.errors += errors
-    variants = reading.variants(rows, settings)
     turnout_ids = None if errors else {row.id for row in rows}
+    variants = reading.variants(rows, settings, are_all_rows_valid=not errors)
     events, errors, event_warnings = read_events(paths["events.csv"], reading.name("events.csv"), turnout_ids, variants)
     reading.errors += errors
     if reading.errors:
@@ -188,7 +188,7 @@ class _ConfigurationReader:
         except ConfigError as error:
             self.errors.append(error)
             return empty
-        fill_empty_groups(spec, tree)
+        fit_to_schema(spec, tree)
         if problems := list(check(spec, tree, whole)):
             self.errors += problems
             return empty
@@ -230,8 +230,11 @@ class _ConfigurationReader:
             if leaf and self.formats is not None and leaf.value not in (allowed := ("auto", *self.formats)):
                 yield leaf.place.error(f"format is {leaf.value!r}", suggestion(leaf.value, allowed))
 
-    def variants(self, rows: list[Row], settings: Branch) -> dict[str, Variant]:
-        """Merged configuration of every row; rows with the same technical columns share one."""
+    def variants(self, rows: list[Row], settings: Branch, are_all_rows_valid: bool) -> dict[str, Variant]:
+        """Merged configuration of every row; rows with the same technical columns share one.
+
+        An override of a turnout that is not in ``rows`` is an error, unless it may be that of a row with an error.
+        """
         overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
         merged = {}
         for row in rows:
@@ -239,7 +242,7 @@ class _ConfigurationReader:
             override = overrides.pop(row.id, None)
             if layout is not None:
                 merged[row.id] = self._variant(row, layout, override)
-        for stem, path in overrides.items():
+        for stem, path in overrides.items() if are_all_rows_valid else ():
             place = Place(self.name("overrides", path.name), 1, 1)
             remedy = suggestion(stem, [row.id for row in rows], NO_TURNOUT)
             self.errors.append(place.error(f"an override without a turnout {stem!r}", remedy))

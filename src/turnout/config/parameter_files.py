@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from turnout.config.document import Place, as_config_errors, compose, place_of_node
 from turnout.config.parameters import KEYS, Entries, Entry, Number, ParameterSet
 from turnout.config.schema import DECIMAL_POINT, decimal_point_hint, suggestion
-from turnout.units import PARAMETER_UNITS
+from turnout.number_text import decimal_number
+from turnout.units import PARAMETER_UNITS, parameter_unit
 
 if TYPE_CHECKING:
     from turnout.config.document import AnyNode
@@ -111,7 +112,7 @@ def _parse(value: Any, node: AnyNode | None, place: Place, sources: dict) -> Ent
         return Entries(map(_parse, value, nodes, places, repeat(sources)), places)
     if not isinstance(value, dict):
         return value
-    return _number(value, place, sources) if "value" in value else _parameter_set(value, node, place, sources)
+    return _number(value, node, place, sources) if "value" in value else _parameter_set(value, node, place, sources)
 
 
 def _parameter_set(content: dict, node: AnyNode | None, place: Place, sources: dict) -> ParameterSet:
@@ -129,32 +130,37 @@ def _members(node: AnyNode | None, path: str) -> dict[str, tuple[Place, AnyNode]
     return {str(key.value): (place_of_node(key, path), value) for key, value in pairs}
 
 
-def _number(entry: dict, place: Place, sources: dict) -> Number:
+def _number(entry: dict, node: AnyNode | None, place: Place, sources: dict) -> Number:
+    texts = {key: member.value for key, (_, member) in _members(node, place.path).items() if member.id == "scalar"}
     for key in ("unit", "source"):
         if isinstance(entry.get(key), (list, dict, type(None))):
             raise place.error(f"a number without {key}", f"Give its {key}")
     if unknown := sorted(map(str, set(entry) - KEYS)):
         remedy = DECIMAL_POINT if unknown[0].isdecimal() else suggestion(unknown[0], KEYS)
         raise place.error(f"unknown key {unknown[0]!r}", remedy)
-    if entry["unit"] not in PARAMETER_UNITS:
+    known_unit = parameter_unit(str(entry["unit"]))
+    if known_unit is None:
         alike = [unit for unit in PARAMETER_UNITS if unit.lower() == str(entry["unit"]).lower()]
         hint = f"Did you mean {' or '.join(map(repr, alike))}? " if alike else ""
         raise place.error(f"unknown unit {entry['unit']!r}", f"{hint}Use one of {', '.join(PARAMETER_UNITS)}")
     source = sources.get(entry["source"], entry["source"])
     prior = entry.get("prior")
-    spread = None if prior is None else _finite(prior, place)
+    spread = None if prior is None else _finite(prior, texts.get("prior"), place)
     if (spread is None and str(source).startswith("estimate")) or (spread is not None and spread <= 0.0):
         problem = "an estimate without a prior" if spread is None else f"a prior of {prior}"
         raise place.error(problem, "Give its relative standard deviation, above 0, as prior")
-    unit, factor = PARAMETER_UNITS[entry["unit"]]
-    return Number(factor * _finite(entry["value"], place), unit, str(source), spread)
+    unit, factor = known_unit
+    return Number(factor * _finite(entry["value"], texts.get("value"), place), unit, str(source), spread)
 
 
-def _finite(value: Any, place: Place) -> float:
+def _finite(value: Any, text: str | None, place: Place) -> float:
+    """The number that is written as ``text``; YAML itself also reads "true" as 1 and "24_6" as 246."""
     try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise place.error(f"{value!r} is not a number", f"Write a number{decimal_point_hint(str(value))}") from None
+        is_special = isinstance(value, float) and not isfinite(value)
+        number = value if is_special else decimal_number(str(value) if text is None else text)
+    except ValueError:
+        written = repr(value if text is None or isinstance(value, str) else text)
+        raise place.error(f"{written} is not a number", f"Write a number{decimal_point_hint(str(value))}") from None
     if not isfinite(number):
         raise place.error(f"{value!r} is not finite", "Write a number")
     return number

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
 
 from turnout.config.document import Branch, Leaf
 from turnout.config.settings.setting import MAIL_ADDRESSES, MAIL_SENDER, WEB_ADDRESS
 from turnout.errors import ConfigError
-from turnout.number_text import number_text
+from turnout.number_text import decimal_number, number_text
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
 LABEL = r"[A-Za-z][A-Za-z0-9-]*"
@@ -250,10 +250,52 @@ def _hint_at_other_unit(key: Key, value: float) -> str:
 DECIMAL_POINT = "If it belongs to the number before it, write a point in place of the comma, as in 24.6"
 
 
-def fill_empty_groups(spec: dict, tree: Branch) -> None:
-    """Give each name without anything below it an empty mapping, where its schema has names there.
+def typed_value(key: Key, leaf: Leaf) -> Any:
+    """The value of a leaf in the type of its key, where the text that is written has one meaning there.
 
-    So a section of config.yaml counts as empty when all of its lines are comments.
+    Parameters
+    ----------
+    key : Key
+        Type of the value.
+    leaf : Leaf
+        The value as YAML reads it, with its text.
+
+    Returns
+    -------
+    any
+        A number for a number in quotes, a whole number for 10.0, the text for a number where text is wanted; the text
+        also of a number in another notation than the decimal one, which ``value_problem`` then reports; else the value
+        unchanged.
+
+    Examples
+    --------
+    >>> from turnout.config.document import Place
+    >>> typed_value(Key("number", "rate"), Leaf("2e4", Place("a.yaml"), "2e4"))
+    20000.0
+    >>> typed_value(Key("text", "serial number"), Leaf(7, Place("a.yaml"), "007"))
+    '007'
+    """
+    value = leaf.value
+    if key.many or isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        return value
+    if key.value_type == "text":
+        return value if isinstance(value, str) else leaf.text
+    if key.value_type not in ("number", "integer") or not leaf.text:
+        return value
+    try:
+        number = decimal_number(leaf.text)
+    except ValueError:
+        return leaf.text if isinstance(value, int) else value
+    if key.value_type == "integer" and number.is_integer():
+        return value if isinstance(value, int) else int(number)
+    return number if isinstance(value, str) else value
+
+
+def fit_to_schema(spec: dict, tree: Branch) -> None:
+    """Give the values of a tree the types of their keys, and each name without anything below it an empty mapping.
+
+    The mapping is given where the schema has names below that name: a section of config.yaml counts as empty when all
+    of its lines are comments.
 
     Parameters
     ----------
@@ -263,16 +305,18 @@ def fill_empty_groups(spec: dict, tree: Branch) -> None:
         Tree of a file; it is changed.
     """
     for name, rule in spec.items():
+        if isinstance(rule, Key) and isinstance(leaf := tree.get(name), Leaf):
+            tree[name] = replace(leaf, value=typed_value(rule, leaf))
         if name in tree and isinstance(rule, Group | NamedEntries):
             branch = _mapping_below(tree, name)
             if branch is None:
                 continue
             if isinstance(rule, Group):
-                fill_empty_groups(rule.spec, branch)
+                fit_to_schema(rule.spec, branch)
                 continue
             for label in branch:
                 if (entry := _mapping_below(branch, label)) is not None:
-                    fill_empty_groups(rule.spec, entry)
+                    fit_to_schema(rule.spec, entry)
 
 
 def _mapping_below(tree: Branch, name: str) -> Branch | None:

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from turnout.config.csv_table import TableError, header_of
+from turnout.config.csv_table import TableError, header_of, rows_of
 from turnout.config.document import Place
-from turnout.config.turnouts_table import NO_PROJECT, separator_problem
+from turnout.config.turnouts_table import NO_PROJECT, separator_problem, titles_of
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.files import temporary_path, write_atomic
 from turnout.locks import folder_lock
@@ -171,16 +171,16 @@ def _csv_header(path: Path) -> tuple[str, ...]:
 def _tsv_header(path: Path) -> tuple[str, ...]:
     """Titles of a table with tabs between its columns and # before comments."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = rows_of(path.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise ConfigError(path, f"line {line}", "a byte that is not UTF-8", "Save the file as UTF-8") from None
-    titles = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    if not titles:
+    if not lines:
         raise Place(str(path), 1, 1).error("an empty table", "Write a header: turnout<tab>layout<tab>...")
-    header = tuple(title.strip() for title in titles.split("\t"))
+    number, text = lines[0]
+    header = titles_of(text)
     if separator_error := separator_problem(header):
-        raise Place(str(path), 1 + lines.index(titles), 1).error(*separator_error)
+        raise Place(str(path), number, 1).error(*separator_error)
     return header
 
 

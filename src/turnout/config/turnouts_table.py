@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from turnout.config.csv_table import rows_of
 from turnout.config.document import Place, as_config_errors
 from turnout.config.file_names import file_key, name_problem
 from turnout.config.layout_schema import HAMMER_RATE, PASSAGE_RATE
 from turnout.config.schema import ID, Key, suggestion, value_problem
 from turnout.errors import ConfigError
+from turnout.number_text import decimal_number
 
 NO_TABLE = "Run 'turnout add ID LAYOUT' to begin one"
 NO_PROJECT = "Run the command in the folder of a project; 'turnout init FOLDER' makes one"
@@ -93,14 +95,13 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
         return [], [ConfigError(name, "the path", "there is no such file", remedy)]
     try:
         with as_config_errors(name, "line 1"):
-            lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+            numbered = rows_of(Path(path).read_text(encoding="utf-8-sig"))
     except ConfigError as error:
         return [], [error]
-    numbered = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if not numbered:
         return [], [ConfigError(name, "line 1", "an empty table", "Write a header: turnout<tab>layout<tab>...")]
-    header = tuple(cell.strip() for cell in numbered[0][1].split("\t"))
-    if errors := list(_header_errors(header, name, numbered[0][0])):
+    header = titles_of(numbered[0][1])
+    if errors := list(_header_errors(header, name, *numbered[0])):
         return [], errors
     rows: list[Row] = []
     line_of_id: dict[str, int] = {}
@@ -129,18 +130,70 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     return rows, errors
 
 
-def _header_errors(header: tuple[str, ...], name: str, line: int) -> Iterator[ConfigError]:
+def titles_of(line: str) -> tuple[str, ...]:
+    """Titles of a table with tabs between its columns; empty columns on the right are left out.
+
+    Parameters
+    ----------
+    line : str
+        The header.
+
+    Returns
+    -------
+    tuple of str
+        Titles without blanks or double quotes around them.
+
+    Examples
+    --------
+    >>> titles_of('turnout\\t"layout"\\t\\t')
+    ('turnout', 'layout')
+    """
+    titles = [cell_text(cell) for cell in line.split("\t")]
+    while titles and not titles[-1]:
+        titles.pop()
+    return tuple(titles)
+
+
+def cell_text(cell: str) -> str:
+    """Content of a cell between tabs. Spreadsheets put a cell in double quotes if it holds a comma or a quote.
+
+    Parameters
+    ----------
+    cell : str
+        The cell as it is written.
+
+    Returns
+    -------
+    str
+        Its content, without blanks around it; quotes within a cell stay.
+
+    Examples
+    --------
+    >>> cell_text(' "Tommerup, switch 3" '), cell_text('"Switch ""old"" 1"'), cell_text('"Nord" 3')
+    ('Tommerup, switch 3', 'Switch "old" 1', '"Nord" 3')
+    """
+    text = cell.strip()
+    content = text[1:-1]
+    is_quoted = len(text) > 1 and text[0] == text[-1] == '"' and '"' not in content.replace('""', "")
+    return content.replace('""', '"').strip() if is_quoted else text
+
+
+def _header_errors(header: tuple[str, ...], name: str, line: int, text: str) -> Iterator[ConfigError]:
     column = 1
     if problem := separator_problem(header):
         yield Place(name, line, 1).error(*problem)
         return
-    for i, title in enumerate(header):
+    if not set(header) & set(ROW):
+        problem_text = f"a header without a known column: {', '.join(map(repr, header))}"
+        yield Place(name, line, 1).error(problem_text, "Write turnout<tab>layout<tab>... above the rows")
+        return
+    for i, (title, cell) in enumerate(zip(header, text.split("\t"))):
         place = Place(name, line, column)
         if title not in ROW:
             yield place.error(f"unknown column {title!r}", suggestion(title, ROW))
         elif title in header[:i]:
             yield place.error(f"column {title!r} for the second time", "Keep one of them")
-        column += len(title) + 1
+        column += len(cell) + 1
     for title, key in ROW.items():
         if key.required and title not in header:
             yield Place(name, line, 1).error(f"no column {title!r}", f"Add it: {key.meaning}")
@@ -175,19 +228,19 @@ def _row(text: str, line: int, header: tuple[str, ...], name: str) -> tuple[Row,
     row = Row({}, line, cells, header, name)
     if separator_error := separator_problem(cells):
         return row, [Place(name, line, 1).error(*separator_error)]
-    if len(cells) > len(header):
+    if any(cell.strip() for cell in cells[len(header) :]):
         place = Place(name, line, 1 + sum(len(c) + 1 for c in cells[: len(header)]))
         return row, [place.error(f"{len(cells)} cells under {len(header)} columns", "Remove what is too much")]
     errors = []
     for title, cell in zip(header, cells):
-        cell = cell.strip()
+        cell = cell_text(cell)
         if not cell:
             continue
         value: str | float = cell
         key = ROW[title]
         if key.value_type == "number":
             try:
-                value = float(cell)
+                value = decimal_number(cell)
             except ValueError:
                 value = cell
         if problem := value_problem(key, value):

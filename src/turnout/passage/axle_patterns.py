@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+
+MAX_VEHICLE_LENGTH = 500.0  # m, of a unit of a train; a longer one is in millimetres
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,9 @@ class Vehicle:
     axles: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.length <= MAX_VEHICLE_LENGTH:
+            limits = f"above 0 and up to {MAX_VEHICLE_LENGTH:g} m"
+            raise ValueError(f"vehicle {self.name}: a length of {self.length:g} m; one unit of a train has {limits}")
         if not self.axles or sorted(self.axles) != list(self.axles):
             raise ValueError(f"vehicle {self.name}: axles must be in order, got {self.axles}")
         if self.axles[0] < 0 or self.axles[-1] > self.length:
@@ -246,15 +252,16 @@ def read_patterns(document: Mapping) -> tuple[Pattern, ...]:
     KeyError
         A train names a vehicle that is not described; the message names both.
     ValueError
-        Axles of a vehicle out of order or beyond its length.
+        Axles of a vehicle out of order or beyond its length; a length, a count or a number of coupled units that no
+        train has; a text in place of a number. The message names the vehicle or the train.
     """
-    vehicles = {name: Vehicle.of(name, values) for name, values in document["vehicles"].items()}
+    vehicles = {name: _vehicle(name, values) for name, values in document["vehicles"].items()}
     patterns: list[Pattern] = []
     for name, values in document["trains"].items():
         type_ = values.get("type", name)
         groups = tuple(_group(item, vehicles, name) for item in values["units"])
         reversed_groups = Pattern(type_, groups).reverse().groups
-        for n in range(1, int(values.get("coupled", 1)) + 1):
+        for n in range(1, _count(values.get("coupled", 1), 1, f"train {name}: coupled") + 1):
             compositions = {Pattern(type_, groups * n), Pattern(type_, reversed_groups * n)}
             if values.get("mixed", False) and n == 2:
                 compositions |= {Pattern(type_, groups + reversed_groups), Pattern(type_, reversed_groups + groups)}
@@ -273,4 +280,24 @@ def _group(item: str | Mapping, vehicles: Mapping[str, Vehicle], type_: str) -> 
             raise KeyError(f"train {type_}: no vehicle {base!r}; there are {sorted(vehicles)}")
         choices.append(vehicles[base].reverse() if str(name).endswith("'") else vehicles[base])
     minimum, maximum = item.get("count", (1, 1))
-    return Group(tuple(choices), int(minimum), int(maximum))
+    least = _count(minimum, 0, f"train {type_}: count")
+    return Group(tuple(choices), least, _count(maximum, max(least, 1), f"train {type_}: the second count"))
+
+
+def _vehicle(name: str, values: Mapping) -> Vehicle:
+    """The vehicle ``name``; ValueError names it also where a value is no number."""
+    try:
+        return Vehicle.of(name, values)
+    except (KeyError, TypeError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else "length and axles [m] are missing"
+        raise ValueError(f"vehicle {name}: {what}") from None
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith("vehicle") else f"vehicle {name}: {text}") from None
+
+
+def _count(value: Any, least: int, what: str) -> int:
+    """A whole number of at least ``least``; ValueError otherwise."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < least:
+        raise ValueError(f"{what} is {value!r}, not a whole number of at least {least}")
+    return value

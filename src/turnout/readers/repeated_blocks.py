@@ -60,8 +60,10 @@ def is_noisy(block: np.ndarray) -> bool:
     Returns
     -------
     bool
-        False for a constant, for a tone and for a signal of a short period.
+        False for a constant, for a tone, for a signal of a short period and for fewer than three samples.
     """
+    if block.shape[1] < 3:
+        return False
     steps = np.sign(np.diff(block, axis=1))
     if not np.any(np.mean(steps[:, 1:] * steps[:, :-1] < 0, axis=1) > MIN_TURNS):
         return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 from turnout.config import Configuration
@@ -15,9 +16,12 @@ from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.parameter_ranges import improbable_in_files
 
+PANEL_ORDER = ("SP", "CLP", "CP", "AS")  # from the switch toe on; the open track is on both sides
+MAX_OFFSET = 10.0  # m from a section to its sensor: a larger one is in millimetres or counts from elsewhere
 MAX_TURNOUT_LENGTH = 500.0  # m between two sections: no turnout is so long
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
+MOUNTING_BEGINNINGS, MID_SPAN = ("rail", "sleeper"), "mid-span"  # what the simulation reads of a mounting
 QUANTITIES_WITHOUT_POSITION = ("force", "temperature", "ignored")  # channels that need no position
 
 
@@ -112,9 +116,10 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
 
 
 def faults_of_sections(configuration: Configuration) -> Iterator[str]:
-    """Pairs of sections at one position of one track, or farther apart than a turnout is long, each pair once.
+    """Positions of sections and of their sensors that no turnout has, each once.
 
-    The first is often the copy of a line that was not changed, the second a slipped decimal point.
+    Two sections are at one position of one track, are farther apart than a turnout is long, or a panel lies before the
+    one that it follows from the switch toe on. A sensor is far from its section.
 
     Parameters
     ----------
@@ -124,7 +129,7 @@ def faults_of_sections(configuration: Configuration) -> Iterator[str]:
     Yields
     ------
     str
-        One pair, as a sentence.
+        One fault, as a sentence.
     """
     faults: dict[str, None] = {}  # keys of one layout are in the trees of all turnouts that use it
     for variant in configuration.variants.values():
@@ -143,7 +148,71 @@ def faults_of_sections(configuration: Configuration) -> Iterator[str]:
             problem = f"sections {first} and {last} are {length:g} m apart"
             remedy = f"No turnout is longer than {MAX_TURNOUT_LENGTH:g} m: correct a position"
             faults[f"sections too far apart: {positions[last].place.error(problem, remedy)}"] = None
+        faults |= {f"panels out of order: {error}": None for error in _panel_errors(variant.tree["sections"])}
+        faults |= {f"far from its section: {error}": None for error in _offset_errors(variant.tree)}
     yield from faults
+
+
+def _panel_errors(sections: Branch) -> Iterator[ConfigError]:
+    """An error for each panel that has a section before one of the panel which it follows."""
+    positions = {
+        panel: {label: s["position"].value for label, s in sections.items() if s["panel"].value == panel}
+        for panel in PANEL_ORDER
+    }
+    present = [panel for panel in PANEL_ORDER if positions[panel]]
+    for before, after in pairwise(present):
+        last = max(positions[before], key=positions[before].__getitem__)
+        first = min(positions[after], key=positions[after].__getitem__)
+        x, x_last = positions[after][first], positions[before][last]
+        if x < x_last:
+            problem = f"section {first} of panel {after} at {x:g} m is before {last} of panel {before} at {x_last:g} m"
+            remedy = "Positions count from the switch toe towards the crossing: correct one, or its panel"
+            yield sections[first]["position"].place.error(problem, remedy)
+
+
+def _offset_errors(tree: Branch) -> Iterator[ConfigError]:
+    """An error for each sensor that is far from its section."""
+    for name, channel in _channels(tree):
+        offset = channel.get("offset")
+        if offset is not None and abs(offset.value) > MAX_OFFSET:
+            problem = f"offset of channel {name} is {offset.value:g} m"
+            remedy = f"Write the distance from its section in m, of at most {MAX_OFFSET:g} m"
+            yield offset.place.error(problem, remedy)
+
+
+def _channels(tree: Branch) -> Iterator[tuple[str, Branch]]:
+    """(name, channel) of the passages, of the hammer tests and of what differs in single sections."""
+    sections = [section.get("hammer", {}) for section in tree["sections"].values()]
+    for branch in (tree.get("passages", {}), tree.get("hammer", {}), *sections):
+        yield from branch.get("channels", {}).items()
+
+
+def mounting_remarks(configuration: Configuration) -> Iterator[str]:
+    """A remark on each mounting from which the simulation cannot tell where the sensor sits, each once.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Configuration of the fleet.
+
+    Yields
+    ------
+    str
+        One sentence with what to write.
+    """
+    remarks: dict[str, None] = {}  # keys of one layout are in the trees of all turnouts that use it
+    for variant in configuration.variants.values():
+        for _, channel in _channels(variant.tree):
+            leaf = channel.get("mounting")
+            if leaf is None or not leaf.value or channel["quantity"].value in QUANTITIES_WITHOUT_POSITION:
+                continue
+            is_known = leaf.value.startswith(MOUNTING_BEGINNINGS)
+            if not is_known or ("mid" in leaf.value.casefold() and MID_SPAN not in leaf.value):
+                taken = "a sensor on the rail at a sleeper"
+                beginnings = " or ".join(MOUNTING_BEGINNINGS)
+                remedy = f"Begin it with {beginnings}; between two sleepers it is 'rail head {MID_SPAN}'"
+                remarks[str(leaf.place.error(f"mounting {leaf.value!r} is simulated as {taken}", remedy))] = None
+    yield from remarks
 
 
 def _check_entries(track: TurnoutTrack) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,15 @@ RANGES = {
     ("secondary_stiffness", "N/m"): (1e4, 1e10),
     ("suspension_stiffness", "N/m"): (1e4, 1e10),
     ("base", "m"): (0.5, 10.0),
+    ("payload", "kg"): (1.0, 500000.0),
+    ("shear_coefficient", "-"): (0.05, 1.0),
+    ("depth", "m"): (-0.05, 0.05),
+    ("length", "m"): (0.01, 1000.0),
+    ("level", "dB"): (-60.0, 60.0),
 }
+# Radius of gyration of cars and bogies: a wrong prefix of the mass or of the inertia changes it by a factor of 32.
+GYRATION_RADII = (0.3, 12.0)  # m
+MAX_TRACK_LENGTH = 5000.0  # m: a longer track is in millimetres
 MAX_PRIOR = 5.0  # relative standard deviation: a larger one is in percent
 
 
@@ -73,12 +82,34 @@ def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:
     ConfigError
         With file, line and entry. 0 is never improbable: it leaves a part out.
     """
+    yield from _errors_of_pairs(parameters)
     for key, value in parameters.items():
         if isinstance(value, Number):
             yield from _errors(parameters, str(key), value)
         else:
             for entry in _mappings(value):
                 yield from improbable_values(entry)
+
+
+def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
+    """Errors of two numbers that do not go together: mass and inertia, and the ends of the track."""
+    mass, inertia = (_number_at(parameters, key, unit) for key, unit in (("mass", "kg"), ("inertia", "kg m²")))
+    low, high = GYRATION_RADII
+    if mass > 0.0 and inertia > 0.0 and not low <= (radius := sqrt(inertia / mass)) <= high:
+        problem = (
+            f"{inertia:g} kg m² of {mass:g} kg are a radius of gyration of {radius:.3g} m, outside {low} to {high} m"
+        )
+        yield parameters.error("inertia", problem, "Correct one of the numbers or its unit")
+    first, last = (_number_at(parameters, key, "m") for key in ("from", "to"))
+    if last - first > MAX_TRACK_LENGTH:
+        problem = f"from {first:g} to {last:g} m are more than {MAX_TRACK_LENGTH:g} m"
+        yield parameters.error("from" if -first > last else "to", problem, "Correct the number or its unit")
+
+
+def _number_at(parameters: ParameterSet, key: str, unit: str) -> float:
+    """The number at a key, 0 if there is none of this unit."""
+    number = parameters.get(key)
+    return number.value if isinstance(number, Number) and number.unit == unit else 0.0
 
 
 def _mappings(value: Any) -> Iterator[ParameterSet]:

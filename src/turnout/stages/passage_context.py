@@ -159,7 +159,8 @@ def _read_patterns(path: str, content: str) -> tuple[Pattern, ...]:
         with as_config_errors(path, "the file"):
             return read_patterns(YAML(typ="safe").load(Path(path)))
     except (KeyError, ValueError, TypeError, AttributeError, MarkedYAMLError) as error:
-        message = " ".join(str(error).split()).strip("'\"")
+        message = " ".join(str(error).split())
+        message = message.strip("'\"") if isinstance(error, KeyError) else message
         if isinstance(error, KeyError) and len(message.split()) == 1:
             message = f"{message!r} is missing"
         elif isinstance(error, (TypeError, AttributeError)):

@@ -104,3 +104,31 @@ def test_two_systems_of_another_program_have_the_answers_of_their_page(repositor
         assert len(shown_amount) == len(found_amount)
         if shown_amount:
             assert found_amount[0] == pytest.approx(shown_amount[0], abs=shown_amount[1])
+
+
+def response_with_cubic_damping(force, amount, rate=200.0, substeps=8):
+    """Displacement of the mount with a damping force of the cube of the velocity, by steps of the midpoint rule."""
+    omega, y, v, out, h = 2.0 * np.pi * 4.0, 0.0, 0.0, [], 1.0 / rate / substeps
+
+    def acceleration(y, v, f):
+        return 100.0 * f - 0.03 * omega * v - omega**2 * (y + 0.1 * amount * (v / omega) ** 3)
+
+    for n, start in enumerate(force):
+        out.append(y)
+        end = force[min(n + 1, force.size - 1)]
+        for s in range(substeps):
+            f = start + (end - start) * (s + 0.5) / substeps
+            middle_v = v + 0.5 * h * acceleration(y, v, f)
+            y, v = y + h * middle_v, v + h * acceleration(y + 0.5 * h * v, middle_v, f)
+    return np.array(out)
+
+
+def test_parts_of_the_free_laws_that_are_no_candidates_prevent_a_wrong_name():
+    """Cubic damping is not in LAWS: with the laws of LAWS alone as free laws it was called quadratic drag."""
+    rng, records = np.random.default_rng(7), []
+    for k, level in enumerate(LEVELS["forced"]):
+        force = level * np.convolve(rng.normal(size=1200), np.ones(10) / np.sqrt(10.0), "same")
+        y = response_with_cubic_damping(force, 0.5)
+        records.append((f"record {k}", f"level {level:g}", force, y + 0.002 * np.std(y) * rng.normal(size=y.size)))
+    found = diagnose(Mount(records[:3], records[3:], *PRIORS, (90.0, 30.0)))
+    assert found.verdict.answer == "unknown" and "free_law_predicts_better" in found.verdict.trail

@@ -41,7 +41,10 @@ class IdentifySettings:
     order_maximum: int = setting(16, "", "16 states leave room for drift and eight modes", minimum=4, maximum=60)
     drift_maximum: int = setting(3, "", "highest degree of a polynomial drift of the zero; -1 for none", minimum=-1)
     hum_sources: tuple[float, ...] = setting(
-        (50.0, 16.7), "Hz", "mains and railway traction current; hum at five harmonics of each is modelled where seen"
+        (50.0, 16.7),
+        "Hz",
+        "mains and railway traction current; hum at five harmonics of each is modelled where seen",
+        minimum=1.0,
     )
     noise_order_maximum: int = setting(6, "", "highest order of the autoregressive noise; 0 for white", minimum=0)
     damping_maximum: float = setting(
