@@ -52,7 +52,10 @@ def position_fault(label: str, x: float, track: TurnoutTrack) -> str:
 
 
 def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
-    """Faults of track files, each once: unreadable, entries without effect, positions off the track or its layout.
+    """Faults of track files and of positions, each once.
+
+    Files that cannot be read, entries without effect, positions off the track or its layout; panels that are not in
+    their order from the switch toe on, and sensors far from their section, also without a track file.
 
     Parameters
     ----------
@@ -82,8 +85,11 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
         stems = (row.id, row.values["layout"])
         files = (configuration.folder / "tracks" / f"{stem}.yaml" for stem in stems)
         file = next((file for file in files if file in tracks), None)
-        if file is not None:
-            faults |= {f"not on the track: {error}": None for error in _position_errors(tree, tracks[file], file)}
+        off_track = [] if file is None else [*_position_errors(tree, tracks[file], file)]
+        faults |= {f"not on the track: {error}": None for error in off_track}
+        if not off_track:  # one wrong position is one fault
+            faults |= {f"panels out of order: {error}": None for error in _panel_errors(tree["sections"])}
+            faults |= {f"far from its section: {error}": None for error in _offset_errors(tree)}
     yield from faults
 
 
@@ -116,10 +122,9 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
 
 
 def faults_of_sections(configuration: Configuration) -> Iterator[str]:
-    """Positions of sections and of their sensors that no turnout has, each once.
+    """Pairs of sections at one position of one track, or farther apart than a turnout is long, each pair once.
 
-    Two sections are at one position of one track, are farther apart than a turnout is long, or a panel lies before the
-    one that it follows from the switch toe on. A sensor is far from its section.
+    The first is often the copy of a line that was not changed, the second a slipped decimal point.
 
     Parameters
     ----------
@@ -148,8 +153,6 @@ def faults_of_sections(configuration: Configuration) -> Iterator[str]:
             problem = f"sections {first} and {last} are {length:g} m apart"
             remedy = f"No turnout is longer than {MAX_TURNOUT_LENGTH:g} m: correct a position"
             faults[f"sections too far apart: {positions[last].place.error(problem, remedy)}"] = None
-        faults |= {f"panels out of order: {error}": None for error in _panel_errors(variant.tree["sections"])}
-        faults |= {f"far from its section: {error}": None for error in _offset_errors(variant.tree)}
     yield from faults
 
 

@@ -94,8 +94,9 @@ def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:
 def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
     """Errors of two numbers that do not go together: mass and inertia, and the ends of the track."""
     mass, inertia = (_number_at(parameters, key, unit) for key, unit in (("mass", "kg"), ("inertia", "kg m²")))
+    lightest, heaviest = RANGES["mass", "kg"]
     low, high = GYRATION_RADII
-    if mass > 0.0 and inertia > 0.0 and not low <= (radius := sqrt(inertia / mass)) <= high:
+    if lightest <= mass <= heaviest and inertia > 0.0 and not low <= (radius := sqrt(inertia / mass)) <= high:
         problem = (
             f"{inertia:g} kg m² of {mass:g} kg are a radius of gyration of {radius:.3g} m, outside {low} to {high} m"
         )
