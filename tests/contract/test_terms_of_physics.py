@@ -104,7 +104,8 @@ class TestTerm:
 
     def test_the_message_of_the_effect_is_complete(self, term):
         example, size = term.example(), term.parameters[0]
-        words = {name: "?" for name in ("place", "channel", "train", "wheel")}
+        words = {f.name: "?" for f in dataclasses.fields(term)}
+        words |= {name: "?" for name in ("place", "channel", "train", "wheel")}
         words |= {p.name: f"{getattr(example, p.name):.3g} {p.unit}" for p in term.parameters}
         words |= {f"{p.name}_size": words[p.name] for p in term.parameters}
         for text in filter(None, (term.message, term.message_negative, term.message_unbounded)):

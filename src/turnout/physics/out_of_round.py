@@ -39,7 +39,7 @@ class OutOfRound(PhysicsTerm):
 
     name = "out_of_round"
     left_out = "wheel {number} of {who} has {order} waves around it with an amplitude of {amplitude:.2e} m"
-    message = "A wheel on {wheel} is out of round"
+    message = "A wheel on {wheel} is out of round: {order} waves around it with an amplitude of {cosine_size}"
     site_check = "Measure the run-out of this wheelset; no work on the track"
     effect_type = "path"
     frame = "wheel"

@@ -220,7 +220,8 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     train, axle = _train_and_axle(finding) if finding["train"] else of_term
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
-    words = {name: _estimate(term, name)[0] for name in term["parameters"]}
+    words = {name: str(value) for name, value in fixed.items()}
+    words |= {name: _estimate(term, name)[0] for name in term["parameters"]}
     words |= {f"{name}_size": _estimate(term, name, of_size=True)[0] for name in term["parameters"]}
     words |= {
         "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",

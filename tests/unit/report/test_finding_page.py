@@ -360,6 +360,17 @@ def test_the_sentence_of_a_second_effect_on_a_wheel_states_its_axle():
     assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text
 
 
+def test_the_sentence_of_a_wheel_out_of_round_states_its_waves_and_their_amplitude():
+    """0.032 ± 0.006 mm: the interval is 0.032 ± 1.96 * 0.006 = 0.020 to 0.044 mm, of either sign of the cosine."""
+    for sign in (1.0, -1.0):
+        cosine = {"cosine": {"value": sign * 3.2e-5, "se": 6e-6, "unit": "m"}}
+        wheel = {"term": "out_of_round", "fixed": {"wheel": 0, "train": "loaded", "order": 5}, "parameters": cosine}
+        assert headline(finding(term="out_of_round", term_json=json.dumps([wheel]))) == (
+            "A wheel on axle 1 of loaded is out of round: 5 waves around it with an amplitude of 0.032 mm "
+            "(95 % interval: 0.020 to 0.044 mm)."
+        )
+
+
 def test_the_size_follows_in_parentheses_if_the_sentence_of_an_effect_does_not_contain_it():
     """0.3 ± 0.05: the interval is 0.3 ± 1.96 * 0.05 = 0.20 to 0.40."""
     hardening = {"hardening": {"value": 0.3, "se": 0.05, "unit": "-"}}
