@@ -21,6 +21,7 @@ from turnout.physics.hum import Hum
 from turnout.physics.lifting_sleepers import LiftingSleepers
 from turnout.physics.local_ballast import LocalBallast
 from turnout.physics.local_pad import LocalPad
+from turnout.physics.loose_fastening import LooseFastening
 from turnout.physics.low_pass import LowPass
 from turnout.physics.mount_resonance import MountResonance
 from turnout.physics.out_of_round import OutOfRound
@@ -50,6 +51,7 @@ TERMS: tuple[type[PhysicsTerm], ...] = (
     LocalBallast,
     LocalPad,
     HangingSleeper,
+    LooseFastening,
     AttachedResonator,
     DryFriction,
     BallastHardening,

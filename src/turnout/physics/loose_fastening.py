@@ -1,0 +1,86 @@
+"""Fastenings that do not hold the rail down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from turnout.physics.hypothesis import Hypothesis, SupportMotion, SupportSite
+from turnout.physics.requirement import IMPACTS, PASSAGES
+from turnout.physics.term import Parameter, PhysicsTerm
+from turnout.simulate.force_laws import Port, TableLaw
+
+if TYPE_CHECKING:
+    from turnout.simulate.links import Link
+    from turnout.simulate.track import Track
+
+ONSET = 1e-6  # m, deflection over which the damping of the pad is lost
+STARTS = ((0.6,),)  # share that is lost
+HALF_LENGTHS = (0, 1)  # sleepers to either side whose fastenings are loose alike
+
+
+@dataclass(frozen=True)
+class LooseFastening(PhysicsTerm):
+    r"""Remove a share of the pad's reaction while the rail lifts off its seat.
+
+    .. math:: F = -s \left( k_p \min(d, 0) + c_p \dot d \, [d < 0] \right)
+
+    d is the compression of the pad, from the unloaded state. A pad that is pressed has its stiffness. One that is
+    pulled has only what the clips give: none without clips (s = 1). A hammer impact moves the rail up and down alike,
+    so in a hammer test the pad has the mean of both stiffnesses. Wheels press it.
+    """
+
+    first: int
+    last: int
+    lost: float
+
+    name = "loose_fastening"
+    left_out = "fastenings of sleepers {first} to {last} have lost {lost:.2f} of their stiffness in uplift"
+    message = "The fastenings at {place} have lost {lost} of their stiffness where the rail lifts"
+    site_check = "Look for loose, broken or missing clips on these sleepers"
+    separating_test = "hammer tests at this sleeper, and passages of a light train"
+    effect_type = "port"
+    frame = "place"
+    requirements = (PASSAGES, IMPACTS)
+    site_types = (SupportSite,)
+    column_type = "support"
+    smallest_reportable = 0.3
+    component = "pad"
+    prescreen_group = "pad"
+    parameters = (
+        Parameter("lost", "-", 0.0, (0.0, 1.0), "share of the stiffness that is lost in uplift",
+                  "Shaw and Holmes 1983, A periodically forced piecewise linear oscillator"),
+    )  # fmt: skip
+
+    @classmethod
+    def example(cls) -> Self:
+        """Three fastenings with a fifth of their stiffness in uplift."""
+        return cls(19, 21, 0.8)
+
+    @classmethod
+    def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
+        """One fastening, or three; only trains distinguish them from softer pads."""
+        for half in HALF_LENGTHS if site.has_passages else ():
+            first, last = site.support - half, site.support + half
+            if site.first <= first and last <= site.last:
+                where = {**site.where, "sleepers": 2 * half + 1}
+                yield Hypothesis(STARTS, {"first": first, "last": last}, where, len(HALF_LENGTHS) * site.n_sites)
+
+    def ports(self, track: Track) -> Sequence[Port]:
+        """One port between rail and sleeper at each fastening."""
+        self.check()
+        if self.lost == 0.0 or track.layers == 1:
+            return ()
+        return tuple(self._port(track.pad_link(j), j) for j in self.supports)
+
+    def _port(self, pad: Link, j: int) -> Port:
+        k, c = self.lost * pad.stiffness, self.lost * pad.damping
+        law = TableLaw((-ONSET, 0.0, ONSET), (k * ONSET, 0.0, 0.0), (-c, -0.5 * c, 0.0))
+        return Port(pad.ends, law, label=f"uplift at support {j}")
+
+    def pseudo_force(self, motion: SupportMotion) -> tuple[str, np.ndarray]:
+        """The pull of the pad that is missing."""
+        return "pad", self.lost * motion.pad_stiffness * np.minimum(motion.rail - motion.sleeper, 0.0)
