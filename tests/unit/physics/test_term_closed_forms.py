@@ -5,8 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from turnout import physics
+from turnout.mismatch.turnout.receptance_model import tangent_links
 from turnout.physics.hypothesis import ContactSite, SupportMotion
 from turnout.simulate import car, uniform_track
 from turnout.simulate.frequency_response import receptance, responses
@@ -271,6 +273,39 @@ def test_hardening_doubles_the_tangent_at_the_deflection_of_duffings_law():
     (port,) = physics.BallastHardening(20, 20, 1.0).ports(TRACK)
     slope = (port.law.force(1.005e-3) - port.law.force(0.995e-3)) / 1e-5
     assert slope / 90e6 == pytest.approx(3.0, rel=0.03)  # pieces of 50 µm
+
+
+def test_a_mass_on_a_loose_fastening_has_the_period_of_a_piecewise_linear_oscillator():
+    """Half a period of each stiffness, pi sqrt(m / k). A quarter of the stiffness in uplift: 1.5 times the period."""
+    (port,) = physics.LooseFastening(20, 20, 0.75).ports(TRACK)
+    stiffness, mass = 300e6, 60.0
+
+    def motion(_, state):
+        return state[1], -(stiffness * state[0] + float(port.law.force(state[0], 0.0))) / mass
+
+    def rises_through_zero(_, state):
+        return state[0]
+
+    rises_through_zero.direction = 1.0
+    path = solve_ivp(motion, (0.0, 0.02), (0.0, 0.1), events=rises_through_zero, rtol=1e-9, atol=1e-12)
+    periods = np.diff([t for t in path.t_events[0] if t > 1e-6])
+    assert periods.size >= 3
+    assert np.allclose(periods, 1.5 * 2.0 * np.pi * (mass / stiffness) ** 0.5, rtol=1e-4, atol=0.0)
+
+
+def test_a_loose_fastening_pulls_with_what_its_clips_give_and_presses_like_any_pad():
+    """Three fastenings without clips cancel spring and damper of the pad where the rail lifts, and nothing else."""
+    ports = physics.LooseFastening(19, 21, 1.0).ports(TRACK)
+    assert [port.ends for port in ports] == [TRACK.pad_link(j).ends for j in (19, 20, 21)]
+    for port in ports:
+        assert float(port.law.force(-2e-4, -0.3)) == pytest.approx(300e6 * 2e-4 + 30e3 * 0.3)
+        assert float(port.law.force(2e-4, 0.3)) == 0.0
+
+
+def test_pads_under_loose_fastenings_have_the_mean_of_both_stiffnesses_in_a_hammer_test():
+    """The describing function of a piecewise linear spring: 1 - 0.8 / 2 of the stiffness, and of the damper."""
+    (link,) = tangent_links((physics.LooseFastening(20, 20, 0.8),), TRACK)
+    assert link.stiffness == pytest.approx(-0.4 * 300e6) and link.damping == pytest.approx(-0.4 * 30e3)
 
 
 def test_friction_dissipates_the_energy_of_its_describing_function():
