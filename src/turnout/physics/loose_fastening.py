@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from turnout.simulate.links import Link
     from turnout.simulate.track import Track
 
+SOURCE = "Shaw and Holmes 1983, A periodically forced piecewise linear oscillator"
 ONSET = 1e-6  # m, deflection over which the damping of the pad is lost
-STARTS = ((0.6,),)  # share that is lost
+STARTS = ((0.6, 0.0), (0.6, 1.0))  # shares that are lost, of the spring and of the damper
 HALF_LENGTHS = (0, 1)  # sleepers to either side whose fastenings are loose alike
 
 
@@ -26,16 +27,17 @@ HALF_LENGTHS = (0, 1)  # sleepers to either side whose fastenings are loose alik
 class LooseFastening(PhysicsTerm):
     r"""Remove a share of the pad's reaction while the rail lifts off its seat.
 
-    .. math:: F = -s \left( k_p \min(d, 0) + c_p \dot d \, [d < 0] \right)
+    .. math:: F = -\left( s k_p \min(d, 0) + r c_p \dot d \, [d < 0] \right)
 
     d is the compression of the pad, from the unloaded state. A pad that is pressed has its stiffness. One that is
-    pulled has only what the clips give: none without clips (s = 1). A hammer impact moves the rail up and down alike,
-    so in a hammer test the pad has the mean of both stiffnesses. Wheels press it.
+    pulled has what the clips give: none without clips (s = 1). Its damper may lose another share r. A hammer impact
+    moves the rail up and down, so a hammer test shows the mean of both, and the rail is thrown up. Wheels press it.
     """
 
     first: int
     last: int
     lost: float
+    damper: float = 0.0
 
     name = "loose_fastening"
     left_out = "fastenings of sleepers {first} to {last} have lost {lost:.2f} of their stiffness in uplift"
@@ -49,16 +51,15 @@ class LooseFastening(PhysicsTerm):
     column_type = "support"
     smallest_reportable = 0.3
     component = "pad"
-    prescreen_group = "pad"
     parameters = (
-        Parameter("lost", "-", 0.0, (0.0, 1.0), "share of the stiffness that is lost in uplift",
-                  "Shaw and Holmes 1983, A periodically forced piecewise linear oscillator"),
-    )  # fmt: skip
+        Parameter("lost", "-", 0.0, (0.0, 1.0), "share of the stiffness that is lost in uplift", SOURCE),
+        Parameter("damper", "-", 0.0, (0.0, 1.0), "share of the damping that is lost in uplift", SOURCE),
+    )
 
     @classmethod
     def example(cls) -> Self:
-        """Three fastenings with a fifth of their stiffness in uplift."""
-        return cls(19, 21, 0.8)
+        """Three fastenings with a fifth of their stiffness and half of their damping in uplift."""
+        return cls(19, 21, 0.8, 0.5)
 
     @classmethod
     def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
@@ -72,12 +73,12 @@ class LooseFastening(PhysicsTerm):
     def ports(self, track: Track) -> Sequence[Port]:
         """One port between rail and sleeper at each fastening."""
         self.check()
-        if self.lost == 0.0 or track.layers == 1:
+        if self.lost == self.damper == 0.0 or track.layers == 1:
             return ()
         return tuple(self._port(track.pad_link(j), j) for j in self.supports)
 
     def _port(self, pad: Link, j: int) -> Port:
-        k, c = self.lost * pad.stiffness, self.lost * pad.damping
+        k, c = self.lost * pad.stiffness, self.damper * pad.damping
         law = TableLaw((-ONSET, 0.0, ONSET), (k * ONSET, 0.0, 0.0), (-c, -0.5 * c, 0.0))
         return Port(pad.ends, law, label=f"uplift at support {j}")
 

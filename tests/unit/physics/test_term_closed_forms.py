@@ -295,7 +295,7 @@ def test_a_mass_on_a_loose_fastening_has_the_period_of_a_piecewise_linear_oscill
 
 def test_a_loose_fastening_pulls_with_what_its_clips_give_and_presses_like_any_pad():
     """Three fastenings without clips cancel spring and damper of the pad where the rail lifts, and nothing else."""
-    ports = physics.LooseFastening(19, 21, 1.0).ports(TRACK)
+    ports = physics.LooseFastening(19, 21, 1.0, 1.0).ports(TRACK)
     assert [port.ends for port in ports] == [TRACK.pad_link(j).ends for j in (19, 20, 21)]
     for port in ports:
         assert float(port.law.force(-2e-4, -0.3)) == pytest.approx(300e6 * 2e-4 + 30e3 * 0.3)
@@ -303,9 +303,9 @@ def test_a_loose_fastening_pulls_with_what_its_clips_give_and_presses_like_any_p
 
 
 def test_pads_under_loose_fastenings_have_the_mean_of_both_stiffnesses_in_a_hammer_test():
-    """The describing function of a piecewise linear spring: 1 - 0.8 / 2 of the stiffness, and of the damper."""
-    (link,) = tangent_links((physics.LooseFastening(20, 20, 0.8),), TRACK)
-    assert link.stiffness == pytest.approx(-0.4 * 300e6) and link.damping == pytest.approx(-0.4 * 30e3)
+    """The describing function of a piecewise linear spring: 1 - 0.8 / 2 of the spring, 1 - 0.5 / 2 of the damper."""
+    (link,) = tangent_links((physics.LooseFastening(20, 20, 0.8, 0.5),), TRACK)
+    assert link.stiffness == pytest.approx(-0.4 * 300e6) and link.damping == pytest.approx(-0.25 * 30e3)
 
 
 def test_friction_dissipates_the_energy_of_its_describing_function():

@@ -141,6 +141,8 @@ class ReceptancePriors:
         0.5, "share of the change", "by chairs that open, rms of 167 receptances of twelve panels",
         SWITCH_PANELS)
     tangent_motion: float = prior(1e-6, "m", "under an impact, for the secant of a port", FRICTION)
+    bilinear_share: float = prior(
+        1e-3, "-", "least difference of the stiffness under pressure and pull, over their sum", "numerical")
     free_rate: float = prior(
         0.021, "m/s", "sliding rate of a free joint under an impact: friction of 0.3 kN fits best with 20 mm/s",
         FRICTION)

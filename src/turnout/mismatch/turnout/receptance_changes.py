@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.bilinear_supports import bilinear_terms
 from turnout.physics.term import PhysicsTerm
 from turnout.simulate.matrices import link_vector
 
@@ -103,11 +104,13 @@ def changed_links(model: ReceptanceModel, terms: Sequence[PhysicsTerm]) -> tuple
     ends : (n_link, n) sparse array
         Weights of the degrees of freedom at the ends of each link.
     impedance : (n_link, n_line) array of complex
-        Their change. [N/m] The whole is None where more than values differ: another rail, or a link that the model
-        has not.
+        Their change. [N/m] The whole is None where more than values differ: another rail, a link that the model
+        has not, or a support that presses and pulls differently.
     """
     pairs = list(zip(model.terms, terms))
     if any(type(a) is not type(b) or (a != b and type(b).rail is not PhysicsTerm.rail) for a, b in pairs):
+        return None
+    if bilinear_terms((*model.terms, *terms), model.track):
         return None
     old, new = model.links(model.terms), model.links(terms)
     if [k.ends for k in old] != [k.ends for k in new] or any(k.loss_factor for k in (*old, *new)):

@@ -87,13 +87,17 @@ def _file_shear_share(track: Track, terms: Sequence[PhysicsTerm]) -> float:
 
 
 class ReceptanceModel:
-    """Receptances of one track with terms at given conditions on ``LINES``."""
+    """Receptances of one track with terms at given conditions on ``LINES``.
+
+    ``bilinear_changes`` are those of ``bilinear_supports``, by position of the impact and seat of the sensor.
+    """
 
     def __init__(self, track: Track, terms: Sequence[PhysicsTerm]):
         self.track, self.terms = track, terms
         self.matrices = linear_matrices(track, terms)
         self.file_shear_share = _file_shear_share(track, terms)
         self.by_position: dict[float | tuple, np.ndarray] = {}
+        self.bilinear_changes: dict[tuple[float, tuple], np.ndarray] = {}
         self.weight: dict[float | tuple, tuple[np.ndarray, np.ndarray]] = {}
 
     def solve(self, positions: Iterable[float | tuple]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import receptance_observation
+from turnout.mismatch.turnout.bilinear_supports import bilinear_changes, bilinear_terms
 from turnout.mismatch.turnout.lifting_chairs import LiftingChairs
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.predictions import Terms, Values
@@ -219,6 +220,11 @@ class ReceptancePredictor(SiteModel):
         sensitivity = samples.sensitivity
         deviation = [values[k] - at for k, at in rail_on_grid(values, self.rail).items()]
         h = samples.at(sensitivity.receptances + sensitivity.rail_gradients @ deviation)
+        model = sensitivity.model
+        if bilinear_terms(model.terms, model.track):
+            probes = [self.seat(pair.sensor, values, terms).probe(model.track) for pair in samples.pairs]
+            changes = bilinear_changes(model, samples.pairs, probes)
+            h = h + np.concatenate([change[pair.lines] for pair, change in zip(samples.pairs, changes)])
         if self.lifting is not None:
             h = h + np.concatenate([self.lifting.change(pair, terms)[pair.lines] for pair in samples.pairs])
         return samples.to_observations(
