@@ -61,6 +61,7 @@ SECOND_EFFECTS = {
     "passage_gain": (physics.PassageGain("S3", 1.3), {"sensor": "S3"}),
     "hammer_delay": (physics.HammerDelay("S4", 1.5e-3), {"sensor": "S4"}),
     "hammer_gain": (physics.HammerGain("S3", 1.3), {"sensor": "S3"}),
+    "loose_fastening": (physics.LooseFastening(38, 40, 0.8), {"place": 23.4}),
 }
 DEVELOPMENT = [(f"control {k}", None, {}) for k in range(12)]
 DEVELOPMENT += [(name, *entry) for more in (EFFECTS, SECOND_EFFECTS) for name, entry in more.items()]

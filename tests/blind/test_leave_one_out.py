@@ -34,7 +34,7 @@ def test_relatives_are_mutual_and_are_effects_of_one_component_or_part():
     assert relatives["hanging_sleeper"] == {"local_ballast", "ballast_hardening"}
     assert relatives["wheel_flat"] == {"out_of_round"}
     assert relatives["sensor_gain"] == {"passage_gain", "hammer_gain"}
-    assert not relatives["local_pad"]
+    assert relatives["local_pad"] == {"loose_fastening"}
 
 
 def test_each_question_has_sites_of_every_effect_that_can_be_its_answer(monkeypatch):

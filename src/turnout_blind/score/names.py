@@ -30,7 +30,7 @@ RIGHT_NAMES = {
     "clipping": ("clipping",),
     "local_resonator": ("attached_resonator",),
     "guard_rail_rattle": (),
-    "bilinear_clip": (),
+    "bilinear_clip": ("loose_fastening",),
     "drifting_support": (),
     "neighbouring_train": (),
     "one_temperature": ("pad_temperature",),
