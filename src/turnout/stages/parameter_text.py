@@ -98,7 +98,7 @@ def estimate_in_words(value: float, low: float, high: float, unit: str) -> tuple
 
 
 def interval(term: str, name: str, value: float, se: float) -> tuple[float, float]:
-    """95 % interval of a term's parameter; not below 0 if the parameter cannot be negative.
+    """95 % interval of a term's parameter; not below 0 if it cannot be negative, a share of 1 not above 1.
 
     Parameters
     ----------
@@ -120,10 +120,16 @@ def interval(term: str, name: str, value: float, se: float) -> tuple[float, floa
     --------
     >>> [round(interval(*what, 0.1, 0.1)[0], 3) for what in (("hanging_sleeper", "seated"), ("kink", "depth"))]
     [0.0, -0.096]
+    >>> [round(interval(*what, 0.9, 0.1)[1], 3) for what in (("loose_fastening", "lost"), ("local_pad", "factor"))]
+    [1.0, 1.096]
     """
     parameters = _parameters_of(term)
     lower_limit = 0.0 if any(p.name == name and p.bounds[0] >= 0.0 for p in parameters) else -np.inf
-    return float(max(value - Z95_EXACT * se, min(lower_limit, value))), float(value + Z95_EXACT * se)
+    upper_limit = 1.0 if unit_in_words(term, name, "-") == SHARE else np.inf
+    return (
+        float(max(value - Z95_EXACT * se, min(lower_limit, value))),
+        float(min(value + Z95_EXACT * se, max(upper_limit, value))),
+    )
 
 
 def parameter_in_words(term: str, name: str) -> str:

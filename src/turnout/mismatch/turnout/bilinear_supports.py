@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.mismatch.turnout.lifting_chairs import receptance_change, typical_impact
+from turnout.mismatch.turnout.lifting_chairs import receptance_change
 from turnout.mismatch.turnout.matrix_cache import FixedLinks, matrices_of
 from turnout.mismatch.turnout.priors import RECEPTANCE, SIMULATION
 from turnout.mismatch.turnout.receptance_model import linear_matrices, tangent_links
@@ -90,7 +90,7 @@ def bilinear_changes(model: ReceptanceModel, pairs: Sequence[FrfPair], probes: S
         both, mean = _with_both_stiffnesses(model), _with_their_mean(model)
     for position, by_seat in by_position.items():
         (first, _), *_ = by_seat.values()
-        change = receptance_change(both, mean, typical_impact(first), position, [p for _, p in by_seat.values()])
+        change = receptance_change(both, mean, first.typical_impact, position, [p for _, p in by_seat.values()])
         model.bilinear_changes |= {(position, seat): c for seat, c in zip(by_seat, change)}
     return [model.bilinear_changes[pair.test.place, pair.seat] for pair in pairs]
 

@@ -152,26 +152,10 @@ def lifting_chairs(track: Track, pairs: Iterable[FrfPair]) -> LiftingChairs | No
     for pair in pairs:
         by_test.setdefault(pair.test.name, []).append(pair)
     tests = [
-        ChairTest(typical_impact(group[0]), group[0].test.place, {p.name: p.sensor.probe(track) for p in group})
+        ChairTest(group[0].typical_impact, group[0].test.place, {p.name: p.sensor.probe(track) for p in group})
         for group in by_test.values()
     ]
     return LiftingChairs(track, tuple(tests))
-
-
-def typical_impact(pair: FrfPair) -> Impact:
-    """The accepted impact of a channel with the median peak force.
-
-    Parameters
-    ----------
-    pair : FrfPair
-        Response channel of a hammer test.
-
-    Returns
-    -------
-    Impact
-    """
-    accepted = sorted(pair.test.accepted_impacts(pair.channel), key=lambda i: i.peak)
-    return accepted[len(accepted) // 2]
 
 
 def receptance_change(

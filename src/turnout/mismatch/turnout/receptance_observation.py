@@ -54,6 +54,12 @@ class FrfPair:
         """(n,) index of its lines in ``LINES``."""
         return np.searchsorted(LINES, self.frequency)
 
+    @cached_property
+    def typical_impact(self) -> Impact:
+        """Accepted impact with the median peak force."""
+        accepted = sorted(self.test.accepted_impacts(self.channel), key=lambda i: i.peak)
+        return accepted[len(accepted) // 2]
+
 
 def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float) -> list[tuple[FrfPair, Observation]]:
     """Every response channel of a test with its observation; channels without accepted impacts are left out.
