@@ -87,10 +87,12 @@ def bilinear_changes(model: ReceptanceModel, pairs: Sequence[FrfPair], probes: S
         if (pair.test.place, pair.seat) not in model.bilinear_changes:
             by_position.setdefault(pair.test.place, {})[pair.seat] = pair, probe
     if by_position:
-        both, mean = _with_both_stiffnesses(model), _with_their_mean(model)
+        bilinear_track, linear_track = _with_both_stiffnesses(model), _with_their_mean(model)
     for position, by_seat in by_position.items():
         (first, _), *_ = by_seat.values()
-        change = receptance_change(both, mean, first.typical_impact, position, [p for _, p in by_seat.values()])
+        change = receptance_change(
+            bilinear_track, linear_track, first.typical_impact, position, [p for _, p in by_seat.values()]
+        )
         model.bilinear_changes |= {(position, seat): c for seat, c in zip(by_seat, change)}
     return [model.bilinear_changes[pair.test.place, pair.seat] for pair in pairs]
 
@@ -98,15 +100,15 @@ def bilinear_changes(model: ReceptanceModel, pairs: Sequence[FrfPair], probes: S
 def _with_both_stiffnesses(model: ReceptanceModel) -> Prepared:
     """The track of a model whose bilinear supports press and pull as they do; other ports are linear."""
     bilinear = bilinear_terms(model.terms, model.track)
-    others = tangent_links([term for term in model.terms if term not in bilinear], model.track)
-    return _prepared(model.track, bilinear, matrices_of(model.track, (*model.terms, FixedLinks(others))))
+    linear_ports = tangent_links([term for term in model.terms if term not in bilinear], model.track)
+    return _prepare_impact(model.track, bilinear, matrices_of(model.track, (*model.terms, FixedLinks(linear_ports))))
 
 
 def _with_their_mean(model: ReceptanceModel) -> Prepared:
     """The linear track of a model."""
-    return _prepared(model.track, (), linear_matrices(model.track, model.terms))
+    return _prepare_impact(model.track, (), linear_matrices(model.track, model.terms))
 
 
-def _prepared(track: Track, terms: tuple[PhysicsTerm, ...], matrices: TrackMatrices) -> Prepared:
+def _prepare_impact(track: Track, terms: tuple[PhysicsTerm, ...], matrices: TrackMatrices) -> Prepared:
     prepared = prepare(track, 1.0 / RECEPTANCE.lifting_rate, "radau", terms, SIMULATION.decay_exponent, matrices)
     return replace(prepared, track=track.with_(blade=None), terms=terms)  # slide chairs are linear here
