@@ -113,6 +113,29 @@ def test_a_leader_also_moves_to_the_next_length(monkeypatch):
     assert moved.candidate.where == {"place": 4.2, "sleepers": 5}
 
 
+def test_a_stretch_also_grows_at_one_end(monkeypatch):
+    """Supports from 3.0 to 5.4 m have changed, a leader has the last three. Another middle or length alone is worse.
+
+    The supports behind weigh five times as much, those at 3.0 and 3.6 m less than the others.
+    """
+    case = Dented(4.2)
+    spacing, weight = 0.6, np.where(X > 5.7, 5.0, np.where(X < 3.9, 0.8, 1.0))
+    case.candidates = tuple(
+        Candidate.of(
+            "bump", SIZE, lambda p, x=x, n=n: p | {"place": x, "n": n}, ((1.0,),), {"place": x, "sleepers": n},
+            n_scanned=27,
+        )
+        for x in POSITIONS for n in (1, 3, 5)
+    )  # fmt: skip
+    monkeypatch.setattr(case, "shape", lambda depth, place, n: depth * weight * (np.abs(X - place) < 0.5 * n * spacing))
+    true = case.shape(DEPTH, 4.2, 5)
+    case.observations = tuple(replace(o, data=true + o.data - Dented(4.2).shape(DEPTH, 4.2)) for o in case.observations)
+    base = fit_jointly(case)
+    (candidate,) = (c for c in case.candidates if c.where == {"place": 4.8, "sleepers": 3})
+    leader = score_of(Search(case), base, fit_jointly(case, (candidate,), [1.0]), candidate)
+    assert at_best_position(Search(case), base, leader).candidate.where == {"place": 4.2, "sleepers": 5}
+
+
 def test_each_position_is_tried_once_even_if_a_fit_to_convergence_has_less_evidence(monkeypatch):
     case, tried = Dented(4.2), []
     base, leader = leader_at(case, 3.0)

@@ -49,8 +49,8 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     """A leader fitted to convergence at the best position that is reached by steps to a better neighbour.
 
     The position was chosen by the hammer tests alone, or by columns of one size. It is a parameter like others, but
-    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. So is the
-    length of a stretch. Each site is tried once.
+    with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. So are the
+    lengths of a stretch, and its two ends. Each site is tried once.
 
     Parameters
     ----------
@@ -96,26 +96,27 @@ def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> S
 
 
 def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
-    """The candidates that differ from this one by the next position before and behind, or by the next length.
+    """The candidates that differ from this one by at most one step of each coordinate; [] if it has no position.
 
-    [] if it has no position.
+    A stretch whose one end moves has another middle and another length.
     """
     if candidate.position is None:
         return []
     alike = [c for c in case.candidates if c.family == candidate.family and c.position is not None]
-    neighbours = []
-    for key in SITE_COORDINATES:
-        at = {c.where[key]: c for c in alike if _is_same_but_for(key, c, candidate)}
-        before = [x for x in at if x < candidate.where[key]]
-        behind = [x for x in at if x > candidate.where[key]]
-        neighbours += [at[x] for x in (*sorted(before)[-1:], *sorted(behind)[:1])]
-    return neighbours
+    alike = [c for c in alike if _differs_in_coordinates(c, candidate)]
+    keys = [key for key in SITE_COORDINATES if key in candidate.where]
+    values = {key: sorted({c.where[key] for c in (candidate, *alike)}) for key in keys}
+
+    def largest_step(other: Candidate) -> int:
+        return max(abs(v.index(other.where[key]) - v.index(candidate.where[key])) for key, v in values.items())
+
+    return [c for c in alike if largest_step(c) == 1]
 
 
-def _is_same_but_for(key: str, first: Candidate, second: Candidate) -> bool:
-    """Whether two candidates of one effect have this coordinate and differ at most in it, and so in the sleeper."""
-    a, b = ({k: v for k, v in c.where.items() if k not in (key, "sleeper")} for c in (first, second))
-    return a == b and key in first.where and key in second.where
+def _differs_in_coordinates(first: Candidate, second: Candidate) -> bool:
+    """Whether two candidates of one effect have the same coordinates, and differ in these alone or in the sleeper."""
+    a, b = ({k: v for k, v in c.where.items() if k not in (*SITE_COORDINATES, "sleeper")} for c in (first, second))
+    return a == b and all((key in first.where) == (key in second.where) for key in SITE_COORDINATES)
 
 
 def start_from_priors(search: Search, fit: Fit, task: RefitTask) -> Score | None:
