@@ -105,10 +105,10 @@ def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
     alike = [c for c in case.candidates if c.family == candidate.family and c.position is not None]
     alike = [c for c in alike if _differs_in_coordinates(c, candidate)]
     keys = [key for key in SITE_COORDINATES if key in candidate.where]
-    values = {key: sorted({c.where[key] for c in (candidate, *alike)}) for key in keys}
+    coordinates = {key: sorted({c.where[key] for c in (candidate, *alike)}) for key in keys}
 
-    def largest_step(other: Candidate) -> int:
-        return max(abs(v.index(other.where[key]) - v.index(candidate.where[key])) for key, v in values.items())
+    def largest_step(neighbour: Candidate) -> int:
+        return max(abs(v.index(neighbour.where[key]) - v.index(candidate.where[key])) for key, v in coordinates.items())
 
     return [c for c in alike if largest_step(c) == 1]
 
