@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.mismatch.blade_turnout import with_blade
 
 from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout.bilinear_supports import bilinear_terms
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.receptance_changes import changed_links, predict_near
-from turnout.physics import LocalPad, LooseFastening
+from turnout.physics import LocalPad, LooseFastening, SlideChairGap
 
 POSITION = 23.4  # of the impacts and of the middle of three loose fastenings [m]
 
@@ -64,3 +66,13 @@ def test_a_small_step_of_a_share_is_simulated_and_not_taken_from_links(case, loo
         assert np.allclose(a, b, atol=1e-12, rtol=1e-9)
     (_, samples), *_ = case.predictor.pair_samples(values, (loose,), case.observations)
     assert changed_links(samples.sensitivity.model, (other,)) is None
+
+
+def test_a_chair_without_contact_is_not_bilinear():
+    """It is linear about rest, with and without contact; chairs that open have a correction of their own."""
+    track = with_blade(small_plan((15.0,), passages=False).turnout).track_of("main")
+    chairs = track.blade.slide_chairs(track)
+    for gap in (3e-5, 2e-4, 2e-3):
+        terms = [SlideChairGap(j, gap) for j in chairs]
+        assert any(term.ports(track) for term in terms)
+        assert bilinear_terms(terms, track) == ()

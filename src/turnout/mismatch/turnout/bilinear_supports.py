@@ -54,8 +54,9 @@ def bilinear_terms(terms: Sequence[PhysicsTerm], track: Track) -> tuple[PhysicsT
     d = RECEPTANCE.tangent_motion
 
     def is_bilinear(term: PhysicsTerm) -> bool:
-        forces = [(float(p.law.force(d)), float(p.law.force(-d))) for p in term.ports(track) if p.gap == 0.0]
-        return any(abs(press + pull) > RECEPTANCE.bilinear_share * abs(press - pull) for press, pull in forces)
+        laws = [port.law for port in term.ports(track) if port.gap == 0.0]
+        changes = [(float(law.force(d) - law.force(0.0)), float(law.force(0.0) - law.force(-d))) for law in laws]
+        return any(abs(press - pull) > RECEPTANCE.bilinear_share * abs(press + pull) for press, pull in changes)
 
     return tuple(term for term in terms if is_bilinear(term))
 
