@@ -62,11 +62,7 @@ class BallastHardening(PhysicsTerm):
     @classmethod
     def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
         """Stretches of several lengths about this support; only trains deflect the ballast enough."""
-        for half in HALF_LENGTHS if site.has_passages else ():
-            first, last = site.support - half, site.support + half
-            if site.first <= first and last <= site.last:
-                where = {**site.where, "sleepers": 2 * half + 1}
-                yield Hypothesis(STARTS, {"first": first, "last": last}, where, len(HALF_LENGTHS) * site.n_sites)
+        return site.stretches(STARTS, HALF_LENGTHS)
 
     def ports(self, track: Track) -> Sequence[Port]:
         """One port per sleeper."""

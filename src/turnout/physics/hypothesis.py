@@ -6,7 +6,7 @@ hypotheses: itself at that site, with the parameter values from which a fit star
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,27 @@ class SupportSite:
     def where(self) -> dict[str, object]:
         """The site in the words of a candidate."""
         return {"sleeper": self.support, "place": self.place}
+
+    def stretches(self, starts: tuple[tuple[float, ...], ...], half_lengths: Sequence[int]) -> Iterator[Hypothesis]:
+        """An effect of all supports from ``first`` to ``last`` about this one; only trains show it.
+
+        Parameters
+        ----------
+        starts : tuple of tuple of float
+            Values of its parameters from which fits start.
+        half_lengths : sequence of int
+            Supports to either side.
+
+        Yields
+        ------
+        Hypothesis
+            One for each length inside the zone; none without passages.
+        """
+        for half in half_lengths if self.has_passages else ():
+            first, last = self.support - half, self.support + half
+            if self.first <= first and last <= self.last:
+                where = {**self.where, "sleepers": 2 * half + 1}
+                yield Hypothesis(starts, {"first": first, "last": last}, where, len(half_lengths) * self.n_sites)
 
 
 @dataclass(frozen=True)

@@ -64,11 +64,7 @@ class LooseFastening(PhysicsTerm):
     @classmethod
     def hypotheses(cls, site: SupportSite) -> Iterator[Hypothesis]:
         """One fastening, or three; only trains distinguish them from softer pads."""
-        for half in HALF_LENGTHS if site.has_passages else ():
-            first, last = site.support - half, site.support + half
-            if site.first <= first and last <= site.last:
-                where = {**site.where, "sleepers": 2 * half + 1}
-                yield Hypothesis(STARTS, {"first": first, "last": last}, where, len(HALF_LENGTHS) * site.n_sites)
+        return site.stretches(STARTS, HALF_LENGTHS)
 
     def ports(self, track: Track) -> Sequence[Port]:
         """One port between rail and sleeper at each fastening."""
