@@ -33,8 +33,9 @@ def without_spikes(
     A sample is a spike if both neighbours lie on the same side of it, and its height h over the nearer one is larger
     than 99 % of the magnitudes of its channel. It is also larger than ``NOISE_FACTOR`` standard deviations of the
     quieter half of the channel, and than ``SPIKE_FACTOR`` times the third largest bend b of the 8 samples before it and
-    of the 8 behind it, since an impact is followed by the vibration that it causes. With the mean of the neighbours in
-    its place, these bend by as little: the impact of a wheel moves more samples than one.
+    of the 8 behind it, since an impact is followed by the vibration that it causes. The impact of a wheel moves more
+    samples than one. So the neighbours of a spike bend by as little with their mean in its place, and exceed the
+    vibration, the third largest of these 8 magnitudes about their median, by as little.
 
     .. math:: h_n = \min(|x_n - x_{n-1}|,\ |x_n - x_{n+1}|), \qquad b_n = |x_n - \tfrac12 (x_{n-1} + x_{n+1})|
 
@@ -104,11 +105,31 @@ def spikes_in(samples: np.ndarray) -> np.ndarray:
         loud = loud[heights[loud] > least]
     if not loud.size:
         return none
-    offsets = np.arange(1, SPIKE_REACH + 1)
-    bends = np.pad(bends, SPIKE_REACH, mode="reflect")
-    sides = bends[SPIKE_REACH + loud[:, None, None] + np.stack([-offsets, offsets])]  # (n_loud, 2, SPIKE_REACH)
-    usual = np.partition(sides, -MAX_LARGE_BENDS - 1, axis=-1)[..., -MAX_LARGE_BENDS - 1].max(axis=1)
-    return loud[heights[loud] > SPIKE_FACTOR * np.maximum(usual, _bends_of_neighbours(samples, loud))]
+    sides = np.stack([loud - SPIKE_REACH, loud + 1])
+    limits = (
+        _usual(_windows(bends, sides)),
+        _bends_of_neighbours(samples, loud),
+        _excess_of_neighbours(samples, loud),
+    )
+    return loud[heights[loud] > SPIKE_FACTOR * np.max(limits, axis=0)]
+
+
+def _windows(samples: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """``SPIKE_REACH`` samples from each index on, mirrored at both ends."""
+    padded = np.pad(samples, SPIKE_REACH, mode="reflect")
+    return padded[SPIKE_REACH + first[..., None] + np.arange(SPIKE_REACH)]
+
+
+def _usual(sides: np.ndarray) -> np.ndarray:
+    """The third largest of the samples on each side, and of both sides the larger one."""
+    return np.partition(sides, -MAX_LARGE_BENDS - 1, axis=-1)[..., -MAX_LARGE_BENDS - 1].max(axis=0)
+
+
+def _excess_of_neighbours(samples: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """By how much the larger neighbour of each sample exceeds the vibration before and behind it."""
+    sides = _windows(samples, np.stack([at - SPIKE_REACH, at + 1]))
+    magnitudes = np.abs(sides - np.median(sides, axis=(0, 2), keepdims=True))
+    return np.maximum(magnitudes[0, :, -1], magnitudes[1, :, 0]) - _usual(magnitudes)
 
 
 def _bends_of_neighbours(samples: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -115,3 +115,14 @@ def test_an_impact_of_a_wheel_at_a_recorder_without_filter_is_no_spike(impact):
     assert spikes_in(samples).size == 0
     samples[2000], samples[2002] = 0.0, 0.0
     np.testing.assert_array_equal(spikes_in(samples), [2001])
+
+
+@pytest.mark.parametrize("impact", [(-14.0, -26.0, 64.0, -32.0, -17.0), (9.0, 23.0, -66.0, 28.0, 20.0)])
+def test_the_pulse_of_a_sharp_dip_at_a_recorder_without_filter_is_no_spike(impact):
+    """The trough beside its peak is smooth, but larger than the vibration before and behind it."""
+    samples = np.random.default_rng(6).normal(scale=2.0, size=4000)
+    slow = 100.0 * np.sin(2.0 * np.pi * np.arange(4000) / 1000.0)  # m/s², of the track under a vehicle
+    samples[2000:2005] += impact
+    assert spikes_in(samples).size == 0 and spikes_in(samples + slow).size == 0
+    samples[2000:2005] = 0.0, 0.0, impact[2], 0.0, 0.0
+    np.testing.assert_array_equal(spikes_in(samples), [2002])
