@@ -28,9 +28,9 @@ def sentences_on_values(nuisances: Sequence[Nuisance], fit: Fit) -> list[str]:
     Returns
     -------
     list of str
-        With the factor on the value of the file and its 95 % interval.
+        With the factor on the value of the file and its 95 % interval, which contains the error of the model.
     """
-    errors = {n.name: float(np.sqrt(fit.covariance[k, k])) for k, n in enumerate(nuisances)}
+    errors = {n.name: float(np.hypot(np.sqrt(fit.covariance[k, k]), n.model_sd)) for k, n in enumerate(nuisances)}
     return [_sentence(v, fit.values[v.nuisance.name], errors[v.nuisance.name]) for v in values_off_file(nuisances, fit)]
 
 

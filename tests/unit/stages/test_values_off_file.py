@@ -1,5 +1,6 @@
 """Values of the whole track that a fit puts beyond their tolerance are stated with their ratio to the file."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,12 @@ def test_a_rail_softer_than_its_tolerance_is_stated_with_factor_and_interval():
     assert sentence == (
         "The shear stiffness of the rail is 0.53 times that of the file (0.50 to 0.56): 5.3 times its tolerance."
     )
+
+
+def test_the_interval_contains_the_error_of_the_model():
+    """exp(-0.631 ± 1.96 * hypot(0.03, 0.04)) = 0.482 and 0.587."""
+    (sentence,) = sentences_of((replace(SHEAR, model_sd=0.04), -0.631, 0.03))
+    assert "is 0.53 times that of the file (0.48 to 0.59): 5.3 times its tolerance." in sentence
 
 
 @pytest.mark.parametrize(("value", "stated"), [(0.359, False), (0.361, True), (-0.359, False), (-0.361, True)])

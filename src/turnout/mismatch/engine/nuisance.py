@@ -16,7 +16,8 @@ class Nuisance:
     ``max_step_sd`` is the largest step of a fit in prior standard deviations. ``can_mask``: the base fit may have
     changed it to hide an effect. ``group`` is the property that it describes, for example the stiffness of single
     railpads. ``index`` is the number of its component among those of the group that are alike, else None. ``at`` is
-    what it is fixed to, as (frame, level) of ``ResidualSpace.combinations``; None if that is not known.
+    what it is fixed to, as (frame, level) of ``ResidualSpace.combinations``; None if that is not known. ``model_sd`` is
+    the error that the model itself makes in the value, which no recording reduces, as a standard deviation.
     """
 
     name: str
@@ -31,3 +32,4 @@ class Nuisance:
     group: str = ""
     index: int | None = None
     at: tuple[str, Any] | None = None
+    model_sd: float = 0.0

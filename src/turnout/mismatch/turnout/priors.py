@@ -52,6 +52,12 @@ class TrackPriors:
     rail_shear_sd: float = prior(
         0.12, "ln", "shear stiffness: published coefficients are 0.34 to 0.41; 14 controls of another simulator",
         ERROR_MODES)
+    rail_shear_model_sd: float = prior(
+        0.13, "ln", "error of the model in a fitted shear stiffness: rms of 14 and of 9 sites of another simulator",
+        ERROR_MODES)
+    sleeper_mass_model_sd: float = prior(
+        0.06, "ln", "the same of all sleepers: rms of 9 sites whose pads are wide and whose sleepers are coupled",
+        ERROR_MODES)
     casting_sds: tuple[float, float] = prior(
         (0.10, 0.30), "ln", "stiffness and mass of inner and end pieces: the file has one section for a casting",
         CROSSING_PANELS)

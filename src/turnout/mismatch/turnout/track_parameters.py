@@ -33,6 +33,9 @@ COMMON_PARAMETERS = (
     ("sleeper_mass", "sleeper", "mass", TRACK.common_mass_sd),
 )
 
+# Errors of the model in values of the whole track; those of the others are smaller than their standard errors.
+MODEL_SDS = {"rail_shear": TRACK.rail_shear_model_sd, "sleeper_mass": TRACK.sleeper_mass_model_sd}
+
 
 @dataclass(frozen=True)
 class SupportParameter:
@@ -85,6 +88,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             meaning=f"ln {name}",
             group="track",
             at=WHOLE_TRACK,
+            model_sd=MODEL_SDS.get(name, 0.0),
         )
         for name, _, _, sd in COMMON_PARAMETERS
     ]
@@ -101,7 +105,8 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     for name, sd in rail_sds(zone).items():
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
         at = WHOLE_TRACK if (name, sd) in RAIL_SDS else None  # a casting's value may stand for a cause beside it
-        nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, f"ln {words[name]}", group="rail", at=at))
+        meaning, model_sd = f"ln {words[name]}", MODEL_SDS.get(name, 0.0)
+        nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, meaning, group="rail", at=at, model_sd=model_sd))
     tracks = zone.turnout.track, *zone.turnout.tracks.values()
     nuisances += [*chair_nuisances(tracks), *toe_nuisances(tracks)]
     for train in trains:
