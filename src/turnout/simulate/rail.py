@@ -64,6 +64,38 @@ class Rail:
             return 0.0 * np.asarray(length, dtype=float)
         return 12.0 * self.bending_stiffness / (self.shear_stiffness * np.asarray(length, dtype=float) ** 2)
 
+    def pin_pin_frequency(self, bay: float) -> float:
+        r"""Frequency at which half a wave of the rail fits between two sleepers, its nodes on both.
+
+        The lower root of :math:`m \rho I \omega^4 - (m (S + EI k^2) + \rho I S k^2) \omega^2 + S\,EI k^4 = 0` with
+        :math:`S = \kappa G A,\ k = \pi / L` (Timoshenko 1921, eq. 5); without shear :math:`EI k^4 / (m + \rho I k^2)`.
+
+        Parameters
+        ----------
+        bay : float
+            Distance L of the sleepers. [m]
+
+        Returns
+        -------
+        float
+            Frequency. [Hz]
+
+        Examples
+        --------
+        >>> round(Rail(6.42e6, 60.21, 2.485e8, 0.24).pin_pin_frequency(0.6))
+        1069
+        """
+        wave_number = np.pi / bay
+        bending = self.bending_stiffness * wave_number**2
+        if self.beam == "euler":
+            squared = bending * wave_number**2 / (self.mass + self.rotary_inertia * wave_number**2)
+        else:
+            shear = self.shear_stiffness
+            linear = self.mass * (shear + bending) + self.rotary_inertia * shear * wave_number**2
+            product = self.mass * self.rotary_inertia * shear * bending * wave_number**2
+            squared = 2.0 * shear * bending * wave_number**2 / (linear + np.sqrt(linear**2 - 4.0 * product))
+        return float(np.sqrt(squared) / (2.0 * np.pi))
+
 
 def in_series(rails: Sequence[Rail], shares: Sequence[float] | np.ndarray) -> Rail:
     r"""One profile for an element with several ``rails`` in a row, each over its share of the length.

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from turnout.errors import SimulationError
 from turnout.simulate.rail import (
@@ -72,3 +73,23 @@ def test_shape_functions_agree_with_displacement_and_rotation_of_the_nodes():
 def test_an_impossible_rail_is_rejected_with_its_value(change):
     with pytest.raises(SimulationError, match=str(next(iter(change.values()))).replace(".", r"\.")):
         Rail(**(UIC60 | change))
+
+
+@pytest.mark.parametrize("beam", ["timoshenko", "euler"])
+def test_the_pin_pin_frequency_is_that_of_a_beam_on_two_pins(beam):
+    """Against 40 finite elements; without shear and rotary inertia pi sqrt(EI / m) / 2 L^2."""
+    rail, bay, n = Rail(**UIC60, beam=beam), 0.65, 40
+    stiffness, mass = (np.zeros((2 * n + 2, 2 * n + 2)) for _ in range(2))
+    for e in range(n):
+        stiffness[2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += element_stiffness(rail, bay / n)
+        mass[2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += element_mass(rail, bay / n)
+    free = np.delete(np.arange(2 * n + 2), [0, 2 * n])
+    lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True)[0]
+    expected = np.sqrt(lowest) / (2.0 * np.pi)
+    if beam == "timoshenko":
+        assert rail.pin_pin_frequency(bay) == pytest.approx(expected, rel=1e-3)  # elements have an error of 1 / n^2
+    else:
+        slender = Rail(**{**UIC60, "rotary_inertia": 0.0}, beam=beam)
+        closed = np.pi * np.sqrt(6.42e6 / 60.21) / (2.0 * bay**2)
+        assert slender.pin_pin_frequency(bay) == pytest.approx(closed, rel=1e-12)
+        assert slender.pin_pin_frequency(bay) == pytest.approx(expected, rel=1e-4)

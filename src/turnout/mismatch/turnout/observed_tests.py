@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout import receptance_observation
 from turnout.mismatch.turnout.campaign import CampaignInput, HammerInput
@@ -51,13 +53,14 @@ def observe_tests(
     ObservedTests
     """
     pairs, observations, notes, rejected_channels = {}, [], [], []
+    highest = _highest_frequency(campaign)
     for test in campaign.hammer:
         sensors = [
             s
             for s in (*campaign.sensors, *_loose_sensors(test, campaign.sensors))
             if s.name not in (saturated or {}) and abs(s.place - test.place) <= CASE.max_hammer_distance
         ]
-        pairs_of_test = receptance_observation.pairs_of_test(test, sensors, tolerance)
+        pairs_of_test = receptance_observation.pairs_of_test(test, sensors, tolerance, highest)
         if not pairs_of_test:
             notes.append(
                 f"hammer test {test.name}: no channel within {CASE.max_hammer_distance:g} m with "
@@ -73,6 +76,22 @@ def observe_tests(
         for (c, r), n in Counter(rejected_channels).items()
     ]
     return ObservedTests(pairs, tuple(observations), tuple(notes))
+
+
+def _highest_frequency(campaign: CampaignInput) -> float:
+    """Highest frequency at which receptances are compared, below the pin-pin resonance of the track [Hz].
+
+    There the rail between two sleepers resonates, and hardly anything damps it. Small errors of sleeper positions and
+    of the rail change the receptance by more than any tolerance.
+    """
+    track = campaign.turnout.track
+    positions = [s.place for s in campaign.sensors] + [test.place for test in campaign.hammer]
+    reach = CASE.max_hammer_distance
+    near = track.support[(track.support > min(positions) - reach) & (track.support < max(positions) + reach)]
+    if near.size < 2:
+        return RECEPTANCE.highest_line
+    pin_pin = track.rail.pin_pin_frequency(float(np.median(np.diff(near))))
+    return min(RECEPTANCE.highest_line, RECEPTANCE.pin_pin_share * pin_pin)
 
 
 def _fault_of_channel(test: HammerInput, channel: str) -> str | None:

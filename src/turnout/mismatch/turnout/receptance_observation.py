@@ -61,7 +61,9 @@ class FrfPair:
         return accepted[len(accepted) // 2]
 
 
-def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float) -> list[tuple[FrfPair, Observation]]:
+def pairs_of_test(
+    test: HammerInput, sensors: Sequence[Sensor], tolerance: float, highest: float = RECEPTANCE.highest_line
+) -> list[tuple[FrfPair, Observation]]:
     """Every response channel of a test with its observation; channels without accepted impacts are left out.
 
     The observation is Re and Im of the receptance over its own magnitude, so that all lines have equal weight. Its
@@ -75,6 +77,8 @@ def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float
         The sensors.
     tolerance : float
         Relative error of a receptance by hammer, calibration and mounting. [-]
+    highest : float
+        Highest frequency that is used. [Hz]
 
     Returns
     -------
@@ -90,6 +94,7 @@ def pairs_of_test(test: HammerInput, sensors: Sequence[Sensor], tolerance: float
         usable = (
             np.isfinite(spread)
             & (spread < RECEPTANCE.max_relative_error * np.abs(h))
+            & (LINES <= highest)
             & (LINES < RECEPTANCE.max_band_share * np.median([i.band_edge for i in accepted]))
         )
         if usable.sum() < RECEPTANCE.min_lines:
