@@ -15,8 +15,8 @@ from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.stages.parameter_ranges import improbable_in_files
+from turnout.stages.track_plan import PANEL_ORDER
 
-PANEL_ORDER = ("SP", "CLP", "CP", "AS")  # from the switch toe on; the open track is on both sides
 MAX_OFFSET = 10.0  # m from a section to its sensor: a larger one is in millimetres or counts from elsewhere
 MAX_TURNOUT_LENGTH = 500.0  # m between two sections: no turnout is so long
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error

@@ -10,6 +10,7 @@ from typing import Any
 from turnout.config.parameter_files import read_unchanged_parameters
 from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import ConfigError, TurnoutError
+from turnout.stages.track_plan import plan_errors
 
 # (name, unit) -> smallest and largest value; each range is some ten times wider than what tracks and vehicles have.
 RANGES = {
@@ -27,7 +28,7 @@ RANGES = {
     ("mass", "kg/m"): (10.0, 1000.0),
     ("density", "kg/m³"): (1000.0, 20000.0),
     ("spacing", "m"): (0.2, 2.0),
-    ("radius", "m"): (0.1, 1.0),
+    ("radius", "m"): (0.1, 0.65),  # not wider: a diameter must not pass for a radius
     ("contact", "N/m^1.5"): (1e9, 1e13),
     ("mass", "kg"): (100.0, 300000.0),
     ("wheelset_mass", "kg"): (100.0, 10000.0),
@@ -43,6 +44,10 @@ RANGES = {
 }
 # Radius of gyration of cars and bogies: a wrong prefix of the mass or of the inertia changes it by a factor of 32.
 GYRATION_RADII = (0.3, 12.0)  # m
+# Radius of gyration of the cross-section of rails: 0.04 m of a light rail, 0.09 m of a crossing.
+SECTION_RADII = (0.01, 0.3)  # m
+POISSON_RATIOS = (0.0, 0.5)  # of any elastic material
+MAX_MASS_DEVIATION = 0.1  # of the mass of a rail from density times area; wear takes less
 MAX_TRACK_LENGTH = 5000.0  # m: a longer track is in millimetres
 MAX_PRIOR = 5.0  # relative standard deviation: a larger one is in percent
 
@@ -63,7 +68,8 @@ def improbable_in_files(paths: Iterable[Path]) -> list[str]:
     sentences: dict[str, None] = {}
     for path in dict.fromkeys(paths):
         try:
-            sentences |= {f"improbable: {e}": None for e in improbable_values(read_unchanged_parameters(path))}
+            parameters = read_unchanged_parameters(path)
+            sentences |= {f"improbable: {e}": None for e in (*improbable_values(parameters), *plan_errors(parameters))}
         except (TurnoutError, OSError):
             continue
     return [*sentences]
@@ -92,7 +98,8 @@ def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:
 
 
 def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
-    """Errors of two numbers that do not go together: mass and inertia, and the ends of the track."""
+    """Errors of numbers that do not go together: mass and inertia, the ends of the track, those of a rail."""
+    yield from _errors_of_rail(parameters)
     mass, inertia = (_number_at(parameters, key, unit) for key, unit in (("mass", "kg"), ("inertia", "kg m²")))
     lightest, heaviest = RANGES["mass", "kg"]
     low, high = GYRATION_RADII
@@ -105,6 +112,25 @@ def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
     if last - first > MAX_TRACK_LENGTH:
         problem = f"from {first:g} to {last:g} m are more than {MAX_TRACK_LENGTH:g} m"
         yield parameters.error("from" if -first > last else "to", problem, "Correct the number or its unit")
+
+
+def _errors_of_rail(parameters: ParameterSet) -> Iterator[ConfigError]:
+    """Errors of a rail: mass against density and area, the two moduli, second moment against area."""
+    mass, density = _number_at(parameters, "mass", "kg/m"), _number_at(parameters, "density", "kg/m³")
+    area, second_moment = _number_at(parameters, "area", "m²"), _number_at(parameters, "second_moment", "m⁴")
+    youngs, shear = (_number_at(parameters, f"{name}_modulus", "Pa") for name in ("youngs", "shear"))
+    remedy = "Correct one of the numbers or its unit"
+    if mass and density * area and abs(mass / (density * area) - 1.0) > MAX_MASS_DEVIATION:
+        problem = f"{mass:g} kg/m, while density times area is {density * area:.4g} kg/m"
+        yield parameters.error("mass", problem, remedy)
+    if youngs and shear and not POISSON_RATIOS[0] <= (ratio := 0.5 * youngs / shear - 1.0) <= POISSON_RATIOS[1]:
+        problem = f"{shear:g} Pa and a Young's modulus of {youngs:g} Pa are a Poisson's ratio of {ratio:.3g}"
+        yield parameters.error("shear_modulus", f"{problem}, outside 0 to 0.5", remedy)
+    if area > 0.0 and second_moment > 0.0:
+        radius = sqrt(second_moment / area)
+        if not SECTION_RADII[0] <= radius <= SECTION_RADII[1]:
+            problem = f"{second_moment:g} m⁴ of {area:g} m² are a radius of gyration of {radius:.3g} m"
+            yield parameters.error("second_moment", problem, remedy)
 
 
 def _number_at(parameters: ParameterSet, key: str, unit: str) -> float:
@@ -124,9 +150,12 @@ def _mappings(value: Any) -> Iterator[ParameterSet]:
 
 def _errors(parameters: ParameterSet, key: str, number: Number) -> Iterator[ConfigError]:
     low, high = RANGES.get((key, number.unit), (None, None))
-    if low is not None and high is not None and number.value and not low <= number.value <= high:
+    size = abs(number.value) if key == "length" else number.value  # a blade may point to smaller positions
+    if low is not None and high is not None and size and not low <= size <= high:
         problem = f"{number.value:g} {number.unit} is outside {low:g} to {high:g} {number.unit}"
-        yield parameters.error(key, problem, "Correct the number or its unit")
+        is_diameter = key == "radius" and low <= 0.5 * number.value <= high
+        hint = f": half a diameter of {number.value:g} m is {0.5 * number.value:g} m" if is_diameter else ""
+        yield parameters.error(key, problem, f"Correct the number or its unit{hint}")
     if number.prior is not None and number.prior > MAX_PRIOR:
         problem = f"a prior of {number.prior:g} is a standard deviation of {100 * number.prior:g} %"
         yield parameters.error(

@@ -389,7 +389,7 @@ VALUES = {
     "vehicles/ic3.yaml: {value: 24.6, unit: t => {value: 24.6, unit: kg": (
         "improbable: config/vehicles/ic3.yaml, line 15, car_types.end_car.mass: 24.6 kg is outside 100 to 300000 kg."
     ),
-    "vehicles/ic3.yaml: {value: 0.43, unit: m => {value: 430, unit: m": "wheel.radius: 430 m is outside 0.1 to 1 m.",
+    "vehicles/ic3.yaml: {value: 0.43, unit: m => {value: 430, unit: m": "wheel.radius: 430 m is outside 0.1 to 0.65 m.",
     "vehicles/ic3.yaml: centre: {value: 54.6 => centre: {value: 154.6": (
         "no train: config/vehicles/ic3.yaml, line 41, bogies[3].centre: 154.6 m is outside the unit, whose length is"
     ),
