@@ -380,7 +380,7 @@ def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:
     for a in model.answers:
         after, by = (None, None) if a.onset is None else map(day_of, a.onset)
         names: list[str | None] = [*a.names, None, None]
-        channel = a.parameter.rpartition("_")[2] if a.group in ("gain", "seat") else None
+        channel = a.parameter.partition("_")[2] if a.group in ("gain", "seat") else None
         rows.append(
             {
                 "visit": a.visit, "question": a.question, "verdict": a.verdict, "term": names[0],

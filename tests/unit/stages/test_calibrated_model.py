@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -88,6 +89,12 @@ def test_the_model_of_a_track_with_a_switch_states_that_its_answers_are_not_prov
     assert switch.computed == () and list(model_text("t1", switch))[-1] == UNPROVEN_SWITCH
     rows = calibrated.answer_rows(switch)
     assert rows and all(row["reservation"] == UNPROVEN_SWITCH for row in rows)
+
+
+def test_the_channel_of_an_answer_may_have_an_underscore():
+    answer = MagicMock(group="gain", parameter="diverging gain_rail_web", onset=None, names=(), position=None)
+    (row,) = calibrated.answer_rows(MagicMock(answers=[answer], reservation=""))
+    assert row["channel"] == "rail_web"
 
 
 def test_a_visit_that_differs_is_not_used_and_the_others_agree_with_the_file(model):

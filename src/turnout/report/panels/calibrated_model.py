@@ -106,11 +106,11 @@ def _of_kind(states: States, kind: str) -> list[Mapping[str, Any]]:
 def _kind_of(parameter: str) -> str:
     """Name before the position or the sensor.
 
-    >>> [_kind_of(name) for name in ("pad@18.00", "diverging pad@18.00", "gain_A8", "cast_bending@3.36")]
+    >>> [_kind_of(name) for name in ("pad@18.00", "diverging pad@18.00", "gain_A8_web", "cast_bending@3.36")]
     ['pad', 'pad', 'gain', 'cast_bending']
     """
     name = parameter.split(" ")[-1]
-    return name.partition("@")[0] if "@" in name else name.rpartition("_")[0]
+    return name.partition("@")[0] if "@" in name else name.partition("_")[0]
 
 
 def _kind_panel(words: str, is_factor: bool, states: States, width: int) -> str:
