@@ -156,14 +156,12 @@ def _write(stream: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) 
 
 def _day(text: str, con: duckdb.DuckDBPyConnection) -> datetime:
     """The time of ``--as-of``; ConfigError if it is invalid or before the first measurement."""
-    from datetime import datetime
-
-    from turnout.config.events import time_problem
+    from turnout.config.events import parse_utc, time_problem
     from turnout.errors import ConfigError
 
     if fault := time_problem(text):
         raise ConfigError("--as-of", "date", f"{text!r}{fault[0]}", fault[1])
-    day = datetime.fromisoformat(text.removesuffix("Z"))
+    day = parse_utc(text)
     ((first,),) = con.execute(FIRST_MEASUREMENT_QUERY).fetchall()
     if first is not None and day < first:
         observation = f"{text!r}: nothing was measured by then, the first measurement is of {first:%Y-%m-%d %H:%M} UTC"

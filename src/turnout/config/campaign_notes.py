@@ -11,7 +11,7 @@ from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
 from turnout.config.events import day_problem, parse_utc, time_problem
 from turnout.config.frozen_mapping import Frozen
-from turnout.config.schema import decimal_point_hint
+from turnout.config.schema import DECIMAL_COMMA, decimal_point_hint
 from turnout.config.turnout import Campaign, TurnoutConfig
 from turnout.errors import ReadError
 from turnout.number_text import decimal_number
@@ -21,6 +21,7 @@ COLUMNS = ("campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip
 TRAIN_COLUMNS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 TRAIN_RANGES = {"speed_kmh": (1, 400), "axle_load_t": (0.1, 60), "n_axles": (1, 2000)}
 WHOLE_NUMBERS = ("n_axles",)
+NUMBER_COLUMNS = ("rail_temperature_c", *TRAIN_RANGES)
 UNITS = {"c": " °C", "kmh": " km/h", "t": " t"}  # by the end of the name of a column
 
 
@@ -177,6 +178,9 @@ def _read_rows(
         try:
             if line_problem := row_problem(cells):
                 raise _CellError(*line_problem)
+            for column in NUMBER_COLUMNS:  # where a comma separates no cells, it is a decimal mark
+                if cells.separator != "," and DECIMAL_COMMA.fullmatch(cells.get(column, "")):
+                    cells[column] = cells[column].replace(",", ".")
             add_row(cells)
         except _CellError as cell_error:
             column, problem, remedy = cell_error.args

@@ -6,6 +6,7 @@ read as text or YAML raise ``ConfigError``.
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -381,7 +382,7 @@ def _tree(node: AnyNode, path: str, constructor: BaseConstructor, ancestors: tup
         branch = Branch(place)
         for key, value in node.value:
             key_place = place_of_node(key, path)
-            name = str(key.value)
+            name = _compose_letters(key.value)
             if name in branch:
                 first = branch.key_places[name].line
                 raise key_place.error(f"{name!r} for the second time, first in line {first}", "Keep one of them")
@@ -389,7 +390,12 @@ def _tree(node: AnyNode, path: str, constructor: BaseConstructor, ancestors: tup
         return branch
     if node.id == "sequence":
         return Leaf(tuple(_scalar(item, path, constructor) for item in node.value), place)
-    return Leaf(_scalar(node, path, constructor), place, str(node.value))
+    return Leaf(_scalar(node, path, constructor), place, _compose_letters(node.value))
+
+
+def _compose_letters(text: Any) -> str:
+    """A text with composed letters: two spellings of an umlaut that look the same are the same name."""
+    return unicodedata.normalize("NFC", str(text))
 
 
 def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:
@@ -399,7 +405,7 @@ def _scalar(node: AnyNode, path: str, constructor: BaseConstructor) -> Scalar:
     if node.id != "scalar":
         raise place.error(f"a {node.id} inside a list", "Write plain values in lists")
     if str(node.tag).endswith((":timestamp", ":str")):
-        return node.value
+        return _compose_letters(node.value)
     try:
         return constructor.construct_object(node)
     except (MarkedYAMLError, ValueError):

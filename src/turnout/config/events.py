@@ -34,6 +34,8 @@ RESETS = {
 FIRST_YEAR = 1900  # an earlier date of work is taken for a mistake
 MAX_LEAD_TIME = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
 DAY_LENGTH = len("2026-04-02")
+UTC_MARK = re.compile(r"\s*(?:z|utc|gmt)$", re.IGNORECASE | re.ASCII)
+BLANK_BEFORE_OFFSET = re.compile(r"\s+(?=[+-]\d{2}:?\d{2}$)", re.ASCII)
 COLUMNS = ("turnout", "section", "date", "kind", "resets", "note")
 
 
@@ -267,7 +269,7 @@ def day_problem(text: str) -> tuple[str, str] | None:
 
 
 def parse_utc(text: str) -> datetime:
-    """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a "Z" or "+00:00"; ValueError for other text.
+    """Time of a cell, YYYY-MM-DD or YYYY-MM-DDTHH:MM, with or without a mark of UTC ("Z", "UTC", "+00:00").
 
     Parameters
     ----------
@@ -288,8 +290,10 @@ def parse_utc(text: str) -> datetime:
     --------
     >>> parse_utc("2026-04-02T10:30Z").isoformat(), parse_utc("2026-04-02T10:30+00:00").isoformat()
     ('2026-04-02T10:30:00', '2026-04-02T10:30:00')
+    >>> parse_utc("2026-04-02t10:30z") == parse_utc("2026-04-02 10:30 UTC") == parse_utc("2026-04-02 10:30 +00:00")
+    True
     """
-    time = datetime.fromisoformat(text.removesuffix("Z"))
+    time = datetime.fromisoformat(BLANK_BEFORE_OFFSET.sub("", UTC_MARK.sub("", text)))
     return time.replace(tzinfo=None) if time.utcoffset() == timedelta(0) else time
 
 

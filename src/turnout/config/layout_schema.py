@@ -1,8 +1,9 @@
 """Keys of layouts and overrides: sections, hammer tests, passages, channels and the settings that they may contain."""
 
-from turnout.config.schema import LABEL, NAME, FleetWideKey, Group, Key, NamedEntries
+from turnout.config.schema import LABEL, FleetWideKey, Group, Key, NamedEntries
 from turnout.config.settings_schema import settings_keys
 
+PANELS = ("OT", "SP", "CLP", "CP", "AS")
 QUANTITIES = ("force", "acceleration", "velocity", "displacement", "strain", "temperature", "ignored")
 
 CHANNEL = {
@@ -44,18 +45,18 @@ HAMMER = {
     "force": Key("text", "channel of the hammer", required=True),
     "response": Key("text", "channel that the models are identified from", required=True),
     "validation": Key("text", "second response; identify.second_response says what for; null: none", nullable=True),
-    "channels": NamedEntries(CHANNEL, NAME, "one entry per channel", required=True),
+    "channels": NamedEntries(CHANNEL, LABEL, "one entry per channel", required=True),
 }
 PASSAGES = {
     **FILES,
     "rate": PASSAGE_RATE,
-    "channels": NamedEntries(PASSAGE_CHANNEL, NAME, "one entry per channel", required=True),
+    "channels": NamedEntries(PASSAGE_CHANNEL, LABEL, "one entry per channel", required=True),
 }
 # Keys that a single section may set differently from the turnout.
 SECTION_HAMMER = {name: rule for name, rule in HAMMER.items() if name != "files"}
 SECTION = {
     "panel": Key("text", "open track, switch, closure, crossing panel, after the crossing", required=True,
-                 choices=("OT", "SP", "CLP", "CP", "AS")),
+                 choices=PANELS),
     "track": Key("text", "track it lies in", required=True, choices=("main", "diverging", "both")),
     "position": Key("number", "position along the turnout, 0 at the switch toe, towards the crossing", unit="m",
                     required=True, minimum=-10000, maximum=10000),

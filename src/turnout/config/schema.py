@@ -12,12 +12,11 @@ from turnout.errors import ConfigError
 from turnout.number_text import decimal_number, number_text
 
 ID = r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}"
-LABEL = r"[A-Za-z][A-Za-z0-9-]*"
-NAME = r"[A-Za-z][A-Za-z0-9_-]*"
+LETTERS = "A-Za-zÀ-ÖØ-öø-ɏΑ-ωА-я"  # Latin with its accents, Greek, Cyrillic: no \\w, which is ASCII in a JSON schema
+LABEL = rf"[{LETTERS}0-9][{LETTERS}0-9_-]*"
 PATTERN_TEXTS = {
     ID: "1 to 64 letters, digits, _ and -, the first a letter or digit",
-    LABEL: "letters, digits and -, the first a letter",
-    NAME: "letters, digits, _ and -, the first a letter",
+    LABEL: "letters, digits, _ and -, the first a letter or digit",
     WEB_ADDRESS: "an address that begins with https:// (or http://), or '' for none",
     MAIL_SENDER: "name@host or Name <name@host>, or '' for the first recipient",
     MAIL_ADDRESSES: "name@host, several with commas between, or '' for none",
@@ -29,6 +28,11 @@ VALUE_TYPES = {
     "integer": (int,),
     "flag": (bool,),
     "name_or_index": (str, int),
+}
+FLAG_WORDS = {
+    word: is_set
+    for is_set, words in ((True, "true yes ja oui sí si sì on y j 1"), (False, "false no nein nee nej non off n 0"))
+    for word in words.split()
 }
 TYPE_TEXTS = {"text": "text", "number": "a number", "integer": "a whole number", "flag": "true or false"}
 
@@ -263,7 +267,8 @@ def typed_value(key: Key, leaf: Leaf) -> Any:
     Returns
     -------
     any
-        A number for a number in quotes, a whole number for 10.0, the text for a number where text is wanted; the text
+        True or False for a word that means it, a number for a number in quotes, a whole number for 10.0, the text for a
+        number where text is wanted; the text
         also of a number in another notation than the decimal one, which ``value_problem`` then reports; else the value
         unchanged.
 
@@ -274,8 +279,12 @@ def typed_value(key: Key, leaf: Leaf) -> Any:
     20000.0
     >>> typed_value(Key("text", "serial number"), Leaf(7, Place("a.yaml"), "007"))
     '007'
+    >>> typed_value(Key("flag", "use it"), Leaf("Ja", Place("a.yaml"), "Ja"))
+    True
     """
     value = leaf.value
+    if key.value_type == "flag":
+        return FLAG_WORDS.get(leaf.text.strip().casefold(), value)
     if key.many or isinstance(value, bool) or not isinstance(value, (int, float, str)):
         return value
     if key.value_type == "text":

@@ -146,22 +146,23 @@ def _write(target: Path, content: bytes, path: Path) -> None:
 def _with_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -> bytes:
     """Content of the table with one more row; a new table gets a header."""
     is_tsv = path.suffix == ".tsv"
-    header = columns if not os.path.lexists(path) else _tsv_header(path) if is_tsv else _csv_header(path)
+    header, separator = columns, "\t" if is_tsv else ","
+    if os.path.lexists(path):
+        header, separator = (_tsv_header(path), "\t") if is_tsv else _csv_header(path)
     cells = _ordered_cells(path, values, header)
-    separator = "\t" if is_tsv else ","
     before = path.read_bytes() if os.path.lexists(path) else f"{separator.join(columns)}\n".encode()
     end = b"\r\n" if b"\r\n" in before else b"\n"
     gap = b"" if before.endswith(b"\n") else end
-    return before + gap + (separator.join(cells) if is_tsv else _csv_line(cells)).encode() + end
+    return before + gap + (separator.join(cells) if is_tsv else _csv_line(cells, separator)).encode() + end
 
 
-def _csv_line(cells: list[str]) -> str:
+def _csv_line(cells: list[str], separator: str) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow(cells)
+    csv.writer(text, lineterminator="", delimiter=separator).writerow(cells)
     return text.getvalue()
 
 
-def _csv_header(path: Path) -> tuple[str, ...]:
+def _csv_header(path: Path) -> tuple[tuple[str, ...], str]:
     try:
         return header_of(path, str(path))
     except TableError as fault:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from turnout.config.events import parse_utc
+
 
 @dataclass(frozen=True)
 class ListedTrain:
@@ -55,7 +57,7 @@ def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[ListedTrain,
 def _listed_train(row: Mapping[str, str]) -> ListedTrain:
     text = row.get("passed_at_utc") or ""
     try:
-        moment = datetime.fromisoformat(text.removesuffix("Z"))
+        moment = parse_utc(text)
     except ValueError:
         raise ValueError(f"passed_at_utc {text!r} is not a time like 2024-05-13T10:00:00") from None
     if moment.tzinfo is not None:

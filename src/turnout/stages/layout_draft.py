@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from turnout.config.layout_schema import QUANTITIES
-from turnout.config.schema import LABEL
+from turnout.config.schema import LETTERS
 from turnout.errors import ConfigError
 from turnout.readers.directions import opposite_directions
 from turnout.records import RawChannel
@@ -16,7 +16,7 @@ from turnout.stages.file_contents import ChannelContents, FileContents
 from turnout.units import SI, conversion
 
 DECIDE = "# DECIDE:"  # marks what the files do not state
-TEST_NAME = re.compile(rf"({LABEL})_([A-Za-z0-9]+)")
+TEST_NAME = re.compile(rf"([{LETTERS}][{LETTERS}0-9-]*)_([A-Za-z0-9]+)")
 PANELS = {"OT": "open track", "SP": "switch", "CLP": "closure", "CP": "crossing", "AS": "after the crossing"}
 QUANTITY_OF_ROLE = {"force": "force", "response": "acceleration"}
 MAX_STATED = 40  # characters of a direction that the file states

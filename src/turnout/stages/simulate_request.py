@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from turnout.config.events import time_problem
+from turnout.config.events import parse_utc, time_problem
 from turnout.config.schema import suggestion
 from turnout.errors import ConfigError
 from turnout.readers.writing import WRITERS
@@ -114,7 +114,7 @@ def time_of(request: Mapping[str, Any]) -> datetime:
     datetime
         Naive UTC.
     """
-    return datetime.fromisoformat(request["at"].removesuffix("Z"))
+    return parse_utc(request["at"])
 
 
 def option_error(option: str, observation: str, remedy: str) -> ConfigError:

@@ -219,7 +219,7 @@ WRONG = {
         {"settings": "receptance: {gate_level: 1.5}"},
         "line 1, column 26: gate_level is 1.5. Write a number from 0",
     ),
-    "flag that is none": ({"settings": "receptance: {force_window: 1}"}, "Write true or false"),
+    "flag that is none": ({"settings": "receptance: {force_window: 2}"}, "Write true or false"),
     "override without a turnout": (
         {"override": ("t9.yaml", "hammer: {rate: 1}")},
         "config/overrides/t9.yaml, line 1, column 1: an override without a turnout 't9'. Allowed: t1, t2",
