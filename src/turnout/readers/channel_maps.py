@@ -1,14 +1,19 @@
 """Channels of the layout assigned to rows of a file."""
 
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
+import numpy as np
+
 from turnout.counts import first_texts
 from turnout.errors import ReadError
+from turnout.readers.attached_units import names_and_units_in
 from turnout.readers.channel_descriptions import describing_entries, exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
+from turnout.readers.column_forms import counts_samples
 from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_vocabulary import is_rate_name
@@ -16,7 +21,7 @@ from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_quantities import quantity_entries
 from turnout.readers.stated_sensitivities import states_sensitivity
 from turnout.readers.stated_units import key_of_units
-from turnout.readers.time_axes import is_axis_name
+from turnout.readers.time_axes import is_axis_name, is_dated_axis, is_unit_of_no_time
 from turnout.records import Channel, RawChannel
 from turnout.units import IGNORED
 
@@ -91,7 +96,11 @@ def channel_mappings(
         raise source.error(where, f"the layout names the channel {record.names[twice]!r} twice", "Name each once")
     unknown = sorted(set(range(len(record.names))) - set(indices))
     if unknown := [
-        i for i in unknown if not is_axis_name(record.names[i], record.units[i]) and not is_rate_name(record.names[i])
+        i
+        for i in unknown
+        if not is_axis_name(record.names[i], record.units[i])
+        and not is_rate_name(record.names[i])
+        and not _needs_no_name(record, i)
     ]:
         names = _name_list([record.names[i] for i in unknown])
         raise source.error(
@@ -123,7 +132,7 @@ def _name_list(names: Sequence[str]) -> str:
 def index_of(
     record: RawRecord, wanted: str | int, where: str, source: Source, assigned: Sequence[str | int] = ()
 ) -> int:
-    """Row of the channel that the layout calls ``wanted``: a number, a name, or an alias of the format.
+    """Row of the channel that the layout calls ``wanted``: a number, a name with or without its unit, or an alias.
 
     Parameters
     ----------
@@ -155,10 +164,13 @@ def index_of(
         in_brackets = f" ({name_list}; times and numbers of records are no channels)" if any(record.names) else ""
         problem = f"there is no channel {wanted}; the file has {len(record.names)}{in_brackets}, counted from 0"
         raise source.error(where, problem, f"{CORRECT_SOURCE}, or copy the file again", reason="channel_missing")
-    for names in (record.names, [n.strip().casefold() for n in record.names]):
-        key = wanted if names is record.names else wanted.strip().casefold()
-        if names.count(key) == 1:
-            return names.index(key)
+    if record.names.count(wanted) == 1:
+        return record.names.index(wanted)
+    key = _key_of_name(wanted)
+    for names in (record.names, tuple(name for name, _ in names_and_units_in(record.names))):
+        keys = [*map(_key_of_name, names)]
+        if keys.count(key) == 1:
+            return keys.index(key)
     if wanted in record.not_numbers:
         content = record.not_numbers[wanted]
         problem = f"the channel {wanted!r} holds {content}"
@@ -167,7 +179,7 @@ def index_of(
             problem = f"the channel {wanted!r} is {content.with_article}, no array of real numbers"
             remedy = content.remedy(wanted)
         raise source.error(where, problem, remedy, reason="channel_missing")
-    matches = [i for i, aliases in enumerate(record.aliases) if wanted in aliases]
+    matches = [i for i, aliases in enumerate(record.aliases) if _key_of_name(wanted) in map(_key_of_name, aliases)]
     if len(matches) == 1:
         return matches[0]
     if (count := record.names.count(wanted) + len(matches)) > 1:
@@ -181,6 +193,19 @@ def index_of(
     )
     problem = f"there is no channel {wanted!r}; there are {_name_list(record.names)}"
     raise source.error(where, problem, hint, reason="channel_missing")
+
+
+def _needs_no_name(record: RawRecord, i: int) -> bool:
+    """Whether the form of a column shows that it is no channel: no number at all, a count of the samples, or a time."""
+    column, unit = record.samples[i], record.units[i]
+    is_empty = isinstance(column, np.ndarray) and column.dtype.kind == "f" and bool(np.isnan(column).all())
+    is_axis = not is_unit_of_no_time(unit) and (counts_samples(column) or is_dated_axis(column, record.names[i]))
+    return is_empty or is_axis
+
+
+def _key_of_name(name: str) -> str:
+    """What two spellings of a name that look the same have in common: capitals, blanks and composed letters differ."""
+    return " ".join(unicodedata.normalize("NFC", name).casefold().split())
 
 
 def _has_channel(record: RawRecord, wanted: str | int, where: str, source: Source) -> bool:

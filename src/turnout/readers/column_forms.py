@@ -97,3 +97,25 @@ def is_on_line(samples: np.ndarray) -> bool:
     return bool(
         np.abs(samples - line).max() < MAX_HEAD_DEVIATION * step or n_jump <= max(1, MAX_JUMP_SHARE * len(steps))
     )
+
+
+def counts_samples(column: Column) -> bool:
+    """Whether a column in memory numbers its samples by ones from 0 or 1, none left out: no sensor measures this.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        The column.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> counts_samples(np.arange(1.0, 33.0)), counts_samples(np.delete(np.arange(33.0), 9)), counts_samples(np.ones(32))
+    (True, False, False)
+    """
+    if not isinstance(column, np.ndarray) or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
+        return False
+    return column[0] in (0, 1) and bool(np.array_equal(column, column[0] + np.arange(len(column))))

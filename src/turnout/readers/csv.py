@@ -39,6 +39,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
+from turnout.readers.number_notations import has_other_notation, with_plain_numbers
 from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_cells
@@ -72,6 +73,9 @@ def read_raw(source: Source) -> RawFile:
     end = len(data) - (data[-1:] == END_OF_FILE)
     if data.find(b"\n") < 0:
         data, lazy = data[:end].replace(b"\r", b"\n"), False
+    if not lazy or has_other_notation(source.head):
+        lazy, data = False, with_plain_numbers(data[:end])
+        end = len(data)
     end, remarks = _end_of_rows(data, end, source)
     if isinstance(data, bytes):
         data = data[:end]

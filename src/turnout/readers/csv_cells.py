@@ -77,8 +77,8 @@ def decode_line(data: bytes) -> str:
 
 BLANK = " "
 SEPARATORS = ("\t", ";", "|")  # a line with one of them is not separated by commas or blanks
-# a word with a unit in brackets behind it, or a text between quotation marks
-WORD = re.compile(r'"[^"]*"(?: *[\[(][^\])]*[\])])?|[^\s"]+(?: *[\[(][^\])]*[\])])?')
+# a word with a unit in brackets behind it, a text between quotation marks, or brackets alone in a line of units
+WORD = re.compile(r'"[^"]*"(?: *[\[(][^\])]*[\])])?|[\[(][^\])]*[\])](?=\s|$)|[^\s"]+(?: *[\[(][^\])]*[\])])?')
 
 
 def cells_of(line: str, separator: str) -> list[str]:
@@ -100,6 +100,8 @@ def cells_of(line: str, separator: str) -> list[str]:
     --------
     >>> cells_of('"force [N]"; -1,5 ', ";"), cells_of("# force [N]  rail (m/s²)", " ")
     (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
+    >>> cells_of("  [s]   [N]  (m/s²)", " ")
+    ['[s]', '[N]', '(m/s²)']
     """
     if separator == BLANK:
         return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]

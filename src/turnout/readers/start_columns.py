@@ -16,6 +16,7 @@ from turnout.readers.source import RawRecord
 from turnout.readers.stamp_texts import plain_stamp
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
 from turnout.readers.texts import decode_text
+from turnout.readers.time_axes import is_dated_axis
 from turnout.readers.time_numbers import SINCE, time_of_number
 
 TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
@@ -109,9 +110,12 @@ def starts_of_axes(record: RawRecord) -> list[tuple[datetime | None, str]]:
     if record.time is not None and len(record.time) > 1:
         starts.append(_start_of_time_column(record.time, record.time_label, record.is_time_in_seconds))
     for name, unit, column in zip(record.names, record.units, record.samples):
-        is_dated = is_time_name(name) or (is_start_name(name) and has_date_word(name))
+        declared = f"{name} [{unit}]" if unit.strip() else name
+        is_dated = (
+            is_time_name(name) or (is_start_name(name) and has_date_word(name)) or is_dated_axis(column, declared)
+        )
         if is_dated and column.dtype.kind in "fiu" and len(column) > 1:
-            starts.append(_start_of_axis(column, f"{name} [{unit}]" if unit.strip() else name))
+            starts.append(_start_of_axis(column, declared))
     return [(start, text) for start, text in starts if start or text]
 
 

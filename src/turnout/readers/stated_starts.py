@@ -11,13 +11,13 @@ import numpy as np
 
 from turnout.readers.entries import Entry
 from turnout.readers.rate_statements import MIN_EPOCH
-from turnout.readers.rate_units import words_of
+from turnout.readers.rate_units import seconds_of, words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.time_numbers import is_declared
+from turnout.readers.time_numbers import SINCE, is_declared
 from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time
 
 START = re.compile(
-    r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|mesur|medic|misur|enregistr|registr|grab"
+    r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|measur|mesur|medic|misur|enregistr|registr|grab"
     r"|pomiar|zaznam|mereni|misuraz|rejestrac|nagran"
     r"|acqui|erfass|optag|maling|timestamp|zeitstempel|horodat|datetime|^date$|^dato$|^datum$|^time$|^zeit$|^fecha$"
 )
@@ -30,6 +30,7 @@ OTHER = re.compile(
     r"|tisk|vytis|udskr|gedruckt|imprim|uloz|zapis|gespeich|speicher|guardad|salvat|opgesl|konec|koniec|^fine$|einde"
     r"|maint|wartung|^tamp|stopf|grind|schleif|repair|repar|replac|ersetz|renew|erneuer"
 )
+OF_MOMENT = frozenset("at on am um le el den utc".split())
 OF_BEGIN = frozenset("of the der de la du del og at on".split())
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
 TIME_WORD = re.compile(
@@ -103,6 +104,38 @@ def has_date_word(name: str) -> bool:
     return any(DATE_WORD.search(word) for word in words_of(name)) or is_declared(name)
 
 
+def with_declared_origins(record: RawRecord) -> RawRecord:
+    """The record with the unit of each time that counts from an origin behind the name of its entry.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        An entry ``start`` with the unit "days since 2000-01-01" is called ``start [days since 2000-01-01]``.
+    """
+    origins = {
+        entry.name: entry.value
+        for entry in record.entries
+        if isinstance(entry.value, str) and SINCE.search(entry.value) and not SINCE.search(entry.name)
+    }
+    counted = {entry.name for entry in record.entries if not isinstance(entry.value, str) and entry.name in origins}
+    if not counted:
+        return record
+    explained = {origins[name] for name in counted}
+    entries = [entry for entry in record.entries if not (isinstance(entry.value, str) and entry.value in explained)]
+    return replace(
+        record,
+        entries=tuple(
+            replace(entry, name=f"{entry.name} [{origins[entry.name]}]") if entry.name in counted else entry
+            for entry in entries
+        ),
+    )
+
+
 def with_stated_start(record: RawRecord) -> RawRecord:
     """The only record of a file with the start time of its metadata if its format states none.
 
@@ -167,8 +200,16 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
 
 
 def _is_long(value: Any, declared: str) -> bool:
-    """Whether a number under the name of a time is too large for a duration."""
-    return any(TIME_WORD.search(word) for word in words_of(declared)) and float(value) >= MIN_EPOCH
+    """Whether a number under the name of a time, or of a moment, is too large for a duration."""
+    is_named = any(TIME_WORD.search(word) for word in words_of(declared)) or _is_of_moment(declared)
+    return is_named and float(value) >= MIN_EPOCH
+
+
+def _is_of_moment(name: str) -> bool:
+    """Whether a name speaks of the moment of a recording: "acquired_at", "start_ms", "mess_ns", and no "record_id"."""
+    words = words_of(name)
+    of_time = [word for word in words if word in OF_MOMENT or seconds_of(word)]
+    return bool(of_time) and all(word in of_time or START.search(word) for word in words)
 
 
 def _is_begin(value: Any, declared: str) -> bool:

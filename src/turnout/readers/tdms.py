@@ -8,7 +8,7 @@ import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from datetime import UTC
+from datetime import UTC, timedelta
 from typing import Any, BinaryIO
 
 import nptdms
@@ -211,10 +211,20 @@ def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float,
     return len(channel), step, facts.record_value(("wf_start_time",), 0, 1)
 
 
-def _in_utc(value: Any) -> Any:
-    """A value of the file; its time stamps are in UTC, which npTDMS does not state."""
+MAX_OFFSET = 1e5  # s: a day; what is more is no time from the time stamp to the first sample
+NO_TIME = timedelta()
+
+
+def _in_utc(value: Any, offset: timedelta = NO_TIME) -> Any:
+    """A value of the file; its time stamps are in UTC, which npTDMS does not state, and moved by an offset."""
     time = parse_time(value) if isinstance(value, np.datetime64) else None
-    return value if time is None else time.replace(tzinfo=UTC)
+    return value if time is None else time.replace(tzinfo=UTC) + offset
+
+
+def _offset_of(properties: Mapping[str, Any], facts: Metadata) -> timedelta:
+    """Time from the time stamp of a waveform to its first sample."""
+    seconds = (facts.number(("wf_start_offset",)) or 0.0) * seconds_of_abscissa(properties)
+    return timedelta(seconds=seconds) if abs(seconds) < MAX_OFFSET else NO_TIME
 
 
 def _axis_text(n_sample: int, step: float, start: Any) -> str:
@@ -314,7 +324,8 @@ def _complete_record(
         entries=(*of_file, *of_remarks, *_entries(channels, groups, other_axes)),
         units=tuple(next((str(c.properties[n]) for n in UNIT_PROPERTIES if c.properties.get(n)), "") for c in channels),
         **start_fields(
-            *map(_in_utc, (facts.record_value(("wf_start_time",), 0, 1), facts.record_value(START_NAMES, 0, 1))),
+            _in_utc(facts.record_value(("wf_start_time",), 0, 1), _offset_of(channels[0].properties, facts)),
+            _in_utc(facts.record_value(START_NAMES, 0, 1)),
             declared=facts.label_of(START_NAMES),
         ),
         axis_starts=(

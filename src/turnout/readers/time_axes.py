@@ -238,6 +238,28 @@ def _unit_of_count(column: Column, declared: str) -> Fraction | None:
     return unit_of_axis(first, declared, float(second - first))
 
 
+def is_dated_axis(column: Column, declared: str) -> bool:
+    """Whether a column is a time axis under any name: it rises evenly, and one usual count puts it into our years.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        The column.
+    declared : str
+        Its name and unit.
+
+    Returns
+    -------
+    bool
+    """
+    return (
+        column.dtype.kind in "fiu"
+        and len(column) >= MIN_AXIS_SIZE
+        and rises_evenly(column[:HEAD_SIZE])
+        and _unit_of_count(column, declared) is not None
+    )
+
+
 def _columns(
     record: RawRecord, measured: Set[int], checked: Collection[str] = ()
 ) -> Iterator[tuple[str, np.ndarray, bool, int]]:
@@ -258,13 +280,13 @@ def _columns(
         is_axis = by_name or (rises_evenly(column[:HEAD_SIZE]) and (is_time_unit or not _is_checked(name, checked)))
         if not is_axis:
             continue
-        unit_of_count = _unit_of_count(column, name) if by_name and not is_time_unit else None
+        unit_of_count = None if is_time_unit else _unit_of_count(column, name)
         scale = known.scale if is_time_unit and known else unit_of_count or 1
         is_in_seconds = is_time_unit or unit_of_count is not None
-        certainty = CERTAIN if by_name or is_time_unit else POSSIBLY
+        certainty = CERTAIN if by_name or is_in_seconds else POSSIBLY
         is_unknown = not is_time_unit and unit.strip().casefold() not in MEANINGLESS_UNITS
         place = f"column {name!r} in the unknown unit {unit!r}" if is_unknown else f"column {name!r}"
-        place = place if by_name or is_time_unit else f"{place}, which rises evenly"
+        place = place if certainty == CERTAIN else f"{place}, which rises evenly"
         yield place, np.asarray(column[:], dtype=float) * float(scale), is_in_seconds, certainty
 
 

@@ -3,12 +3,17 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_starts import DATE_WORD, OTHER, TIME_WORD, is_start_name
+from turnout.readers.time_numbers import SINCE
+from turnout.readers.time_texts import stated_time
 
 YEAR = r"(?:19|20)\d{2}"
 DATE = (
@@ -83,7 +88,10 @@ def possible_start(record: RawRecord) -> str:
         Name and value of the first with a date and a time of day, else of two of which one is called a date and one a
         time of day; "" if each is about another event, such as an export, a calibration or the end.
     """
-    entries = [e for e in record.entries if isinstance(e.value, str) and not e.is_piece and not _is_of_other(e.name)]
+    entries = [e for e in record.entries if not e.is_piece and not _is_of_other(e.name)]
+    if times := [text for e in entries if not isinstance(e.value, str) and (text := _text_of_time(e))]:
+        return times[0]
+    entries = [e for e in entries if isinstance(e.value, str) and not SINCE.search(e.value)]
     if moment := next(_moments(entries), ""):
         return moment
     dated = [e for e in entries if _is_named(e.name, DATE_WORD, DAY_WORD) and YEAR_OF_FOUR_DIGITS.search(e.value)]
@@ -92,6 +100,15 @@ def possible_start(record: RawRecord) -> str:
     clocks = [e for e in entries if CLOCK_ALONE.fullmatch(e.value.strip()) and not DAY_ALONE.fullmatch(e.value.strip())]
     clocks = clocks or [e for e in days[1:] if CLOCK_ALONE.fullmatch(e.value.strip())]
     return f"{_quotation(days[0])}; {_quotation(clocks[0])}" if days and clocks else ""
+
+
+def _text_of_time(entry: Entry) -> str:
+    """Name and time of an entry that is a time stamp or counts from a declared origin; "" for a time of no logger."""
+    is_stamp = isinstance(entry.value, datetime | np.datetime64)
+    if np.ndim(entry.value) or not (is_stamp or SINCE.search(entry.name)):
+        return ""
+    time, _ = stated_time(entry.value, entry.name)
+    return f"{entry.name}: {entry.value}{'' if is_stamp else f' ({time:%Y-%m-%d %H:%M:%S})'}" if time else ""
 
 
 def _moments(entries: Sequence[Entry]) -> Iterator[str]:

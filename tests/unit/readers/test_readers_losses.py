@@ -196,7 +196,7 @@ def test_empty_columns_without_a_name_are_not_read_as_channels(tmp_path):
     [
         ("0,25", "one decimal mark"),
         ("0.25-", "without other signs"),
-        ("−0.25", "without other signs"),
+        ("±0.25", "without other signs"),
         ("OVER", "Copy"),
     ],
 )
