@@ -15,7 +15,7 @@ def cusum_by_loop(charts, baselines) -> pd.Series:
     joined = charts.merge(baselines[[*KEYS, "epoch", "allowance", "threshold_down"]], on=[*KEYS, "epoch"])
     sums = {}
     for chart, cells in joined.sort_values("measured_at_utc").groupby([*KEYS, "epoch"]):
-        total, held, side_before = 0.0, 0.0, 0
+        total, highest, held, side_before = 0.0, 0.0, 0.0, 0
         for cell in cells.itertuples(index=False):
             if cell.state in ("ok", "alarm_down", "alarm_up") and np.isfinite(cell.z):
                 limit = min(0.6 * cell.threshold_down + cell.allowance, 3.0)
@@ -26,6 +26,9 @@ def cusum_by_loop(charts, baselines) -> pd.Series:
                 else:
                     total, held = max(0.0, total + fall + (held if side else 0.0)), 0.0
                 side_before = side
+                if total <= highest - cell.threshold_down:  # the chart has returned
+                    total = 0.0
+                highest = max(highest, total) if total else 0.0
             sums[(*chart[:4], cell.measured_at_utc)] = total
     index = pd.MultiIndex.from_tuples(sums, names=[*KEYS, "measured_at_utc"])
     return pd.Series(list(sums.values()), index)

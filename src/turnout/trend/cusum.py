@@ -39,6 +39,7 @@ def cusum(
     confirmed: np.ndarray,
     active: np.ndarray,
     fresh: np.ndarray,
+    closes_on_return: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     r"""One-sided CUSUM for a falling mean, in which one campaign alone cannot raise an alarm.
 
@@ -48,8 +49,9 @@ def cusum(
     side. Then each of them, and every further one, adds ``confirmed``. A confirmed rise counts in full.
 
     The sum starts at 0 with every epoch. It keeps its value over campaigns that are not ``active`` (learning, no value,
-    no temperature). An alarm opens when S > h and closes when S is back at 0 or the epoch ends. For a rising mean pass
-    ``-z``.
+    no temperature). An alarm opens when S > h. It closes when the epoch ends, when S is back at 0, or when S has fallen
+    by h from its highest value of this alarm: a return needs the evidence of a change, however long the change lasted.
+    S is 0 then. For a rising mean pass ``-z``.
 
     Parameters
     ----------
@@ -65,6 +67,8 @@ def cusum(
         What a confirmed outlier adds to the sum, in the same unit; above h / 2 two of them raise the alarm.
     active, fresh : (n_chart, n_campaign) arrays of bool
         Campaigns that count; campaigns that start an epoch.
+    closes_on_return : bool
+        Whether a fall by h closes an alarm. Without it, the alarm lasts until S is back at 0.
 
     Returns
     -------
@@ -98,15 +102,20 @@ def cusum(
     alarm_open = np.zeros((n_campaign, n_chart), dtype=bool)
     began = np.full((n_campaign, n_chart), -1, dtype=np.int32)
     total, alarm, since = np.zeros(n_chart), np.zeros(n_chart, dtype=bool), np.full(n_chart, -1, dtype=np.int32)
+    highest = np.zeros(n_chart)
     last_side, held_gain = np.zeros(n_chart, dtype=np.int8), np.zeros(n_chart)
     for i in range(n_campaign):
         last_side, held_gain = np.where(fresh[i], 0, last_side), np.where(fresh[i], 0.0, held_gain)
         held = (side[i] != 0) & (side[i] != last_side)
         step = np.where(held, 0.0, gain[i] + np.where(use[i] & (side[i] == last_side), held_gain, 0.0))
-        total = np.maximum(np.where(fresh[i], 0.0, total) + step, 0.0)
+        total, highest = np.where(fresh[i], 0.0, total), np.where(fresh[i], 0.0, highest)
+        total = np.maximum(total + step, 0.0)
         held_gain = np.where(held, gain[i], np.where(use[i], 0.0, held_gain))
         last_side = np.where(use[i], side[i], last_side)
+        if closes_on_return:
+            total = np.where(total > highest - threshold, total, 0.0)
         resting = total == 0.0
+        highest = np.where(resting, 0.0, np.maximum(highest, total))
         since = np.where(resting & (fresh[i] | (counts[i] & ~(held & (side[i] < 0)))), i, since)
         alarm = (alarm & ~resting & ~fresh[i]) | (total > threshold)
         statistic[i], alarm_open[i], began[i] = total, alarm, since
@@ -176,7 +185,7 @@ def finish(p: Prepared, phi: np.ndarray, settings: TrendSettings) -> Charts:
     alarmed = first["down_open"] | first["up_open"]
     turnouts = turnout_residuals(p, sections, window, settled, alarmed, settings)
     second = chart_sums(slice(n, None), turnouts)
-    sections = _without_change_of_turnout(p, sections, first, alarm_campaigns(second), chart_sums)
+    sections = _published_sums(p, sections, first, alarm_campaigns(second), chart_sums)
     sums = {name: np.concatenate([first[name], second[name]]) for name in first}
     joint = {k: np.vstack([getattr(sections, k), getattr(turnouts, k)]) for k in ("values", "residual", "sigma")}
     level, shift = (stack_padded(getattr(sections, k), getattr(turnouts, k)) for k in ("level", "shift"))
@@ -217,15 +226,19 @@ def alarm_campaigns(sums: Mapping[str, np.ndarray]) -> np.ndarray:
     return np.cumsum(change, axis=1)[:, :-1] > 0
 
 
-def _without_change_of_turnout(
+def _published_sums(
     p: Prepared, sections: Residuals, sums: dict[str, np.ndarray], alarms: np.ndarray, chart_sums: _ChartSums
 ) -> Residuals:
-    """Residuals of the sections, ``nearer_residuals`` in the ``alarms`` of their turnouts; ``sums`` are made again."""
+    """Residuals of the sections, ``nearer_residuals`` in the ``alarms`` of their turnouts; ``sums`` are made again.
+
+    Of sections with an alarm they are made again as well: now a return closes it.
+    """
     common = alarms[p.panel.charts["group"].to_numpy()]
-    row = np.flatnonzero(common.any(axis=1))
+    row = np.flatnonzero(common.any(axis=1) | (sums["down_open"] | sums["up_open"]).any(axis=1))
     if not len(row):
         return sections
-    sections = nearer_residuals(p, sections, common)
+    if common.any():
+        sections = nearer_residuals(p, sections, common)
     for name, values in chart_sums(row, Residuals(*(array[row] for array in vars(sections).values()))).items():
         sums[name][row] = values
     return sections
@@ -237,7 +250,8 @@ def _siblings_without_alarm(
     """Residuals and sums of the sections, and which of their campaigns serve as siblings: none that is in alarm.
 
     Sections with a large change may first raise a false alarm in an unchanged one. Without them its alarm closes, and
-    it is a sibling again.
+    it is a sibling again. No return closes an alarm here: where most siblings have changed as well, a changed section
+    differs from them as little as one that has returned.
     """
     n = len(p.panel.charts)
     is_sibling = settled[:n]
@@ -246,7 +260,7 @@ def _siblings_without_alarm(
     for _ in range(MAX_SIBLING_ROUNDS):
         sections = sums = None  # free the arrays of the last round before the next: they set the peak of memory
         sections = section_residuals(p, window, settled, is_sibling, settings)
-        sums = chart_sums(slice(0, n), sections)
+        sums = chart_sums(slice(0, n), sections, closes_on_return=False)
         before, is_sibling = is_sibling, settled[:n] & ~(sums["down_open"] | sums["up_open"])
         if np.array_equal(before, is_sibling):
             break
@@ -280,7 +294,9 @@ class _ChartSums:
     ) -> None:
         self.p, self.allowance, self.window, self.factor, self.settings = p, allowance, window, factor, settings
 
-    def __call__(self, rows: slice | np.ndarray, residuals: Residuals) -> dict[str, np.ndarray]:
+    def __call__(
+        self, rows: slice | np.ndarray, residuals: Residuals, closes_on_return: bool = True
+    ) -> dict[str, np.ndarray]:
         p, settings, window = self.p, self.settings, self.window[rows]
         epoch = p.epoch[rows]
         usable = window & np.isfinite(residuals.values)
@@ -300,6 +316,6 @@ class _ChartSums:
             outlier = np.minimum(single[:, None] + k[:, None] + extra, settings.outlier_limit)
             sums[f"threshold_{name}"] = h
             sums[name], sums[f"{name}_open"], sums[f"{name}_began"] = cusum(
-                sign * z, k[:, None] + extra, h, outlier, single, active, fresh
+                sign * z, k[:, None] + extra, h, outlier, single, active, fresh, closes_on_return
             )
         return sums

@@ -229,8 +229,8 @@ def baseline_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
 def alarm_rows(charts: Charts, settings: TrendSettings) -> pd.DataFrame:
     """Table ``alarms``: one row per alarm, open or closed.
 
-    ``began_at_utc`` is the last campaign at which the sum was 0: the change came after it. An alarm closes when its sum
-    is back at 0 or an event starts a new epoch.
+    ``began_at_utc`` is the last campaign at which the sum was 0: the change came after it. An alarm closes as stated
+    in ``cusum``, or when an event starts a new epoch.
 
     Parameters
     ----------

@@ -26,12 +26,12 @@ def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
     k, h = rng.uniform(0.3, 1.2, z.shape), rng.uniform(2.0, 4.0, 7)
     outlier, confirmed = rng.uniform(0.5, 1.5, z.shape), rng.uniform(1.0, 2.0, 7)
     statistic, opened, began = cusum(z, k, h, outlier, confirmed, active, fresh)
-    n_confirmed = 0
+    n_confirmed = n_returned = 0
     for c in range(7):
-        total, alarm, since, waiting, side_before = 0.0, False, -1, 0.0, 0
+        total, highest, alarm, since, waiting, side_before = 0.0, 0.0, False, -1, 0.0, 0
         for i in range(60):
             if fresh[c, i]:
-                total, alarm, waiting, side_before = 0.0, False, 0.0, 0
+                total, highest, alarm, waiting, side_before = 0.0, 0.0, False, 0.0, 0
             held_low = False
             if active[c, i]:
                 side = int(np.sign(z[c, i])) if abs(z[c, i]) > outlier[c, i] else 0
@@ -43,24 +43,38 @@ def test_cusum_equals_a_plain_loop_with_resets_gaps_and_learning():
                 else:
                     waiting, held_low = gain, side < 0
                 side_before = side
+            if alarm and 0.0 < total <= highest - h[c]:
+                total, n_returned = 0.0, n_returned + 1
+            highest = max(highest, total)
             if total == 0.0:
-                alarm = False
+                alarm, highest = False, 0.0
                 if (np.isfinite(z[c, i]) and not held_low) or fresh[c, i]:
                     since = i
             alarm = alarm or total > h[c]
             assert statistic[c, i] == pytest.approx(total, abs=1e-12)
             assert opened[c, i] == alarm
             assert began[c, i] == since
-    assert n_confirmed > 5
+    assert n_confirmed > 5 and n_returned > 0
 
 
 def test_cusum_is_the_running_sum_above_its_lowest_point():
     # S_i = P_i - min(0, min P): Page's other form.
     z = np.random.default_rng(2).standard_normal((3, 200))
     on = np.ones(z.shape, bool)
-    statistic, _, _ = cusum(z, np.full(z.shape, 0.5), np.full(3, 5.0), np.full(z.shape, np.inf), np.zeros(3), on, ~on)
+    limits = np.full(z.shape, 0.5), np.full(3, 5.0), np.full(z.shape, np.inf), np.zeros(3)
+    statistic, _, _ = cusum(z, *limits, on, ~on, closes_on_return=False)
     running = np.cumsum(-z - 0.5, axis=1)
     assert np.allclose(statistic, running - np.minimum(0, np.minimum.accumulate(running, axis=1)), atol=1e-9)
+
+
+@pytest.mark.parametrize("n_changed", [5, 50, 500])
+def test_a_return_closes_an_alarm_after_h_over_k_campaigns_however_long_the_change_lasted(n_changed):
+    z = np.concatenate([np.zeros(20), np.full(n_changed, -3.0), np.zeros(20)])[None]
+    on, k, h = np.ones(z.shape, bool), 0.5, 4.2
+    _, is_open, _ = cusum(z, np.full(z.shape, k), np.array([h]), np.full(z.shape, np.inf), np.zeros(1), on, ~on)
+    opening = 20 + int(np.ceil(h / (3.0 - k))) - 1
+    closing = 20 + n_changed + int(np.ceil(h / k)) - 1
+    assert np.flatnonzero(is_open[0]).tolist() == list(range(opening, closing))
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 7, 8])

@@ -104,6 +104,21 @@ def test_cusum_in_sql_equals_the_chart(con, frames):
     assert chart["cusum_down"].max() > 10
 
 
+def test_a_return_closes_the_alarm_in_sql_as_in_the_chart(settings):
+    """Weekly campaigns: 3 % for 40 weeks, then back. The alarm used to last twice as long as the change itself."""
+    fleet = Fleet(turnouts=2, weeks=150, phi=0.2)
+    which = np.isin(np.arange(16), (2, 11)).reshape(2, 8)
+    charts = evaluate(modes(fleet, 21, step(fleet, which, -3.0, 70) + step(fleet, which, 3.0, 110)), None, settings)
+    frames = {"charts": chart_rows(charts), "baselines": baseline_rows(charts, settings)}
+    for row in np.flatnonzero(which):
+        assert charts.down_open[row, 76:110].all() and not charts.down_open[row, 122:].any()
+    with connect_views(frames, "2018-12-01", rounded=False) as connection:
+        found = plain(connection.execute("select * from cusum(timestamp '2016-01-01')").df())
+    chart = plain(frames["charts"])
+    assert len(found) == len(chart)
+    assert np.abs(found[["cusum_down", "cusum_up"]] - chart[["cusum_down", "cusum_up"]]).max(axis=None) < 1e-8
+
+
 def test_the_sums_since_a_date_are_those_of_the_whole_epoch(con, frames):
     chart = plain(frames["charts"])
     since = chart["measured_at_utc"].quantile(0.9)

@@ -1,7 +1,8 @@
 -- One row per chart and campaign since a date: the sums that the alarms rest on, recomputed from z from the start of
 -- the epoch on.
--- S = P - min(0, min P), P the running sum of the steps within an epoch. A campaign with |z| beyond the smaller of
--- outlier_limit and single_share * h + k is held: it counts only if the next one is beyond it on the same side.
+-- S = S + gain within an epoch, 0 where that is not above max(0, H - h), H the highest S since it was 0.
+-- A campaign with |z| beyond the smaller of outlier_limit and single_share * h + k is held: it counts only if the next
+-- one is beyond it on the same side.
 -- k and h NULL: those of the chart. Other values ask "what if"; state stays that of the chart with its own.
 create or replace macro cusum(since, k := null, h := null) as table
 with steps as (
@@ -55,25 +56,36 @@ gains as (
         end as gain_up
     from neighbours
 ),
-running as (
-    select *, sum(gain_down) over history as p_down, sum(gain_up) over history as p_up
+chart_gains as (
+    select
+        turnout_id, section_id, band, source, epoch, threshold_down, threshold_up,
+        list(struct_pack(measured_at_utc := measured_at_utc, z := z, state := state) order by measured_at_utc) as campaigns,
+        list([[gain_down]] order by measured_at_utc) as gains_down,
+        list([[gain_up]] order by measured_at_utc) as gains_up
     from gains
-    window history as (
-        partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
-        rows between unbounded preceding and current row
-    )
+    group by all
 ),
+-- [S, H] before the first campaign and after every campaign
+paths as (
+    select
+        *,
+        list_reduce(gains_down, lambda path, gain: list_append(path,
+            case when path[-1][1] + gain[1][1] > greatest(0, path[-1][2] - threshold_down)
+            then [path[-1][1] + gain[1][1], greatest(path[-1][1] + gain[1][1], path[-1][2])] else [0, 0] end
+        ), [[0.0::double, 0.0::double]]) as path_down,
+        list_reduce(gains_up, lambda path, gain: list_append(path,
+            case when path[-1][1] + gain[1][1] > greatest(0, path[-1][2] - threshold_up)
+            then [path[-1][1] + gain[1][1], greatest(path[-1][1] + gain[1][1], path[-1][2])] else [0, 0] end
+        ), [[0.0::double, 0.0::double]]) as path_up
+    from chart_gains
+),
+numbered as (select *, unnest(range(1, len(campaigns) + 1)) as n from paths),
 sums as (
     select
-        turnout_id, section_id, band, source, measured_at_utc, epoch, z,
-        p_down - least(0, min(p_down) over history) as cusum_down,
-        p_up - least(0, min(p_up) over history) as cusum_up,
-        threshold_down, threshold_up, state
-    from running
-    window history as (
-        partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
-        rows between unbounded preceding and current row
-    )
+        turnout_id, section_id, band, source, campaigns[n].measured_at_utc as measured_at_utc, epoch,
+        campaigns[n].z as z, path_down[n + 1][1] as cusum_down, path_up[n + 1][1] as cusum_up,
+        threshold_down, threshold_up, campaigns[n].state as state
+    from numbered
 )
 select * from sums where measured_at_utc >= since;
 
