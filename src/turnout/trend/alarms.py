@@ -68,7 +68,8 @@ WITHOUT_LIMIT: dict[str, Any] = {
 class Flag:
     """What is needed to describe one chart: the values of its present epoch and its CUSUM over the threshold.
 
-    ``time`` [d] and ``values`` [%] are (n,) arrays; ``autocorrelation`` is their lag-one coefficient. ``temperature``
+    ``time`` [d] and ``values`` [%] are (n,) arrays. Of a chart in alarm they lack the campaigns of alarms that have
+    closed, and the change came after ``not_before`` [d], the last of those. ``autocorrelation`` is their lag-one coefficient. ``temperature``
     (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``. ``ratio`` (CUSUM over threshold)
     and ``opening_campaign`` (the campaign that raised each open alarm) are by direction. ``pair`` holds both resonances
     of the section, None where only one has a chart.
@@ -82,6 +83,12 @@ class Flag:
     ratio: dict[str, float]
     opening_campaign: dict[str, int]
     pair: ResonancePair | None = None
+    not_before: float = -np.inf
+
+    @property
+    def direction(self) -> str | None:
+        """That of the alarm, of the later one where two are open; None without an alarm."""
+        return max(self.opening_campaign, key=lambda name: self.opening_campaign[name], default=None)
 
 
 def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) -> dict[int, Flag]:
@@ -115,8 +122,10 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
         alarms = {d: getattr(charts, f"{d}_open")[i] for d in ("down", "up")}
         opening_campaign = {d: _opening_campaign(alarm) for d, alarm in alarms.items() if alarm[-1]}
-        if len(opening_campaign) == 2:  # describe the later alarm, relative to the level after the earlier one
-            column = column[column >= min(opening_campaign.values())]
+        not_before = -np.inf
+        if opening_campaign and (passed := np.flatnonzero(_closed_alarms(charts, int(i)))).size:
+            not_before = float(p.time[i, passed[-1]])
+            column = np.setdiff1d(column, passed)
         temperature, slope_weight = _temperatures(charts, int(i), column)
         flags[int(i)] = Flag(
             p.time[i, column],
@@ -127,8 +136,25 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
             ratio,
             opening_campaign,
             resonance_pair(charts, int(i), numbers),
+            not_before,
         )
     return flags
+
+
+def _closed_alarms(charts: Charts, i: int) -> np.ndarray:
+    """Campaigns of the present epoch from the onset of each closed alarm to its highest sum, (n_campaign,) bool.
+
+    They have a level of their own, from which the chart has returned.
+    """
+    inside = np.zeros(charts.residual.shape[1], dtype=bool)
+    for direction in ("down", "up"):
+        is_open = getattr(charts, f"{direction}_open")[i]
+        edge = np.flatnonzero(np.diff(is_open.astype(np.int8), prepend=0))
+        for opening, closing in zip(edge[::2], edge[1::2]):
+            highest = opening + int(np.argmax(getattr(charts, direction)[i, opening:closing]))
+            inside[getattr(charts, f"{direction}_began")[i, opening] + 1 : highest + 1] = True
+    epoch = charts.prepared.epoch[i]
+    return inside & (epoch == epoch[-1])
 
 
 def _opening_campaign(alarm: np.ndarray) -> int:
@@ -176,7 +202,15 @@ def describe_flagged(status: pd.DataFrame, flags: Mapping[int, Flag], settings: 
     status["drift_q"] = adjusted_p_values(np.where(is_tested, status["drift_p"].to_numpy(), np.nan))
     flagged = ((status["state"] == "alarm") | (status["drift_q"] <= settings.false_discovery)).to_numpy()
     changes = {
-        i: find_change(flag.time, flag.values, flag.autocorrelation, flag.temperature, flag.slope_weight)
+        i: find_change(
+            flag.time,
+            flag.values,
+            flag.autocorrelation,
+            flag.temperature,
+            flag.slope_weight,
+            direction=flag.direction,
+            not_before=flag.not_before,
+        )
         for i, flag in flags.items()
         if flagged[i]
     }
@@ -217,13 +251,11 @@ def _describe_chart(flag: Flag, change: Change, of_section: Change, settings: Tr
     """Columns that describe one flagged chart. The change point is sought in its present epoch only."""
     time, values = flag.time, flag.values
     at = int(np.searchsorted(time, change.since)) if np.isfinite(change.since) else 0
-    if flag.opening_campaign:
-        direction = max(flag.opening_campaign, key=lambda name: flag.opening_campaign[name])
-    else:
-        direction = "down" if values[-N_RECENT:].mean() < values.mean() else "up"
-    outlook = forecast(time[at:], values[at:], flag.autocorrelation, settings)
+    newest = int(np.searchsorted(time, change.course[-1][1])) if change.course else 0  # first value after all changes
+    direction = flag.direction or ("down" if values[-N_RECENT:].mean() < values.mean() else "up")
+    outlook = forecast(time[newest:], values[newest:], flag.autocorrelation, settings)
     now = time[-1] if len(time) else np.nan
-    stiffness = stiffness_change(flag.pair, of_section.shape, of_section.since)
+    stiffness = stiffness_change(flag.pair, of_section.course)
     sizes = {
         f"{component}_stiffness{end}_pct": value
         for component in COMPONENTS

@@ -1,4 +1,4 @@
-"""Estimate when a flagged chart changed and by how much, as a step or as a drift."""
+"""Estimate when a flagged chart changed and by how much: one change or two, each a step or a drift."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from turnout.constants import DAYS_PER_YEAR
+from turnout.trend.change_pairs import SHAPES, Pairs, find_pairs
 from turnout.trend.forecast import step_autocorrelation
 from turnout.trend.roots import find_root
 
@@ -17,16 +18,20 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+N_PARTS = 400  # parts that stand for all pairs of changes: the probability of a quantile is known to 1 / 400
+MIN_SHARE = 0.25  # of the present change: a smaller first change is not its onset
 MIN_VALUES = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change: ``shape`` is "step" or "drift", the more probable one; times in days.
+    """What changed since when: ``shape`` is "step" or "drift", the more probable one; times in days.
 
     ``size`` is the change at the newest campaign, ``low`` and ``high`` its interval [%]. ``since`` is the median onset
-    under that shape, ``earliest`` and ``latest`` its interval. The intervals average over both shapes, each with its
-    probability, so a wrong choice of the shape does not narrow them.
+    under that shape, ``earliest`` and ``latest`` its interval; of two changes it is the onset of the first in the
+    direction that is asked for. The intervals average over one and two changes and their shapes, each with its
+    probability, so a wrong choice does not narrow them. ``course`` is the shape and the onset of each change: one, or
+    two where that is more probable.
     """
 
     shape: str
@@ -37,6 +42,7 @@ class Change:
     low: float
     high: float
     drift_probability: float
+    course: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,7 @@ def fit_onsets(
     pieces: int = 4,
     temperature: np.ndarray | None = None,
     slope_weight: float = 0.0,
+    not_before: float = -np.inf,
 ) -> dict[str, Fits]:
     r"""Fit a level and a change for every onset, by generalised least squares with AR(1) errors.
 
@@ -86,6 +93,8 @@ def fit_onsets(
     slope_weight : float
         Squared ratio of the scatter to the error of the slope, if the slope was fitted to other values; 0 if it was
         fitted to these.
+    not_before : float
+        Time before which no onset lies. [d]
 
     Returns
     -------
@@ -112,9 +121,12 @@ def fit_onsets(
     after = np.append(t[1:], 0.0)
     terms = (one, t * one, y, t * y, diagonal + 2 * off_diagonal, t * diagonal + off_diagonal * (t + after))
     sums = [np.cumsum(v[::-1])[::-1] for v in (*terms, t * t * diagonal + 2 * off_diagonal * t * after)]
-    i = np.repeat(np.arange(2, t.size), pieces)
-    width = (t[i] - t[i - 1]) / pieces
-    onset = t[i - 1] + (np.tile(np.arange(pieces), t.size - 2) + 0.5) * width
+    gaps = np.arange(2, t.size)
+    gaps = gaps[time[2:] > not_before] if time[-1] > not_before else gaps
+    i = np.repeat(gaps, pieces)
+    start = np.maximum(t[i - 1], (min(not_before, time[-1]) - time[-1]) / DAYS_PER_YEAR)
+    width = (t[i] - start) / pieces
+    onset = start + (np.tile(np.arange(pieces), gaps.size) + 0.5) * width
     one_0, one_1, y_0, y_1, self_0, self_1, self_2 = (s[i] for s in sums)
     total, total_y = one.sum(), y.sum()
     rss_total = max(float(values @ y) - total_y**2 / total, 0.0)
@@ -165,8 +177,10 @@ def find_change(
     temperature: np.ndarray | None = None,
     slope_weight: float = 0.0,
     level: float = 0.95,
+    direction: str | None = None,
+    not_before: float = -np.inf,
 ) -> Change:
-    r"""Onset and size of one change, averaged over its shape and its onset.
+    r"""Onset and size of the present change, averaged over one and two changes, their shapes and their onsets.
 
     The prior is uniform over step and drift, over the onset and over the size; the scatter is unknown. Then an onset
     of one shape has the posterior probability
@@ -174,8 +188,8 @@ def find_change(
     .. math:: p \propto \Delta\tau\ w_\tau^{-1/2}\ RSS_\tau^{-\nu/2}
 
     with :math:`\nu` = number of values less level, size and temperature slope. Given the onset, the size has a Student
-    t distribution about its least-squares value with :math:`\nu - 1` degrees of freedom (one for the onset). Intervals
-    are the central ones of the mixture.
+    t distribution about its least-squares value with :math:`\nu - 1` degrees of freedom (one for the onset), of two
+    changes :math:`\nu - 3`. Intervals are the central ones of the mixture. ``find_pairs`` gives the pairs of changes.
 
     Parameters
     ----------
@@ -191,6 +205,10 @@ def find_change(
         Weight of the temperature slope, see ``fit_onsets``.
     level : float
         Probability of the intervals.
+    direction : str or None
+        "down" or "up": of two changes, the onset is that of the first in this direction; None: in that of their sum.
+    not_before : float
+        Time before which no onset lies. [d]
 
     Returns
     -------
@@ -214,22 +232,61 @@ def find_change(
     if n < MIN_VALUES or np.ptp(values) == 0.0:
         return Change("step", *(float("nan"),) * 6, 0.5)
     slope = temperature is not None and n > MIN_VALUES and np.ptp(temperature) > 0.0
-    fits_by_shape = fit_onsets(
-        time, values, autocorrelation, 4 if n < 150 else 2, temperature if slope else None, slope_weight
-    )
+    law = (temperature if slope else None, slope_weight)
+    pieces = 4 if n < 150 else 2
+    fits = fit_onsets(time, values, autocorrelation, pieces, *law, not_before)
     freedom = n - 2 - (slope and slope_weight == 0.0)
-    log_p = [np.log(f.width) - 0.5 * np.log(f.weight) - 0.5 * freedom * np.log(f.rss) for f in fits_by_shape.values()]
-    p = np.exp(np.concatenate(log_p) - max(v.max() for v in log_p))
-    p = np.split(p / p.sum(), 2)
-    step, drift = fits_by_shape["step"], fits_by_shape["drift"]
-    shape = "drift" if p[1].sum() > 0.5 else "step"
+    log_p = np.concatenate(
+        [np.log(f.width) - 0.5 * np.log(f.weight) - 0.5 * freedom * np.log(f.rss) for f in fits.values()]
+    )
+    p = np.exp(log_p - log_p.max())
+    paired = fit_onsets(time, values, autocorrelation, 1, *law, not_before)
+    pairs = find_pairs(time, values, autocorrelation, paired, freedom, *law)
+    share = 0.0 if pairs is None else float(pairs.probability.sum())
+    p *= (1.0 - share) / p.sum()
+    parts = [_SizeParts.of_one(fits, p, freedom - 1)]
+    course: tuple[tuple[str, float], ...] = ()
+    present = p  # probability of each shape and onset of the present change
+    if pairs is not None:
+        parts.append(_SizeParts.of_two(pairs, freedom - 3))
+        count = 2 * paired["step"].onset.size
+        of_pairs = np.bincount(_present_change(pairs, direction), pairs.probability, minlength=count)
+        present = p + np.repeat(of_pairs / pieces, pieces)
+        if share > 0.5:
+            course = _course_of(pairs, paired["step"].onset)
+    step, drift = np.split(present, 2)
+    shape = SHAPES[int(drift.sum() > 0.5)]
     tail = 0.5 * (1.0 - level)
-    first, last = _quantiles(step, p[0] + p[1], (tail, 1.0 - tail))
-    since = _quantiles(fits_by_shape[shape], p[shape == "drift"], (0.5,))[0]
-    joined = Fits(*(np.concatenate(pair) for pair in zip(vars(step).values(), vars(drift).values())))
-    low, middle, high = _sizes(joined, np.concatenate(p), freedom - 1, (tail, 0.5, 1.0 - tail))
-    since, first, last = (float(time[-1] + DAYS_PER_YEAR * x) for x in (min(max(since, first), last), first, last))
-    return Change(shape, since, first, last, middle, low, high, float(p[1].sum()))
+    first, last = _quantiles(fits["step"], step + drift, (tail, 1.0 - tail))
+    since = _quantiles(fits["step"], drift if shape == "drift" else step, (0.5,))[0]
+    since = min(max(since, first), last)
+    course = course or ((shape, since),)
+    low, middle, high = _sizes(parts, (tail, 0.5, 1.0 - tail))
+
+    def day(years: float) -> float:
+        return float(time[-1] + DAYS_PER_YEAR * years)
+
+    return Change(
+        shape, day(since), day(first), day(last), middle, low, high, float(drift.sum()),
+        tuple((name, day(years)) for name, years in course),
+    )  # fmt: skip
+
+
+def _course_of(pairs: Pairs, onset: np.ndarray) -> tuple[tuple[str, float], ...]:
+    """Shape and onset [a, relative to the newest value] of both changes of the most probable pair."""
+    best = int(np.argmax(pairs.probability))
+    columns = int(pairs.first[best]), int(pairs.second[best])
+    return tuple((SHAPES[c // onset.size], float(onset[c % onset.size])) for c in columns)
+
+
+def _present_change(pairs: Pairs, direction: str | None) -> np.ndarray:
+    """Column of the first change of each pair in the direction, that of their sum where none is given.
+
+    A first change smaller than ``MIN_SHARE`` of the sum does not count.
+    """
+    total = pairs.sizes.sum(axis=0)
+    sign = np.sign(total) if direction is None else {"down": -1.0, "up": 1.0}[direction]
+    return np.where(pairs.sizes[0] * sign >= MIN_SHARE * np.abs(total), pairs.first, pairs.second)
 
 
 def _quantiles(fit: Fits, weight: np.ndarray, levels: Sequence[float]) -> list[float]:
@@ -239,17 +296,46 @@ def _quantiles(fit: Fits, weight: np.ndarray, levels: Sequence[float]) -> list[f
     return [float(np.interp(q, running, edges)) for q in levels]
 
 
-def _sizes(fit: Fits, p: np.ndarray, freedom: int, levels: Sequence[float]) -> list[float]:
-    """Quantiles of a mixture of Student t distributions; components below 1e-6 of the largest weight are left out."""
-    use = p > 1e-6 * p.max()
-    p, size = p[use] / p[use].sum(), fit.size[use]
-    scale = np.sqrt(fit.rss[use] / freedom / fit.weight[use])
-    half_range = 1e3 * scale.max() + np.ptp(size)
+@dataclass(frozen=True)
+class _SizeParts:
+    """Student t distributions of the size with their probabilities ``p``: (n,) arrays, and their ``freedom``."""
+
+    p: np.ndarray
+    size: np.ndarray
+    scale: np.ndarray
+    freedom: int
+
+    @classmethod
+    def of_one(cls, fits: dict[str, Fits], p: np.ndarray, freedom: int) -> _SizeParts:
+        """Of one change; parts below 1e-6 of the largest probability are left out."""
+        joined = Fits(*(np.concatenate(pair) for pair in zip(*(vars(f).values() for f in fits.values()))))
+        use = p > 1e-6 * p.max()  # none where one change is impossible
+        scale = np.sqrt(joined.rss[use] / freedom / joined.weight[use])
+        return cls(p[use], joined.size[use], scale, freedom)
+
+    @classmethod
+    def of_two(cls, pairs: Pairs, freedom: int) -> _SizeParts:
+        """Of the sums of two changes: ``N_PARTS`` parts of equal probability stand for all pairs, ordered by size."""
+        size = pairs.sizes.sum(axis=0)
+        order = np.argsort(size)
+        running = np.cumsum(pairs.probability[order])
+        use = order[np.searchsorted(running, (np.arange(N_PARTS) + 0.5) / N_PARTS * running[-1])]
+        scale = np.sqrt(pairs.rss[use] / freedom * pairs.variance[use])
+        return cls(np.full(N_PARTS, running[-1] / N_PARTS), size[use], scale, freedom)
+
+
+def _sizes(mixture: Sequence[_SizeParts], levels: Sequence[float]) -> list[float]:
+    """Quantiles of a mixture of Student t distributions."""
+    parts = [part for part in mixture if part.size.size]
+    total = sum(float(part.p.sum()) for part in parts)
+    low, high = min(float(part.size.min()) for part in parts), max(float(part.size.max()) for part in parts)
+    half_range = 1e3 * max(float(part.scale.max()) for part in parts) + high - low
 
     def quantile(q: float) -> float:
         def shortfall(x: float) -> float:
-            return float(np.sum(p * stdtr(freedom, (x - size) / scale))) - q
+            below = sum(float(np.sum(part.p * stdtr(part.freedom, (x - part.size) / part.scale))) for part in parts)
+            return below / total - q
 
-        return find_root(shortfall, size.min() - half_range, size.max() + half_range, 1e-9 * half_range)
+        return find_root(shortfall, low - half_range, high + half_range, 1e-9 * half_range)
 
     return [quantile(q) for q in levels]

@@ -182,10 +182,10 @@ def _mean_frequency(charts: Charts, chart: int) -> float:
     return float(np.mean(frequency[np.isfinite(frequency)])) if np.isfinite(frequency).any() else float("nan")
 
 
-def stiffness_change(pair: ResonancePair | None, shape: str, since: float) -> StiffnessChange:
+def stiffness_change(pair: ResonancePair | None, course: tuple[tuple[str, float], ...]) -> StiffnessChange:
     r"""Component that changed, with the size of its change.
 
-    Both resonances are fitted with one change of the given shape and onset. A component alone is rejected where the
+    Both resonances are fitted with changes of the given shapes and onsets, and their sums are compared. A component alone is rejected where the
     changes are too far from its line for every coupling within the limits,
 
     .. math:: \chi^2 = \min_\alpha \frac{(\alpha x_1 - (1 - \alpha) x_2)^2}{\alpha^2 v_1 + (1 - \alpha)^2 v_2}
@@ -197,10 +197,8 @@ def stiffness_change(pair: ResonancePair | None, shape: str, since: float) -> St
     ----------
     pair : ResonancePair or None
         Both resonances; None gives "either".
-    shape : str
-        "step" or "drift".
-    since : float
-        Onset. [d]
+    course : tuple of (str, float)
+        "step" or "drift", and the onset [d], of each change; empty gives "either".
 
     Returns
     -------
@@ -208,9 +206,9 @@ def stiffness_change(pair: ResonancePair | None, shape: str, since: float) -> St
         The component and both changes.
     """
     unknown = (float("nan"),) * 3
-    if pair is None or not np.isfinite(since):
+    if pair is None or not course:
         return StiffnessChange("either", unknown, unknown)
-    x, variance = np.array([_log_change(pair, band, shape, since) for band in BANDS]).T
+    x, variance = np.array([_log_change(pair, band, course) for band in BANDS]).T
     if not (np.isfinite(x).all() and np.isfinite(variance).all()):
         return StiffnessChange("either", unknown, unknown)
     return judged_change(x, variance, pair.coupling)
@@ -280,30 +278,31 @@ def _extremes(changes: list[tuple[float, float]]) -> tuple[float, float, float]:
     return (100.0 * math.expm1(mean), 100.0 * math.expm1(low), 100.0 * math.expm1(high))
 
 
-def _log_change(pair: ResonancePair, band: str, shape: str, since: float) -> tuple[float, float]:
-    """Change of the logarithm of a resonance, and its variance; nan where it has no value before or after it.
+def _log_change(pair: ResonancePair, band: str, course: tuple[tuple[str, float], ...]) -> tuple[float, float]:
+    """Change of the logarithm of a resonance, and its variance; nan where its values do not determine the changes.
 
     A value further than ``MAX_DEVIATION`` errors from the fit is left out, the furthest first: it may be another mode.
     """
     newest = max((float(t[-1]) for t in pair.time.values() if t.size), default=0.0)
     time, values, error = pair.time[band], pair.values[band], pair.error[band]
     while True:
-        after = time >= since
-        if not after.any() or after.all():
+        columns = [_change_course(time, newest, shape, since) for shape, since in course]
+        design = np.column_stack([np.ones(time.size), *columns]) / error[:, None]
+        if np.linalg.matrix_rank(design) < design.shape[1]:
             return float("nan"), float("nan")
-        change = after.astype(float)
-        if shape == "drift":
-            change = np.maximum(time - since, 0.0) / max(newest - since, 1e-9)
-        weight = 1.0 / error**2
-        centred = change - np.average(change, weights=weight)
-        precision = float(np.sum(weight * centred**2))
-        if not precision > 0.0:
-            return float("nan"), float("nan")
-        size = float(np.sum(weight * centred * values)) / precision
-        deviation = np.abs(values - np.average(values, weights=weight) - size * centred) / error
+        covariance = np.linalg.inv(design.T @ design)
+        coefficient = covariance @ (design.T @ (values / error))
+        deviation = np.abs(values / error - design @ coefficient)
         furthest = int(np.argmax(deviation))
         if deviation[furthest] <= MAX_DEVIATION:
             break
         time, values, error = (np.delete(part, furthest) for part in (time, values, error))
-    factor = max(1.0 + size / 100.0, 1e-3)
-    return float(np.log(factor)), 1e-4 / (factor**2 * precision)
+    factor = max(1.0 + float(coefficient[1:].sum()) / 100.0, 1e-3)
+    return float(np.log(factor)), 1e-4 * float(covariance[1:, 1:].sum()) / factor**2
+
+
+def _change_course(time: np.ndarray, newest: float, shape: str, since: float) -> np.ndarray:
+    """Course of one change at every time, 1 at the newest."""
+    if shape == "drift":
+        return np.maximum(time - since, 0.0) / max(newest - since, 1e-9)
+    return (time >= since).astype(float)

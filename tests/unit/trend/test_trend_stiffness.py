@@ -88,11 +88,11 @@ def test_one_campaign_of_another_mode_does_not_name_its_component():
     values["railpad"][23] += 28.0
     error = {band: np.full(25, 0.5) for band in values}
     pair = ResonancePair({band: time for band in values}, values, error, coupling_limits(4.0))
-    found = stiffness_change(pair, "step", since)
+    found = stiffness_change(pair, (("step", since),))
     assert found.component == "ballast" and found.ballast[1] < 100.0 * (0.94**2 - 1.0) < found.ballast[2]
     error["railpad"][:] = 20.0
-    assert stiffness_change(pair, "step", since).component == "ballast"
-    assert stiffness_change(None, "step", since).component == "either"
+    assert stiffness_change(pair, (("step", since),)).component == "ballast"
+    assert stiffness_change(None, (("step", since),)).component == "either"
 
 
 def test_softer_ballast_lists_no_inspection_of_the_railpads(settings):
