@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import date as day
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
@@ -38,12 +39,13 @@ def read_campaigns(path: Path, name: str) -> tuple[dict[str, Campaign], list[Rea
     Returns
     -------
     tuple of (dict of str to Campaign, list of ReadError)
-        Campaigns by date, their temperature None if its cell is empty; and an error for each row that cannot be used.
+        Campaigns by date, their temperature None if its cell is empty; and an error for each row and cell that cannot
+        be used. Of a row with a valid day, the other cells count.
     """
     campaigns: dict[str, Campaign] = {}
 
-    def add_campaign(cells: Cells) -> None:
-        campaign = _campaign(cells)
+    def add_campaign(cells: Cells, faults: _Faults) -> None:
+        campaign = _campaign(cells, faults)
         if campaign.date in campaigns:
             raise _CellError("campaign", f"campaign {campaign.date} for the second time", "Keep one of them")
         campaigns[campaign.date] = campaign
@@ -92,20 +94,23 @@ def read_trains(path: Path, name: str) -> tuple[tuple[dict[str, str], ...], list
     Returns
     -------
     tuple of (tuple of dict of str to str, list of ReadError)
-        Rows as text in the order of the file, and an error for each row that cannot be used.
+        Rows as text in the order of the file, and an error for each row and cell that cannot be used. Of a row with a
+        valid time, the other cells count.
     """
     trains: list[Cells] = []
     passed: set[tuple[datetime, str]] = set()
 
-    def add_train(cells: Cells) -> None:
+    def add_train(cells: Cells, faults: _Faults) -> None:
         text = cells["passed_at_utc"]
         if problem := time_problem(text):
             raise _CellError("passed_at_utc", f"passed_at_utc is {text!r}{problem[0]}", problem[1])
-        for column, (low, high) in TRAIN_RANGES.items():
-            _in_range(cells.get(column, ""), column, low, high)
-        if (track := cells.get("track", "")) not in ("", "main", "diverging"):
-            raise _CellError("track", f"track is {track!r}", "Write main or diverging, or nothing")
-        key = (parse_utc(text), track)
+        for column in (c for c in TRAIN_RANGES if c in cells):
+            if faults.optional(_in_range, cells[column], column, *TRAIN_RANGES[column]) is None:
+                cells[column] = ""
+        if cells.get("track", "") not in ("", "main", "diverging"):
+            faults.append(_CellError("track", f"track is {cells['track']!r}", "Write main or diverging, or nothing"))
+            cells["track"] = ""
+        key = (parse_utc(text), cells.get("track", ""))
         if key in passed:  # of two rows nothing says which one is right
             raise _CellError("passed_at_utc", f"a train at {text} for the second time", "Keep one of them")
         passed.add(key)
@@ -158,15 +163,27 @@ class _CellError(Exception):
     """A cell that cannot be used: (column, problem, remedy)."""
 
 
+class _Faults(list[_CellError]):
+    """Cells of one row that count as empty."""
+
+    def optional(self, read: Callable, *args: Any) -> Any:
+        """What ``read`` returns; None if its cell cannot be used."""
+        try:
+            return read(*args)
+        except _CellError as fault:
+            self.append(fault)
+            return None
+
+
 def _read_rows(
     path: Path,
     name: str,
     titles: tuple[str, ...],
     n_required: int,
-    add_row: Callable[[Cells], None],
+    add_row: Callable[[Cells, _Faults], None],
     allow_others: bool = False,
 ) -> list[ReadError]:
-    """Call ``add_row`` with every row; return the errors of the header and of the rows that cannot be used."""
+    """Call ``add_row`` with every row; return the errors of the header, and of the rows and cells that cannot be used."""
     try:
         table = read_csv(path, name, titles, n_required, allow_others)
     except (FileNotFoundError, NotADirectoryError):
@@ -175,15 +192,17 @@ def _read_rows(
         return [_error(fault.place, fault.problem, fault.remedy, fault.reason)]
     errors = [_error(fault.place, fault.problem, fault.remedy) for fault in table.faults]
     for line, cells in table.rows:
+        faults = _Faults()
         try:
             if line_problem := row_problem(cells):
                 raise _CellError(*line_problem)
             for column in NUMBER_COLUMNS:  # where a comma separates no cells, it is a decimal mark
                 if cells.separator != "," and DECIMAL_COMMA.fullmatch(cells.get(column, "")):
                     cells[column] = cells[column].replace(",", ".")
-            add_row(cells)
+            add_row(cells, faults)
         except _CellError as cell_error:
-            column, problem, remedy = cell_error.args
+            faults.append(cell_error)
+        for column, problem, remedy in (fault.args for fault in faults):
             errors.append(_error(cells.place(name, line, column), problem, remedy))
     return errors
 
@@ -192,20 +211,26 @@ def _error(place: Place, problem: str, remedy: str, reason: str = "unreadable") 
     return ReadError(place.path, str(place), problem, remedy, reason)
 
 
-def _campaign(cells: Mapping) -> Campaign:
+def _campaign(cells: Mapping, faults: _Faults) -> Campaign:
+    """The campaign of a row; without a valid start it starts at noon, as one that is not listed."""
     if wrong_day := day_problem(cells["campaign"]):
         raise _CellError("campaign", f"campaign is {cells['campaign']!r}{wrong_day[0]}", wrong_day[1])
     date = day.fromisoformat(cells["campaign"]).isoformat()
-    text = cells["started_at_utc"]
+    start = faults.optional(_start, cells["started_at_utc"], date) or unlisted_campaign(date).started_at
+    details = {k: cells.get(k, "") for k in ("hammer_id", "tip", "operator")}
+    noted = cells.get("rail_temperature_c", "")
+    temperature = faults.optional(_in_range, noted, "rail_temperature_c", -50, 80)
+    return Campaign(date, start, temperature, **details)
+
+
+def _start(text: str, date: str) -> datetime:
     if time_error := time_problem(text):
         raise _CellError("started_at_utc", f"started_at_utc is {text!r}{time_error[0]}", time_error[1])
     start = parse_utc(text)
     if abs((start - datetime.fromisoformat(date)).total_seconds()) > 2 * 86400:
         problem = f"started_at_utc {text!r} is not on the campaign's day {date}"
         raise _CellError("started_at_utc", problem, "Correct the one or the other")
-    details = {k: cells.get(k, "") for k in ("hammer_id", "tip", "operator")}
-    temperature = _in_range(cells.get("rail_temperature_c", ""), "rail_temperature_c", -50, 80)
-    return Campaign(date, start, temperature, **details)
+    return start
 
 
 def _in_range(text: str, column: str, low: float, high: float) -> float | None:

@@ -506,8 +506,21 @@ def test_a_wrong_campaign_is_reported_with_column_value_and_remedy(tmp_path, row
     path = tmp_path / "campaigns.csv"
     path.write_text(f"campaign,started_at_utc,rail_temperature_c\n2025-01-03,2025-01-03T10:00,\n{row}\n", "utf-8")
     campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
-    assert list(campaigns) == ["2025-01-03"] and len(errors) == 1
+    assert list(campaigns) == ["2025-01-03", *["2025-01-10"] * (column > 1)] and len(errors) == 1
     assert f"t1/campaigns.csv, line 3, column {column}: " in str(errors[0]) and found in str(errors[0])
+
+
+def test_a_cell_of_a_campaign_that_cannot_be_used_counts_as_empty_and_the_others_count(tmp_path):
+    path = tmp_path / "campaigns.csv"
+    rows = "2025-01-10,2025-01-10T10:00,warm,H2,soft,AB\n2025-01-11,ten,3.5,H2,,\n2025-01-12,eleven,cold,H3,,\n"
+    path.write_text(f"campaign,started_at_utc,rail_temperature_c,hammer_id,tip,operator\n{rows}")
+    campaigns, errors = read_campaigns(path, "t1/campaigns.csv")
+    assert [(c.started_at.hour, c.rail_temperature, c.hammer_id) for c in campaigns.values()] == [
+        (10, None, "H2"), (12, 3.5, "H2"), (12, None, "H3")
+    ]  # fmt: skip
+    assert (campaigns["2025-01-10"].tip, campaigns["2025-01-10"].operator) == ("soft", "AB")
+    places = [str(error).split(": ")[0] for error in errors]
+    assert places == [f"t1/campaigns.csv, line {n}, column {c}" for n, c in ((2, 29), (3, 12), (4, 12), (4, 19))]
 
 
 @pytest.mark.parametrize(
