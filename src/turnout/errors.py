@@ -169,8 +169,15 @@ def is_infrastructure(error: BaseException) -> bool:
     return isinstance(error, MemoryError)
 
 
+DISK_REMEDIES = {
+    errno.ENOSPC: "Free space on its disk",
+    errno.EDQUOT: "Free space on its disk, or ask for a larger quota",
+    errno.EROFS: "Mount its disk for writing",
+}
+
+
 def remedy_of_access(error: OSError, otherwise: str) -> str:
-    """What to do about a file or folder that cannot be opened; ``otherwise`` if the name itself is the cause.
+    """What to do about a file or folder that cannot be opened or written; ``otherwise`` if the name is the cause.
 
     A sound file is never to be removed: without permission, or on a disk that fails, it only cannot be opened.
 
@@ -190,6 +197,8 @@ def remedy_of_access(error: OSError, otherwise: str) -> str:
     --------
     >>> remedy_of_access(PermissionError(errno.EACCES, ""), "Remove it")
     'Correct its permissions'
+    >>> remedy_of_access(OSError(errno.ENOSPC, ""), "Remove it")
+    'Free space on its disk'
     >>> remedy_of_access(OSError(errno.EIO, ""), "Remove it")
     'Check the disk or the network that holds it'
     >>> remedy_of_access(IsADirectoryError(errno.EISDIR, ""), "Remove it")
@@ -197,6 +206,8 @@ def remedy_of_access(error: OSError, otherwise: str) -> str:
     """
     if isinstance(error, PermissionError):
         return "Correct its permissions"
+    if error.errno in DISK_REMEDIES:
+        return DISK_REMEDIES[error.errno]
     return "Check the disk or the network that holds it" if is_infrastructure(error) else otherwise
 
 

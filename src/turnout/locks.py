@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from filelock import FileLock, Timeout
 
-from turnout.errors import TurnoutError
+from turnout.errors import TurnoutError, remedy_of_access
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +50,8 @@ def folder_lock(
         ) from None
     except OSError as error:
         raise error_type(
-            f"{folder}: cannot write there: {error.strerror or error}. Allow writing there, or use a copy of it."
+            f"{folder}: cannot write there: {error.strerror or error}. "
+            f"{remedy_of_access(error, 'Make a folder of it')}, or use a copy of it."
         ) from error
     try:
         yield

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from turnout import __version__
 from turnout.cli import COMMANDS, GROUPS
 from turnout.cli.options import add_common, leaf_parsers
-from turnout.errors import TurnoutError, installation_error
+from turnout.errors import TurnoutError, installation_error, remedy_of_access
 from turnout.threads import use_one_thread
 
 if TYPE_CHECKING:
@@ -272,7 +272,7 @@ def _message(error: TurnoutError | OSError, args: argparse.Namespace) -> str:
     name = error.filename or ", ".join(map(str, [paths] if isinstance(paths, str) else paths))
     name = name or "standard output, or a file without a name"
     where = f"{name}: {error.strerror}" if error.strerror else str(error)
-    return f"{where}. Correct this, or name another file or folder, then run again."
+    return f"{where}. {remedy_of_access(error, 'Correct this')}, or name another file or folder, then run again."
 
 
 def _run_for_json(args: argparse.Namespace) -> tuple[int, str]:

@@ -119,11 +119,13 @@ def _require_valid_project(options: Sequence[str]) -> None:
     from turnout.readers.formats import FORMATS
     from turnout.units import to_si
     from turnout.workflow.launch import launch
+    from turnout.workflow.output_places import require_writable_places
     from turnout.workflow.project import snakefile_options
 
     values = _config_options(options)
     table = Path(_configuration_folder(options)) / "turnouts.tsv"
     if table.exists():
+        require_writable_places()
         launch({name: values[name] for name in values if name != "functions"}, False, FORMATS, to_si)
     elif "configuration" in values or snakefile_options(Path()):  # else the own Snakefile may name another folder
         raise read_table(table, str(table))[1][0]

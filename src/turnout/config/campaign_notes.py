@@ -183,7 +183,7 @@ def _read_rows(
     add_row: Callable[[Cells, _Faults], None],
     allow_others: bool = False,
 ) -> list[ReadError]:
-    """Call ``add_row`` with every row; return the errors of the header, and of the rows and cells that cannot be used."""
+    """Call ``add_row`` with every row; return the errors of the header, of rows and of cells that cannot be used."""
     try:
         table = read_csv(path, name, titles, n_required, allow_others)
     except (FileNotFoundError, NotADirectoryError):

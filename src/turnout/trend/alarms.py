@@ -69,10 +69,10 @@ class Flag:
     """What is needed to describe one chart: the values of its present epoch and its CUSUM over the threshold.
 
     ``time`` [d] and ``values`` [%] are (n,) arrays. Of a chart in alarm they lack the campaigns of alarms that have
-    closed, and the change came after ``not_before`` [d], the last of those. ``autocorrelation`` is their lag-one coefficient. ``temperature``
-    (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``. ``ratio`` (CUSUM over threshold)
-    and ``opening_campaign`` (the campaign that raised each open alarm) are by direction. ``pair`` holds both resonances
-    of the section, None where only one has a chart.
+    closed, and the change came after ``not_before`` [d], the last of those. ``autocorrelation`` is the lag-one
+    coefficient. ``temperature`` (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``.
+    ``ratio`` (CUSUM over threshold) and ``opening_campaign`` (the campaign that raised each open alarm) are by
+    direction. ``pair`` holds both resonances of the section, None where only one has a chart.
     """
 
     time: np.ndarray

@@ -97,8 +97,8 @@ def find_pairs(
     with a step or a drift for each, as in ``fit_onsets``. One and two changes are equally probable before the values
     are seen, and so are all onsets within their duration D. The second size has the unit information prior, which gives
 
-    .. math:: p_{12} \propto \frac{\Delta\tau_1 \Delta\tau_2}{2 D^2}\, n^{-1/2} w_{\tau_1}^{-1/2} RSS_{12}^{-\nu/2} \quad\text{beside}\quad
-              p_1 \propto \frac{\Delta\tau_1}{2 D}\, w_{\tau_1}^{-1/2} RSS_1^{-\nu/2}
+    .. math:: p_{12} \propto \frac{\Delta\tau_1 \Delta\tau_2}{2 D^2}\, n^{-1/2} w_{\tau_1}^{-1/2} RSS_{12}^{-\nu/2},
+              \qquad p_1 \propto \frac{\Delta\tau_1}{2 D}\, w_{\tau_1}^{-1/2} RSS_1^{-\nu/2}
 
     Parameters
     ----------

@@ -185,8 +185,8 @@ def _mean_frequency(charts: Charts, chart: int) -> float:
 def stiffness_change(pair: ResonancePair | None, course: tuple[tuple[str, float], ...]) -> StiffnessChange:
     r"""Component that changed, with the size of its change.
 
-    Both resonances are fitted with changes of the given shapes and onsets, and their sums are compared. A component alone is rejected where the
-    changes are too far from its line for every coupling within the limits,
+    Both resonances are fitted with changes of the given shapes and onsets, and their sums are compared. A component
+    alone is rejected where the changes are too far from its line for every coupling within the limits,
 
     .. math:: \chi^2 = \min_\alpha \frac{(\alpha x_1 - (1 - \alpha) x_2)^2}{\alpha^2 v_1 + (1 - \alpha)^2 v_2}
 

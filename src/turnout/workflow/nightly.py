@@ -19,6 +19,7 @@ from turnout.counts import count_of, first_texts
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.installation import shipped_path
+from turnout.workflow.output_places import require_writable_places
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
 from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unread_files, unused_turnouts
@@ -118,8 +119,8 @@ def nightly(
     """
     profile = profile_folder(profile)
     _require_profile(Path(profile))
+    require_writable_places()
     work.mkdir(exist_ok=True)
-    _require_writable(work)
     lock = FileLock(work / ".nightly.lock")
     try:
         with lock.acquire(timeout=0), _signals_raise():
@@ -153,15 +154,6 @@ def _require_profile(profile: Path) -> None:
         problem = "holds no config.yaml" if profile.is_dir() else "there is no such folder"
         remedy = f"Write one of {', '.join(profiles)}, or the folder of your own"
         raise TurnoutError(f"{profile}, the profile: {problem}. {remedy}.")
-
-
-def _require_writable(work: Path) -> None:
-    """TurnoutError if the run could not store its results; a job would find out only after it has computed them."""
-    pages = WORKLIST.parent / "pages"
-    for folder in (work, WORKLIST.parent, GENERATION.parent, pages, Path("logs"), Path(".snakemake"), Path()):
-        if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
-            problem = f"{folder.resolve()}, the folder: it cannot be written, and nothing was computed"
-            raise TurnoutError(f"{problem}. Correct its permissions, or mount its disk for writing.")
 
 
 @contextmanager

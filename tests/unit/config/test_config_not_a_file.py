@@ -75,7 +75,9 @@ def test_a_table_without_write_permission_gives_one_sentence(config, capsys, mon
 
     monkeypatch.setattr("turnout.config.table_edits.write_atomic", reject)  # as root has every permission
     assert main(COMMANDS["events.csv"]) == 2
-    message = "turnout events: config/events.csv: Permission denied. Correct this, or name another file or folder"
+    message = (
+        "turnout events: config/events.csv: Permission denied. Correct its permissions, or name another file or folder"
+    )
     assert capsys.readouterr().err.startswith(message)
 
 

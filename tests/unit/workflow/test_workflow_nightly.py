@@ -1,5 +1,6 @@
 """The nightly run: one at a time, and the remains of a killed run are removed."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -130,16 +131,57 @@ def test_a_missing_profile_is_an_error_before_the_run_starts(tmp_path, monkeypat
     assert not (tmp_path / "work").exists()
 
 
-@pytest.mark.parametrize("folder", ["work", "results", "results/registry", "results/pages", "logs", ".snakemake", "."])
-def test_a_folder_without_write_permission_is_an_error_before_the_run_starts(tmp_path, monkeypatch, folder):
+PLACES = ["work", "results", "results/registry", "results/pages", "logs", ".snakemake"]
+FAULTS = [
+    (errno.EACCES, "Correct its permissions"), (errno.EROFS, "Mount its disk for writing"),
+    (errno.ENOSPC, "Free space on its disk"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("code, remedy", FAULTS)
+@pytest.mark.parametrize("folder", [*PLACES, "."])
+def test_a_folder_that_cannot_be_written_is_an_error_before_the_run_starts(tmp_path, monkeypatch, folder, code, remedy):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "snakemake.py").write_text("open('begun', 'w')\n")
     (tmp_path / folder).mkdir(parents=True, exist_ok=True)
     locked = (tmp_path / folder).resolve()
-    access = os.access
-    # root can write into every folder, so no permission can be tested: this simulates a read-only disk
-    monkeypatch.setattr(module.os, "access", lambda path, mode: Path(path).resolve() != locked and access(path, mode))
-    with pytest.raises(TurnoutError, match=f"^{locked}, the folder: it cannot be written.* Correct its permissions"):
+
+    def sync(descriptor):  # root can write into every folder, so this simulates the disk
+        if Path(os.readlink(f"/proc/self/fd/{descriptor}")).parent == locked:
+            raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr("turnout.workflow.output_places.os.fsync", sync)
+    with pytest.raises(
+        TurnoutError, match=f"^{locked}, the folder: it cannot be written.*nothing was computed. {remedy}"
+    ):
+        nightly([], "profiles/default")
+    assert not (tmp_path / "begun").exists() and not list(locked.glob(".probe*"))
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_a_file_where_a_folder_is_expected_is_an_error_before_the_run_starts(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("open('begun', 'w')\n")
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).touch()
+    with pytest.raises(TurnoutError, match=f"^{tmp_path / name}, the folder: .*it is a file.* Rename or remove it"):
+        nightly([], "profiles/default")
+    assert not (tmp_path / "begun").exists()
+
+
+def test_a_link_to_a_disk_that_is_not_mounted_is_an_error_before_the_run_starts(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "work").symlink_to(tmp_path / "disk/work")
+    with pytest.raises(TurnoutError, match=f"^{tmp_path}/work, the folder: its link leads to nothing.* Mount the disk"):
+        nightly([], "profiles/default")
+
+
+@pytest.mark.parametrize("name", ["work/.nightly.lock", "results/registry/.lock", "results/registry/_generation.json"])
+def test_a_folder_where_a_file_is_expected_is_an_error_before_the_run_starts(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "snakemake.py").write_text("open('begun', 'w')\n")
+    (tmp_path / name).mkdir(parents=True)
+    with pytest.raises(TurnoutError, match=f"^{tmp_path / name}, the file: .*it is a folder.* Rename or remove it"):
         nightly([], "profiles/default")
     assert not (tmp_path / "begun").exists()
 

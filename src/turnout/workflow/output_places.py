@@ -1,0 +1,77 @@
+"""Check before a run that everything it stores can be written: nobody computes a night that is lost."""
+
+import errno
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from turnout.errors import TurnoutError, remedy_of_access
+from turnout.files import temporary_path
+
+FOLDERS = ("work", "work/plan", "results", "results/registry", "results/pages", "logs", ".snakemake", ".")
+# Files that a run opens or replaces; a lock is opened for writing, the others are replaced by new files.
+LOCKS = ("work/.nightly.lock", "work/.run.lock", "results/registry/.lock")
+FILES = (
+    "work/launched",
+    "results/registry/_generation.json",
+    "results/registry/registry.duckdb",
+    "results/worklist.csv",
+)
+PROBE = bytes(4096)  # one block: a full disk has none left
+
+
+def require_writable_places(project: Path = Path()) -> None:
+    """Check that a run can store its results: no permission, no space or a wrong kind of entry ends it at once.
+
+    Parameters
+    ----------
+    project : Path
+        Folder of the project.
+
+    Raises
+    ------
+    TurnoutError
+        If a folder cannot be written or is a file, its disk is full, or a file is a folder or a lock that cannot be
+        opened for writing. The message says what to do.
+    """
+    for name in FOLDERS:
+        _require(project / name, "folder", "Rename or remove it: the run makes a folder there", _write_probe)
+    for name in (*LOCKS, *FILES):
+        _require(project / name, "file", "Rename or remove it: the run makes a file there", _check_file)
+
+
+def _require(path: Path, kind: str, otherwise: str, check: Callable[[Path], None]) -> None:
+    if not os.path.lexists(path):
+        return
+    if not path.exists():
+        problem = f"{path.absolute()}, the {kind}: its link leads to nothing, and nothing was computed"
+        raise TurnoutError(f"{problem}. Mount the disk that it leads to, or remove the link.")
+    try:
+        check(path)
+    except OSError as error:
+        problem = f"{path.absolute()}, the {kind}: it cannot be written ({error.strerror}), and nothing was computed"
+        raise TurnoutError(f"{problem}. {remedy_of_access(error, otherwise)}.") from None
+
+
+def _write_probe(folder: Path) -> None:
+    """Write and remove a file: permissions alone show neither a full disk nor one that is mounted for reading."""
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, "it is a file, not a folder")
+    probe = temporary_path(folder / "probe")
+    try:
+        with open(probe, "wb") as stream:
+            stream.write(PROBE)
+            stream.flush()
+            os.fsync(stream.fileno())
+    finally:
+        with suppress(OSError):
+            probe.unlink(missing_ok=True)
+
+
+def _check_file(path: Path) -> None:
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")
+    if path.name.endswith(".lock"):
+        with open(path, "ab"):
+            pass
