@@ -218,8 +218,8 @@ def _campaign(cells: Mapping, faults: _Faults) -> Campaign:
     date = day.fromisoformat(cells["campaign"]).isoformat()
     start = faults.optional(_start, cells["started_at_utc"], date) or unlisted_campaign(date).started_at
     details = {k: cells.get(k, "") for k in ("hammer_id", "tip", "operator")}
-    noted = cells.get("rail_temperature_c", "")
-    temperature = faults.optional(_in_range, noted, "rail_temperature_c", -50, 80)
+    temperature_text = cells.get("rail_temperature_c", "")
+    temperature = faults.optional(_in_range, temperature_text, "rail_temperature_c", -50, 80)
     return Campaign(date, start, temperature, **details)
 
 

@@ -146,12 +146,12 @@ def find_pairs(
         return np.where(onset[i] == onset[j], -np.inf, log_p)
 
     # The best pair by turns, from the best single change on: the sum over its row bounds what the whole sum can be.
-    columns, best = np.arange(onset.size), int(np.argmax(log_one))
+    columns, likeliest = np.arange(onset.size), int(np.argmax(log_one))
     evidence_row = -np.inf
     for _ in range(4):
-        row = log_pairs(np.full(onset.size, best), columns, design.changes.T @ design.changes[:, best])
+        row = log_pairs(np.full(onset.size, likeliest), columns, design.changes.T @ design.changes[:, likeliest])
         evidence_row = max(evidence_row, float(np.logaddexp.reduce(row)))
-        best = int(np.argmax(row))
+        likeliest = int(np.argmax(row))
     if evidence_row - evidence_one < np.log(MIN_PROBABILITY):
         return None
     n_onset = step.onset.size

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-N_PARTS = 400  # parts that stand for all pairs of changes: the probability of a quantile is known to 1 / 400
+N_COMPONENTS = 400  # distributions that stand for all pairs of changes: quantiles are known to 1 / 400
 MIN_SHARE = 0.25  # of the present change: a smaller first change is not its onset
 MIN_VALUES = 4  # values, fewer give no change point: level, size, onset and scatter are estimated
 
@@ -244,11 +244,11 @@ def find_change(
     pairs = find_pairs(time, values, autocorrelation, paired, freedom, *law)
     share = 0.0 if pairs is None else float(pairs.probability.sum())
     p *= (1.0 - share) / p.sum()
-    parts = [_SizeParts.of_one(fits, p, freedom - 1)]
+    components = [_SizeMixture.of_one(fits, p, freedom - 1)]
     course: tuple[tuple[str, float], ...] = ()
     present = p  # probability of each shape and onset of the present change
     if pairs is not None:
-        parts.append(_SizeParts.of_two(pairs, freedom - 3))
+        components.append(_SizeMixture.of_two(pairs, freedom - 3))
         count = 2 * paired["step"].onset.size
         of_pairs = np.bincount(_present_change(pairs, direction), pairs.probability, minlength=count)
         present = p + np.repeat(of_pairs / pieces, pieces)
@@ -261,7 +261,7 @@ def find_change(
     since = _quantiles(fits["step"], drift if shape == "drift" else step, (0.5,))[0]
     since = min(max(since, first), last)
     course = course or ((shape, since),)
-    low, middle, high = _sizes(parts, (tail, 0.5, 1.0 - tail))
+    low, middle, high = _sizes(components, (tail, 0.5, 1.0 - tail))
 
     def day(years: float) -> float:
         return float(time[-1] + DAYS_PER_YEAR * years)
@@ -274,8 +274,8 @@ def find_change(
 
 def _course_of(pairs: Pairs, onset: np.ndarray) -> tuple[tuple[str, float], ...]:
     """Shape and onset [a, relative to the newest value] of both changes of the most probable pair."""
-    best = int(np.argmax(pairs.probability))
-    columns = int(pairs.first[best]), int(pairs.second[best])
+    likeliest = int(np.argmax(pairs.probability))
+    columns = int(pairs.first[likeliest]), int(pairs.second[likeliest])
     return tuple((SHAPES[c // onset.size], float(onset[c % onset.size])) for c in columns)
 
 
@@ -297,7 +297,7 @@ def _quantiles(fit: Fits, weight: np.ndarray, levels: Sequence[float]) -> list[f
 
 
 @dataclass(frozen=True)
-class _SizeParts:
+class _SizeMixture:
     """Student t distributions of the size with their probabilities ``p``: (n,) arrays, and their ``freedom``."""
 
     p: np.ndarray
@@ -306,34 +306,40 @@ class _SizeParts:
     freedom: int
 
     @classmethod
-    def of_one(cls, fits: dict[str, Fits], p: np.ndarray, freedom: int) -> _SizeParts:
-        """Of one change; parts below 1e-6 of the largest probability are left out."""
+    def of_one(cls, fits: dict[str, Fits], p: np.ndarray, freedom: int) -> _SizeMixture:
+        """Of one change; components below 1e-6 of the largest probability are left out."""
         joined = Fits(*(np.concatenate(pair) for pair in zip(*(vars(f).values() for f in fits.values()))))
         use = p > 1e-6 * p.max()  # none where one change is impossible
         scale = np.sqrt(joined.rss[use] / freedom / joined.weight[use])
         return cls(p[use], joined.size[use], scale, freedom)
 
     @classmethod
-    def of_two(cls, pairs: Pairs, freedom: int) -> _SizeParts:
-        """Of the sums of two changes: ``N_PARTS`` parts of equal probability stand for all pairs, ordered by size."""
+    def of_two(cls, pairs: Pairs, freedom: int) -> _SizeMixture:
+        """Of the sums of two changes: ``N_COMPONENTS`` of equal probability stand for all pairs, ordered by size."""
         size = pairs.sizes.sum(axis=0)
         order = np.argsort(size)
         running = np.cumsum(pairs.probability[order])
-        use = order[np.searchsorted(running, (np.arange(N_PARTS) + 0.5) / N_PARTS * running[-1])]
+        use = order[np.searchsorted(running, (np.arange(N_COMPONENTS) + 0.5) / N_COMPONENTS * running[-1])]
         scale = np.sqrt(pairs.rss[use] / freedom * pairs.variance[use])
-        return cls(np.full(N_PARTS, running[-1] / N_PARTS), size[use], scale, freedom)
+        return cls(np.full(N_COMPONENTS, running[-1] / N_COMPONENTS), size[use], scale, freedom)
 
 
-def _sizes(mixture: Sequence[_SizeParts], levels: Sequence[float]) -> list[float]:
+def _sizes(mixture: Sequence[_SizeMixture], levels: Sequence[float]) -> list[float]:
     """Quantiles of a mixture of Student t distributions."""
-    parts = [part for part in mixture if part.size.size]
-    total = sum(float(part.p.sum()) for part in parts)
-    low, high = min(float(part.size.min()) for part in parts), max(float(part.size.max()) for part in parts)
-    half_range = 1e3 * max(float(part.scale.max()) for part in parts) + high - low
+    components = [component for component in mixture if component.size.size]
+    total = sum(float(component.p.sum()) for component in components)
+    low, high = (
+        min(float(component.size.min()) for component in components),
+        max(float(component.size.max()) for component in components),
+    )
+    half_range = 1e3 * max(float(component.scale.max()) for component in components) + high - low
 
     def quantile(q: float) -> float:
         def shortfall(x: float) -> float:
-            below = sum(float(np.sum(part.p * stdtr(part.freedom, (x - part.size) / part.scale))) for part in parts)
+            below = sum(
+                float(np.sum(component.p * stdtr(component.freedom, (x - component.size) / component.scale)))
+                for component in components
+            )
             return below / total - q
 
         return find_root(shortfall, low - half_range, high + half_range, 1e-9 * half_range)

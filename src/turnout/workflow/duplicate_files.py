@@ -1,8 +1,9 @@
 """Handle copied and moved files.
 
 Files that are twice in a turnout's folder count in one unit; the other unit names the original in its quarantine row. A
-measurement whose files were moved counts in the new unit only, also in another turnout. Nothing tells at which of two
-turnouts a hammer test was made whose file is at both: it counts at both, with a remark.
+measurement whose files were moved counts in the new unit only, also in another turnout. A hammer test that was moved
+and corrected in one night has other bytes: its impacts tell that it is the same. Nothing tells at which of two turnouts
+a hammer test was made whose file is at both: it counts at both, with a remark.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -13,15 +14,19 @@ from typing import TypeGuard
 from turnout.config.merge import digest
 from turnout.config.settings.fleet import FleetSettings
 from turnout.records import Unit
-from turnout.workflow.batches import UnitResult
+from turnout.workflow.batches import UnitResult, read_results
 from turnout.workflow.guard import quarantine_row, status_of
 from turnout.workflow.ledger import Ledger
 from turnout.workflow.plan import PlannedUnit, read_plan
 from turnout.workflow.retries import request_rerun
 from turnout.workflow.scan import unit_id
-from turnout.workflow.state import VANISHED, WITH_ROWS, UnitState, load_state, state_lock
+from turnout.workflow.state import VANISHED, WITH_ROWS, UnitState, batch_folder, load_state, state_lock
 
 COPY_PREFIX = "copy of "
+# Impacts with the same peak force and contact show that two hammer tests are one. Two impacts of different tests agree
+# in both once in some thousand, so three do by chance in none.
+MIN_SAME_IMPACTS = 3
+SAME_IMPACTS_SHARE = 0.5  # of the impacts of the earlier result
 
 
 @dataclass(frozen=True)
@@ -263,7 +268,9 @@ def withdrawal(name: str, entry: UnitState) -> UnitResult:
     return UnitResult(name, turnout, kind, VANISHED, entry.algo, VANISHED, {})
 
 
-def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings) -> int:
+def withdraw_moved(
+    work: Path, stages: Iterable[str], shards: Iterable[str], limits: FleetSettings, published: int = 0
+) -> int:
     """Withdraw units that were moved to a turnout of another shard, after the jobs of all shards.
 
     A rerun of the shard is requested, so that stages that use its results omit them, too. A stage that gathers its own
@@ -279,6 +286,8 @@ def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], lim
         Names of the shards that took part in the run.
     limits : FleetSettings
         Settings of the checkpoints.
+    published : int
+        When the registry was last published: results that are newer are compared by their impacts. [ns since 1970]
 
     Returns
     -------
@@ -299,9 +308,53 @@ def withdraw_moved(work: Path, stages: Iterable[str], shards: Iterable[str], lim
         return all(by) and (_kind(name) in kinds or _turnout(name) not in set().union(*by))
 
     moved = {s: {n: units[s][n] for n in missing[s] if has_moved(n, units[s][n])} for s in states}
+    fresh = _fresh_hammer_tests(units, wanted, published)
+    for state in states:
+        corrected = [n for n in missing[state] if n not in moved[state] and _is_corrected(n, state, units, fresh)]
+        moved[state] |= {name: units[state][name] for name in corrected}
     for state in states:
         _withdraw(state, moved[state], limits)
     return sum(map(len, moved.values()))
+
+
+def _fresh_hammer_tests(
+    units: Mapping[Path, Units], wanted: Mapping[str, Collection[str]], published: int
+) -> dict[str, list[tuple[Path, str]]]:
+    """Day -> (state, unit) of the planned hammer tests whose results are newer than the published registry."""
+    fresh: dict[str, list[tuple[Path, str]]] = {}
+    for state, entries in units.items():
+        new_batches = {p.name for p in batch_folder(state).glob("batch-*.parquet") if p.stat().st_mtime_ns > published}
+        for name in wanted[state.stem]:
+            entry = entries.get(name)
+            if _kind(name) == "hammer" and _has_rows(entry) and entry.batch in new_batches:
+                fresh.setdefault(_day(name), []).append((state, name))
+    return fresh
+
+
+def _is_corrected(
+    name: str, state: Path, units: Mapping[Path, Units], fresh: Mapping[str, Collection[tuple[Path, str]]]
+) -> bool:
+    """Whether the impacts of a missing hammer test are those of a fresh one of the same day at another turnout."""
+    if _kind(name) != "hammer" or not _has_rows(units[state][name]):
+        return False
+    elsewhere = [(s, n) for s, n in fresh.get(_day(name), ()) if _turnout(n) != _turnout(name)]
+    if not elsewhere:
+        return False
+    impacts = _impacts(state, name, units)
+    n_same = max(len(impacts & _impacts(other, test, units)) for other, test in elsewhere)
+    return n_same >= max(MIN_SAME_IMPACTS, SAME_IMPACTS_SHARE * len(impacts))
+
+
+def _impacts(state: Path, name: str, units: Mapping[Path, Units]) -> set[tuple[float, float]]:
+    """Peak force [0.1 N] and contact [µs] of the impacts of a hammer test; none if its batch is damaged."""
+    import pyarrow as pa
+
+    try:
+        results = list(read_results(batch_folder(state) / units[state][name].batch, {name}))
+    except (OSError, pa.ArrowException):  # named when the batch is registered
+        return set()
+    rows = [row for result in results for row in result.tables.get("impacts", ())]
+    return {(round(row["peak_n"], 1), round(row["contact_ms"], 3)) for row in rows if row["contact_ms"] is not None}
 
 
 def _withdraw(state: Path, moved: Units, limits: FleetSettings) -> None:
@@ -374,6 +427,15 @@ REMEDY = "Delete it at the turnout where it was not measured"
 
 def _has_rows(entry: UnitState | None) -> TypeGuard[UnitState]:
     return entry is not None and entry.status in WITH_ROWS
+
+
+def _day(name: str) -> str:
+    """Day of the campaign in the name of a hammer test.
+
+    >>> _day("t1/hammer/A7/2024-05-13")
+    '2024-05-13'
+    """
+    return name.rsplit("/", 1)[1]
 
 
 def _turnout(name: str) -> str:

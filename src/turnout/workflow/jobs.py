@@ -133,7 +133,8 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
     states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
     with attempt("register", params.again):
-        withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"])
+        published = changed_at(Path(generation))
+        withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"], published)
         shared = files_at_two_turnouts(Path("work"), params.stages, params.shards)
         tables["quarantine"] += shared
         result = register(

@@ -41,16 +41,18 @@ def require_writable_places(project: Path = Path()) -> None:
         _require(project / name, "file", "Rename or remove it: the run makes a file there", _check_file)
 
 
-def _require(path: Path, kind: str, otherwise: str, check: Callable[[Path], None]) -> None:
+def _require(path: Path, entry_type: str, otherwise: str, check: Callable[[Path], None]) -> None:
     if not os.path.lexists(path):
         return
     if not path.exists():
-        problem = f"{path.absolute()}, the {kind}: its link leads to nothing, and nothing was computed"
+        problem = f"{path.absolute()}, the {entry_type}: its link leads to nothing, and nothing was computed"
         raise TurnoutError(f"{problem}. Mount the disk that it leads to, or remove the link.")
     try:
         check(path)
     except OSError as error:
-        problem = f"{path.absolute()}, the {kind}: it cannot be written ({error.strerror}), and nothing was computed"
+        problem = (
+            f"{path.absolute()}, the {entry_type}: it cannot be written ({error.strerror}), and nothing was computed"
+        )
         raise TurnoutError(f"{problem}. {remedy_of_access(error, otherwise)}.") from None
 
 

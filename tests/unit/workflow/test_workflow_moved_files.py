@@ -1,5 +1,6 @@
 """A measurement whose files were moved is used only at its new place."""
 
+import time
 from dataclasses import replace
 
 import pytest
@@ -77,18 +78,19 @@ class TwoShards(Fleet):
 
     stages = {"hammer": None}
 
-    def run_night(self, order):
+    def run_night(self, order, compute=length, published=0):
         CALLS.clear()
         write_plans(self.configuration, self.raw, self.plan.parent, 2)
         for kind, gather in self.stages.items():
             for name in order:
-                stage = Stage(kind, length, "1", gather=gather)
+                stage = Stage(kind, compute, "1", gather=gather)
                 plan = self.plan.with_name(f"{name}.json")
                 run_shard(plan, self.state_of(kind, name), stage, self.configuration, self.raw)
-        return self.withdraw_moved_files()
+        return self.withdraw_moved_files(published)
 
-    def withdraw_moved_files(self):
-        return withdraw_moved(self.folder / "work", self.stages, SHARDS, self.configuration.settings["fleet"])
+    def withdraw_moved_files(self, published=0):
+        limits = self.configuration.settings["fleet"]
+        return withdraw_moved(self.folder / "work", self.stages, SHARDS, limits, published)
 
     def state_of(self, kind, shard):
         return self.folder / "work" / kind / f"{shard}.json"
@@ -131,6 +133,36 @@ def test_a_moved_campaign_is_withdrawn_after_the_job_was_killed_before_the_withd
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9]
     assert fleet.withdraw_moved_files() == 1
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == []
+
+
+def impacts_of(unit, turnout, raw_root, algo=""):
+    """Rows of a file of peak forces [N], such as "812.31 905.27 # a comment"."""
+    rows = length(unit, turnout, raw_root, algo)
+    texts = [(raw_root / path).read_text().partition("#")[0].split() for path, *_ in unit.files]
+    return rows | {"impacts": [{"peak_n": float(peak), "contact_ms": 0.4} for text in texts for peak in text]}
+
+
+@pytest.mark.parametrize(
+    "corrected, same",
+    [
+        ("812.31 905.27 799.64 1011.5 # a corrected name of a channel", True),
+        ("812.31 905.27 799.64 1011.5 644.07 # the impact that was cut off", True),
+        ("812.31 911.88 640.02 1002.5 # another test of that day", False),
+    ],
+)
+def test_a_test_that_was_corrected_and_moved_in_one_night_is_used_only_there(tmp_path, corrected, same):
+    fleet = TwoShards(tmp_path, 5)
+    fleet.put("t0/2024-05-13/A_1.txt", "812.31 905.27 799.64 1011.5")
+    fleet.run_night(SHARDS, impacts_of)
+    published = time.time_ns()
+    (fleet.raw / "t0/2024-05-13/A_1.txt").unlink()
+    fleet.put("t4/2024-05-13/A_1.txt", corrected)
+    assert fleet.run_night(SHARDS, impacts_of, published) == int(same)
+    assert (fleet.lengths()["t0/hammer/A/2024-05-13"] == []) == same
+    assert fleet.lengths()["t4/hammer/A/2024-05-13"] == [len(corrected)]
+    fleet.put("t0/2024-05-13/A_1.txt", "812.31 905.27 799.64 1011.5")  # the file is back: both count again
+    fleet.run_night(SHARDS, impacts_of, time.time_ns())
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [27]
 
 
 def test_the_same_file_at_two_turnouts_is_used_at_both_while_a_plan_is_missing(tmp_path):
