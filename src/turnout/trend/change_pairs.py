@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from turnout.trend.change_point import Fits
 
 MIN_VALUES = 8  # values, fewer do not determine level, two sizes and two onsets with a scatter
+MIN_DISTANCE = 3  # campaigns between two changes: two drifts that begin closer are one that begins between them
 MIN_PROBABILITY = 0.01  # two changes less probable than this are left out
 LEFT_OUT = 1e-6  # pairs less probable than this, relative to the most probable one, are left out
 SHAPES = ("step", "drift")
@@ -131,7 +132,7 @@ def find_pairs(
     years = (time - time[-1]) / DAYS_PER_YEAR
     design = _Design(years, values, autocorrelation, step.onset, temperature, slope_weight)
     width = np.tile(step.width, 2)
-    onset = np.tile(step.onset, 2)
+    onset, number = np.tile(step.onset, 2), np.tile(np.arange(step.onset.size), 2)
     duration = step.width.sum()
     weight, rss = np.append(step.weight, drift.weight), np.append(step.rss, drift.rss)
     log_one = np.log(width / (2.0 * duration)) - 0.5 * np.log(weight) - 0.5 * freedom * np.log(rss)
@@ -143,7 +144,7 @@ def find_pairs(
         prior = np.log(width[i] * width[j] / (2.0 * duration**2)) - 0.5 * np.log(weight[first]) - information
         with np.errstate(divide="ignore"):
             log_p = prior - 0.5 * freedom * np.log(design.pair_rss(i, j, product)[0])
-        return np.where(onset[i] == onset[j], -np.inf, log_p)
+        return np.where(np.abs(number[i] - number[j]) < MIN_DISTANCE, -np.inf, log_p)
 
     # The best pair by turns, from the best single change on: the sum over its row bounds what the whole sum can be.
     columns, likeliest = np.arange(onset.size), int(np.argmax(log_one))
@@ -155,7 +156,7 @@ def find_pairs(
     if evidence_row - evidence_one < np.log(MIN_PROBABILITY):
         return None
     n_onset = step.onset.size
-    earlier, later = np.triu_indices(n_onset, 1)
+    earlier, later = np.triu_indices(n_onset, MIN_DISTANCE)
     first = np.concatenate([earlier + a * n_onset for a in (0, 1) for _ in (0, 1)])
     second = np.concatenate([later + b * n_onset for _ in (0, 1) for b in (0, 1)])
     product = (design.changes.T @ design.changes)[first, second]

@@ -30,8 +30,8 @@ class Change:
     ``size`` is the change at the newest campaign, ``low`` and ``high`` its interval [%]. ``since`` is the median onset
     under that shape, ``earliest`` and ``latest`` its interval; of two changes it is the onset of the first in the
     direction that is asked for. The intervals average over one and two changes and their shapes, each with its
-    probability, so a wrong choice does not narrow them. ``course`` is the shape and the onset of each change: one, or
-    two where that is more probable.
+    probability, so a wrong choice does not narrow them. ``course`` is the shape and the onset of each change: two where
+    their probability is above the level of the intervals, else one.
     """
 
     shape: str
@@ -223,9 +223,9 @@ def find_change(
     Examples
     --------
     >>> t = np.arange(40.0) * 7.0
-    >>> found = find_change(t, -0.2 * np.maximum(t / 7.0 - 25.0, 0.0) + 0.01 * np.cos(9.0 * t), 0.0)
-    >>> print(found.shape, f"{found.since / 7.0:.1f} {found.size:.1f}")
-    drift 25.0 -2.8
+    >>> found = find_change(t, -0.2 * np.maximum(t / 7.0 - 25.0, 0.0) + 0.1 * np.cos(9.0 * t), 0.0)
+    >>> print(found.shape, found.earliest / 7.0 < 25.0 < found.latest / 7.0, f"{found.size:.0f}")
+    drift True -3
     """
     time, values = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
     n = values.size
@@ -252,7 +252,7 @@ def find_change(
         count = 2 * paired["step"].onset.size
         of_pairs = np.bincount(_present_change(pairs, direction), pairs.probability, minlength=count)
         present = p + np.repeat(of_pairs / pieces, pieces)
-        if share > 0.5:
+        if share > level:
             course = _course_of(pairs, paired["step"].onset)
     step, drift = np.split(present, 2)
     shape = SHAPES[int(drift.sum() > 0.5)]
