@@ -95,19 +95,31 @@ def impact_train(
 
 
 def rolling_noise(
-    rng, offsets=IC3, speed=40.0, positions=(0.0, 4.0), direction=1, noise=0.02, acceleration=0.0, lead=1.0
+    rng,
+    offsets=IC3,
+    speed=40.0,
+    positions=(0.0, 4.0),
+    direction=1,
+    noise=0.02,
+    acceleration=0.0,
+    lead=1.0,
+    amplitudes=None,
 ):
-    """Recording of noise bursts that follow the wheels along the rail. Power decays by 1/e in 0.4 m; no modal model."""
+    """Recording of noise bursts that follow the wheels along the rail. Power decays by 1/e in 0.4 m; no modal model.
+
+    ``amplitudes`` (n_axle,) are those of the wheels, 1 without them.
+    """
+    amplitudes = np.ones(len(offsets)) if amplitudes is None else amplitudes
     times = passing_times(offsets, positions, speed, acceleration, direction, lead)
     n = int((times.max() + 1.0) * RATE)
     time = np.arange(n) / RATE
     rows = []
     for row in times:
         power = np.zeros(n)
-        for t in row:
+        for t, amplitude in zip(row, amplitudes):
             at_wheel = speed + acceleration * (t - lead)
             near = slice(*np.searchsorted(time, t + np.array([-40.0, 40.0]) / at_wheel))  # beyond: exp(-100)
-            power[near] += np.exp(-np.abs(time[near] - t) * at_wheel / 0.4)
+            power[near] += amplitude**2 * np.exp(-np.abs(time[near] - t) * at_wheel / 0.4)
         rows.append(np.sqrt(power) * rng.standard_normal(n) + noise * rng.standard_normal(n))
     return recording_of(np.array(rows), positions)
 

@@ -10,7 +10,7 @@ import numpy as np
 from turnout.constants import KMH
 from turnout.errors import REMARK_REASONS
 from turnout.passage.axle_count import best_count, count_without_distance
-from turnout.passage.axles import sensor_times
+from turnout.passage.axles import MAX_LEFT_HEIGHT, sensor_times
 from turnout.passage.channel_checks import channel_states, lost_sensors
 from turnout.passage.cleaning import clean
 from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
@@ -144,7 +144,7 @@ def _analyse_train(
     motion, axles, train_type = count
     passage = _estimate_motion(envelopes, sensors, motion, axles, train_type, settings, is_multi_sensor)
     passage = replace(passage, direction=direction, track=track, begin=envelopes.begin, end=envelopes.end)
-    findings += _axle_count_doubts(passage, axles, all_envelopes, is_multi_sensor)
+    findings += _axle_count_doubts(passage, axles, all_envelopes, is_multi_sensor, settings)
     findings += _out_of_search(passage, settings)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
     return replace(passage, status=_status(findings, "accepted"), findings=tuple(findings))
@@ -179,25 +179,42 @@ def _count_by_several_sensors(
 
 
 def _axle_count_doubts(
-    passage: Passage, axles: AxleFinding, envelopes: SensorEnvelopes, is_multi_sensor: bool
+    passage: Passage,
+    axles: AxleFinding,
+    envelopes: SensorEnvelopes,
+    is_multi_sensor: bool,
+    settings: PassageSettings,
 ) -> list[Rejection]:
     """Reasons to doubt the number of axles.
 
     The count of an unknown train is a cut between high and low peaks. Another cut that is nearly as clear may be right.
+    A known train has the doubts of its row of vehicles.
     """
-    doubts: list[Rejection] = []
     is_named = passage.type is not None and passage.type.type != UNKNOWN
     min_contrast = MIN_NAMED_CONTRAST if is_named else MIN_CONTRAST if is_multi_sensor else 2.0 * MIN_CONTRAST
+    n = f"{passage.n_axle} axles"
+    min_lead = float(np.log(settings.type_probability / max(1.0 - settings.type_probability, 1e-12)))
+    doubts: list[Rejection] = []
     if passage.contrast < min_contrast:
-        text = f"{passage.n_axle} axles, but the weakest peak is only {passage.contrast:.2f} times the next one"
+        text = f"{n}, but the weakest peak is only {passage.contrast:.2f} times the next one"
         doubts.append(Rejection("axles_uncertain", passage.contrast, min_contrast, text))
-    elif passage.contrast < MIN_CONTRAST * axles.rival_contrast:
+    elif passage.contrast < min_contrast * axles.rival_contrast:
         lead = passage.contrast / axles.rival_contrast
         text = (
-            f"{passage.n_axle} axles, whose weakest peak is {passage.contrast:.2f} times the next one; another number "
+            f"{n}, whose weakest peak is {passage.contrast:.2f} times the next one; another number "
             f"of axles divides the peaks nearly as clearly, {axles.rival_contrast:.2f} times"
         )
-        doubts.append(Rejection("axles_uncertain", lead, MIN_CONTRAST, text))
+        doubts.append(Rejection("axles_uncertain", lead, min_contrast, text))
+    elif is_named and axles.lead < min_lead:
+        text = f"{n}, but with one vehicle exchanged another number is nearly as likely: {axles.lead:.1f} nat less"
+        doubts.append(Rejection("axles_uncertain", axles.lead, min_lead, text))
+    elif is_named and axles.further > MAX_LEFT_HEIGHT:
+        text = f"{n}, but a wheel of {axles.further:.2f} times the median amplitude is at none of them"
+        doubts.append(Rejection("axles_uncertain", axles.further, MAX_LEFT_HEIGHT, text))
+    elif not is_named and axles.weakest < MIN_CONTRAST * axles.further:
+        ratio = axles.weakest / axles.further
+        text = f"{n}, but the weakest wheel has only {ratio:.2f} times the amplitude of one that is left out"
+        doubts.append(Rejection("axles_uncertain", ratio, MIN_CONTRAST, text))
     if is_multi_sensor and not is_named and (impacts := fixed_impact_correlation(envelopes, passage.train_motion)):
         text = (
             f"{passage.n_axle} axles, but sensors record impacts at one moment, as of a crossing's nose or a deep dip"

@@ -28,6 +28,7 @@ from turnout.passage.comb_search import (
 from turnout.passage.kinematics import Motion
 from turnout.passage.sensor_stack import axle_counts, template_counts
 from turnout.passage.train_type import UNKNOWN, TypeFinding, find_type, unknown_evidence
+from turnout.passage.wheel_amplitudes import fit_amplitudes, settle_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -83,6 +84,7 @@ def match_template(
     posterior = {name: float(np.exp(value - highest) / total) for name, value in sorted(log_posterior.items())}
     if posterior[likeliest.pattern.type] < settings.type_probability or likeliest.evidence < MIN_EVIDENCE:
         return None
+    likeliest, wheels, lead = settle_count(envelopes, likeliest)
     profiles = profiles_at(envelopes, [likeliest.motion])
     shape, share_before, share_after = fit_shape(profiles, likeliest.vehicles, likeliest.comb.offsets, likeliest.start)
     n, length = len(envelopes.positions), float(profiles.length[0])
@@ -115,7 +117,16 @@ def match_template(
         speed_se,
     )
     origin = float(profiles_at(envelopes, [fitted.motion]).origin[0])
-    axles = AxleFinding(origin + fitted.start + offsets, np.ones(offsets.size), 1.0 / (1.0 - likeliest.share), "comb")
+    weakest, further = wheels.extremes(offsets, settings.axle_spacing_minimum)
+    axles = AxleFinding(
+        origin + fitted.start + offsets,
+        np.ones(offsets.size),
+        1.0 / (1.0 - likeliest.share),
+        "comb",
+        weakest=weakest,
+        further=further,
+        lead=lead,
+    )
     return fitted.motion, axles, train_type
 
 
@@ -230,13 +241,21 @@ def best_count(
         )
     if typed is not None:
         return (motion, *typed)
-    return (motion, _with_rival(first[0], candidates), first[1]) if first is not None else None
+    if first is None:
+        return None
+    rivals = [c.contrast for c in candidates if len(c.offsets) != len(first[0].offsets)]
+    axles = replace(first[0], rival_contrast=max(rivals, default=0.0))
+    return motion, _with_extremes(envelopes, motion, axles, settings), first[1]
 
 
-def _with_rival(axles: AxleFinding, candidates: Sequence[AxleFinding]) -> AxleFinding:
-    """The count with the largest contrast of the ``candidates`` that have another number of axles."""
-    rivals = [c.contrast for c in candidates if len(c.offsets) != len(axles.offsets)]
-    return replace(axles, rival_contrast=max(rivals, default=0.0))
+def _with_extremes(
+    envelopes: SensorEnvelopes, motion: Motion, axles: AxleFinding, settings: PassageSettings
+) -> AxleFinding:
+    """The count with the amplitudes of its weakest wheel and of the strongest one that it leaves out."""
+    profiles, offsets = profiles_at(envelopes, [motion]), axles.offsets - axles.offsets[0]
+    wheels = fit_amplitudes(profiles, offsets, float(axles.offsets[0] - profiles.origin[0]))
+    weakest, further = wheels.extremes(offsets, settings.axle_spacing_minimum)
+    return replace(axles, weakest=weakest, further=further)
 
 
 def _motions_near(motion: Motion, envelopes: SensorEnvelopes, reach: float) -> list[Motion]:
@@ -327,8 +346,12 @@ def count_without_distance(
                 per_axle = unknown_evidence(np.diff(axles.offsets)) / (len(axles.offsets) - 1)
                 log_prior = -0.5 * (np.log(speed / TYPICAL_SPEED) / 0.6) ** 2
                 candidates.append((log_prior + per_axle + 0.5 * min(np.log(axles.contrast), 1.5), motion, axles))
-    for _, motion, axles in sorted(candidates, key=lambda o: -o[0]):
+    for plausibility, motion, axles in sorted(candidates, key=lambda o: -o[0]):
         _, typed = _first_with_type(envelopes, motion, [axles], 0.12 * motion.speed, (), settings)
         if typed is not None:
-            return motion, *typed
+            # half the logarithm of a contrast is a part of the plausibility: the rival's is less by twice the lead
+            rivals = [o[0] for o in candidates if len(o[2].offsets) != len(typed[0].offsets)]
+            lead = plausibility - max(rivals, default=-np.inf)
+            axles = replace(typed[0], rival_contrast=typed[0].contrast * float(np.exp(-2.0 * lead)))
+            return motion, _with_extremes(envelopes, motion, axles, settings), typed[1]
     return None

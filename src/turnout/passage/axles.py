@@ -31,7 +31,9 @@ class AxleFinding:
     """``offsets`` (n_axle,) [m] behind the stack's origin, ``height`` (n_axle,) of the peaks.
 
     ``contrast`` is the weakest accepted peak over the strongest rejected one: near 1 the count is a guess.
-    ``rival_contrast`` is the largest contrast of a count with another number of axles, 0 without one.
+    ``rival_contrast`` is the largest contrast of a count with another number of axles, 0 without one. ``weakest`` and
+    ``further`` are the amplitudes of the weakest wheel and of the strongest one that the count leaves out, over the
+    median wheel. ``lead`` [nat] is the log evidence of a known train over one with another number of axles.
     """
 
     offsets: np.ndarray
@@ -39,6 +41,9 @@ class AxleFinding:
     contrast: float
     feature: str = ""
     rival_contrast: float = 0.0
+    weakest: float = 1.0
+    further: float = 0.0
+    lead: float = np.inf
 
 
 def along_train(

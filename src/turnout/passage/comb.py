@@ -47,13 +47,15 @@ class Comb:
     inverse: np.ndarray
 
     @classmethod
-    def of(cls, offsets: np.ndarray) -> Comb:
+    def of(cls, offsets: np.ndarray, amplitudes: np.ndarray | float = 1.0) -> Comb:
         """For axle offsets that begin at 0. [m]
 
         Parameters
         ----------
         offsets : (n_axle,) array of float
             Distances of the axles behind the first; the first is 0. [m]
+        amplitudes : float or (n_axle,) array of float
+            Height of each axle's tooth. [-]
 
         Returns
         -------
@@ -64,8 +66,8 @@ class Comb:
         teeth = np.zeros(int(offsets[-1] / COMB_STEP) + 3)
         whole = np.floor(offsets / COMB_STEP).astype(int)
         fraction = offsets / COMB_STEP - whole
-        np.add.at(teeth, whole, 1.0 - fraction)
-        np.add.at(teeth, whole + 1, fraction)
+        np.add.at(teeth, whole, amplitudes * (1.0 - fraction))
+        np.add.at(teeth, whole + 1, amplitudes * fraction)
         auto = np.correlate(np.concatenate([teeth, np.zeros(N_TAPS - 1)]), teeth, "valid")
         return cls(offsets, teeth, np.linalg.inv(auto[LAGS] + RIDGE * auto[0] * np.eye(N_TAPS)))
 
