@@ -105,10 +105,10 @@ def fit_amplitudes(profiles: Profiles, offsets: np.ndarray, start: float) -> Amp
     amplitudes = np.ones(offsets.size)
     for _ in range(N_PASSES):
         teeth, _ = teeth_of(profiles, Comb.of(offsets, amplitudes), start)
-        own = np.sum([np.correlate(k, k, "full")[N_TAPS - 1 :] for k in teeth], axis=0)
+        overlap = np.sum([np.correlate(k, k, "full")[N_TAPS - 1 :] for k in teeth], axis=0)
         matched = np.sum([np.correlate(y, k, "same") for y, k in zip(values, teeth)], axis=0)
         at_axles = np.interp(offsets, positions, matched)
-        normal = np.interp(np.abs(np.subtract.outer(offsets, offsets)), lags, own, right=0.0)
+        normal = np.interp(np.abs(np.subtract.outer(offsets, offsets)), lags, overlap, right=0.0)
         residual = _residual_power(profiles, normal, at_axles, amplitudes)
         for _ in range(N_VARIANCE_PASSES):
             weight = n_per_observation * residual / n_point / AMPLITUDE_SD**2
@@ -118,9 +118,9 @@ def fit_amplitudes(profiles: Profiles, offsets: np.ndarray, start: float) -> Amp
     penalised = residual + weight * np.sum((amplitudes - 1.0) ** 2)
     evidence = -0.5 * n_observation * np.log(penalised / profiles.power[0]) - 0.5 * N_TAPS * np.log(n_observation)
     evidence -= 0.5 * float(np.linalg.slogdet(normal / weight + np.eye(offsets.size))[1])
-    near = np.interp(np.abs(np.subtract.outer(positions, offsets)), lags, own, right=0.0)
-    free = own[0] - np.sum(near @ inverse * near, axis=1)  # what the amplitudes of the other wheels cannot take up
-    further = (matched - near @ amplitudes) / np.maximum(free, 1e-3 * own[0])
+    near = np.interp(np.abs(np.subtract.outer(positions, offsets)), lags, overlap, right=0.0)
+    free = overlap[0] - np.sum(near @ inverse * near, axis=1)  # what the amplitudes of the other wheels cannot take up
+    further = (matched - near @ amplitudes) / np.maximum(free, 1e-3 * overlap[0])
     return AmplitudeFit(amplitudes, float(evidence), positions, further)
 
 
@@ -181,7 +181,7 @@ def _fit_row(envelopes: SensorEnvelopes, row: FittedRow) -> AmplitudeFit:
 def _rivals(envelopes: SensorEnvelopes, fitted: FittedRow) -> list[FittedRow]:
     """The likeliest rows with one vehicle exchanged and another number of axles, each at its own motion."""
     profiles, candidates = profiles_at(envelopes, [fitted.motion]), []
-    for vehicles in _exchanged(fitted):
+    for vehicles in _exchange_vehicles(fitted):
         comb = Comb.of(offsets_of(vehicles))
         share, starts = explained_share(profiles, comb, np.arange(1))
         k = int(np.argmax(share[0]))
@@ -200,13 +200,13 @@ def _rivals(envelopes: SensorEnvelopes, fitted: FittedRow) -> list[FittedRow]:
     return [refine_motion(envelopes, row, SPEED_REACH) for _, row in likeliest]
 
 
-def _exchanged(fitted: FittedRow) -> Iterator[tuple[Vehicle, ...]]:
+def _exchange_vehicles(fitted: FittedRow) -> Iterator[tuple[Vehicle, ...]]:
     """Rows with one vehicle exchanged for another of its group with another number of axles, each once."""
     rows = {}
     for i, vehicle in enumerate(fitted.vehicles):
         for group in fitted.pattern.groups:
-            for other in group.vehicles if vehicle in group.vehicles else ():
-                if len(other.axles) != len(vehicle.axles):
-                    row = (*fitted.vehicles[:i], other, *fitted.vehicles[i + 1 :])
+            for substitute in group.vehicles if vehicle in group.vehicles else ():
+                if len(substitute.axles) != len(vehicle.axles):
+                    row = (*fitted.vehicles[:i], substitute, *fitted.vehicles[i + 1 :])
                     rows[tuple((v.length, v.axles) for v in row)] = row
     yield from rows.values()
