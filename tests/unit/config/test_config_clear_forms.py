@@ -99,4 +99,6 @@ def test_a_comma_that_separates_no_cells_is_a_decimal_mark(tmp_path):
         assert (campaigns["2026-04-02"].rail_temperature, errors) == (expected, [])
     (tmp_path / "campaigns.csv").write_text("sep=;\n" + text.format("1,234"))  # a thousand, or 1.2 °C
     campaigns, (error,) = read_campaigns(tmp_path / "campaigns.csv", "campaigns.csv")
-    assert not campaigns and "line 3, column 29: rail_temperature_c is '1,234'" in str(error)
+    assert campaigns[
+        "2026-04-02"
+    ].rail_temperature is None and "line 3, column 29: rail_temperature_c is '1,234'" in str(error)

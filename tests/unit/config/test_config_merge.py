@@ -151,7 +151,8 @@ def test_faulty_campaigns_are_reported_and_the_others_are_used(folder, tmp_path)
     (tmp_path / "raw/t1").mkdir(parents=True)
     (tmp_path / "raw/t1/campaigns.csv").write_text(CAMPAIGNS)
     turnout, errors = read_notes(load_configuration(folder).turnout("t1"), tmp_path / "raw")
-    assert {d: c.rail_temperature for d, c in turnout.campaigns.items()} == {"2024-05-13": 18.5, "2024-06-17": None}
+    temperatures = {d: c.rail_temperature for d, c in turnout.campaigns.items()}
+    assert temperatures == {"2024-05-13": 18.5, "2024-06-17": None, "2024-07-15": None, "2024-08-15": 15.0}
     assert [e.where.split(",")[0] for e in errors] == ["line 4", "line 5", "line 6", "line 7"]
     assert "rail_temperature_c is 'warm'. Write a number" in str(errors[0])
     assert "is not on the campaign's day" in str(errors[1]) and "second time" in str(errors[2])
