@@ -134,7 +134,8 @@ def test_a_cell_with_another_notation_is_no_number(tmp_path, cell):
         f'campaign,started_at_utc,rail_temperature_c\n2026-05-13,2026-05-13,"{cell}"\n2026-06-13,2026-06-13,15\n'
     )
     campaigns, (error,) = read_campaigns(tmp_path / "c.csv", "c.csv")
-    assert list(campaigns) == ["2026-06-13"] and "rail_temperature_c is" in str(error)
+    temperatures = {date: campaign.rail_temperature for date, campaign in campaigns.items()}
+    assert temperatures == {"2026-05-13": None, "2026-06-13": 15.0} and "rail_temperature_c is" in str(error)
 
 
 def test_an_option_with_another_notation_is_no_number():
