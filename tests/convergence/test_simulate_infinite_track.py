@@ -95,19 +95,11 @@ def test_an_euler_bernoulli_mesh_converges_with_the_fourth_power():
     assert np.all(np.abs(np.log2(errors[0] / errors[1]) - 4.0) < 0.3)
 
 
-def pinned_pinned_frequency(rail, spacing):
-    """Half a wave of the Timoshenko rail between two supports [Hz]: the lower root of aω⁴ - bω² + c = 0."""
-    wave = np.pi / spacing
-    a = rail.rotary_inertia * rail.mass / rail.shear_stiffness
-    b = rail.mass * (1.0 + wave**2 * rail.bending_stiffness / rail.shear_stiffness) + rail.rotary_inertia * wave**2
-    return np.sqrt(min(np.roots([a, -b, rail.bending_stiffness * wave**4]))) / (2.0 * np.pi)
-
-
 @pytest.mark.parametrize(("kappa", "printed"), [(0.34, 1035.0), (0.40, 1070.0), (0.45, 1093.0)])
 def test_pinned_pinned_of_timoshenko(kappa, printed):
     """Check 4, printed to 1 Hz."""
     rail = Rail(210e9 * 3.055e-5, 60.21, kappa * 81e9 * 76.7e-4, 7850 * 3.055e-5)
-    assert abs(pinned_pinned_frequency(rail, 0.6) - printed) <= 0.6
+    assert abs(rail.pinned_pinned_frequency(0.6) - printed) <= 0.6
 
 
 def test_the_meshed_track_resonates_at_the_pinned_pinned_frequency():
@@ -115,7 +107,7 @@ def test_the_meshed_track_resonates_at_the_pinned_pinned_frequency():
     rail = Rail(210e9 * 3.055e-5, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5)
     frequency = np.arange(1000.0, 1150.0, 1.0)
     found = np.abs(receptance(assemble(uniform_track(96.0, rail=rail)), frequency, 48.3, 48.3))
-    assert frequency[np.argmax(found)] == pytest.approx(pinned_pinned_frequency(rail, 0.6), rel=0.01)
+    assert frequency[np.argmax(found)] == pytest.approx(rail.pinned_pinned_frequency(0.6), rel=0.01)
 
 
 def test_peaks_of_the_two_layer_track():

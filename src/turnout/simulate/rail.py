@@ -64,7 +64,7 @@ class Rail:
             return 0.0 * np.asarray(length, dtype=float)
         return 12.0 * self.bending_stiffness / (self.shear_stiffness * np.asarray(length, dtype=float) ** 2)
 
-    def pin_pin_frequency(self, bay: float) -> float:
+    def pinned_pinned_frequency(self, bay: float) -> float:
         r"""Frequency at which half a wave of the rail fits between two sleepers, its nodes on both.
 
         The lower root of :math:`m \rho I \omega^4 - (m (S + EI k^2) + \rho I S k^2) \omega^2 + S\,EI k^4 = 0` with
@@ -82,7 +82,7 @@ class Rail:
 
         Examples
         --------
-        >>> round(Rail(6.42e6, 60.21, 2.485e8, 0.24).pin_pin_frequency(0.6))
+        >>> round(Rail(6.42e6, 60.21, 2.485e8, 0.24).pinned_pinned_frequency(0.6))
         1069
         """
         wave_number = np.pi / bay

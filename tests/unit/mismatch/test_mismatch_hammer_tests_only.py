@@ -174,14 +174,14 @@ def test_an_impact_is_not_compared_at_sensors_far_from_it():
 
 
 @pytest.mark.parametrize(("spacing", "lower"), [(0.55, 880.0), (0.72, 640.0)])
-def test_impacts_are_compared_below_the_pin_pin_resonance_alone(plan, spacing, lower):
+def test_impacts_are_compared_below_the_pinned_pinned_resonance_alone(plan, spacing, lower):
     """Bending alone: 512.9 / 0.72^2 = 989 Hz; shear and rotary inertia leave 796 Hz, of which 85 % are used."""
     track = uniform_track(36.0, start=6.0, spacing=spacing)
-    pin_pin = track.rail.pin_pin_frequency(spacing)
+    pinned_pinned = track.rail.pinned_pinned_frequency(spacing)
     plan = replace(plan, turnout=TurnoutTrack(track, {"main": ((),)}))
     pairs = observe_tests(measured_campaign(plan, (), 3), MismatchSettings().pair_tolerance).frf_pairs
     highest = max(p.frequency.max() for p in pairs.values())
-    assert lower < highest < min(900.1, 0.86 * pin_pin)
+    assert lower < highest < min(900.1, 0.86 * pinned_pinned)
 
 
 def test_a_channel_whose_impacts_are_all_rejected_is_stated_once(plan):

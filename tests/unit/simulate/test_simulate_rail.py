@@ -76,7 +76,7 @@ def test_an_impossible_rail_is_rejected_with_its_value(change):
 
 
 @pytest.mark.parametrize("beam", ["timoshenko", "euler"])
-def test_the_pin_pin_frequency_is_that_of_a_beam_on_two_pins(beam):
+def test_the_pinned_pinned_frequency_is_that_of_a_beam_on_two_pins(beam):
     """Against 40 finite elements; without shear and rotary inertia pi sqrt(EI / m) / 2 L^2."""
     rail, bay, n = Rail(**UIC60, beam=beam), 0.65, 40
     stiffness, mass = (np.zeros((2 * n + 2, 2 * n + 2)) for _ in range(2))
@@ -87,9 +87,11 @@ def test_the_pin_pin_frequency_is_that_of_a_beam_on_two_pins(beam):
     lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True)[0]
     expected = np.sqrt(lowest) / (2.0 * np.pi)
     if beam == "timoshenko":
-        assert rail.pin_pin_frequency(bay) == pytest.approx(expected, rel=1e-3)  # elements have an error of 1 / n^2
+        assert rail.pinned_pinned_frequency(bay) == pytest.approx(
+            expected, rel=1e-3
+        )  # elements have an error of 1 / n^2
     else:
         slender = Rail(**{**UIC60, "rotary_inertia": 0.0}, beam=beam)
         closed = np.pi * np.sqrt(6.42e6 / 60.21) / (2.0 * bay**2)
-        assert slender.pin_pin_frequency(bay) == pytest.approx(closed, rel=1e-12)
-        assert slender.pin_pin_frequency(bay) == pytest.approx(expected, rel=1e-4)
+        assert slender.pinned_pinned_frequency(bay) == pytest.approx(closed, rel=1e-12)
+        assert slender.pinned_pinned_frequency(bay) == pytest.approx(expected, rel=1e-4)

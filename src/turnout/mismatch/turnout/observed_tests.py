@@ -79,7 +79,7 @@ def observe_tests(
 
 
 def _highest_frequency(campaign: CampaignInput) -> float:
-    """Highest frequency at which receptances are compared, below the pin-pin resonance of the track [Hz].
+    """Highest frequency at which receptances are compared, below the pinned-pinned resonance of the track [Hz].
 
     There the rail between two sleepers resonates, and hardly anything damps it. Small errors of sleeper positions and
     of the rail change the receptance by more than any tolerance.
@@ -90,8 +90,8 @@ def _highest_frequency(campaign: CampaignInput) -> float:
     near = track.support[(track.support > min(positions) - reach) & (track.support < max(positions) + reach)]
     if near.size < 2:
         return RECEPTANCE.highest_line
-    pin_pin = track.rail.pin_pin_frequency(float(np.median(np.diff(near))))
-    return min(RECEPTANCE.highest_line, RECEPTANCE.pin_pin_share * pin_pin)
+    pinned_pinned = track.rail.pinned_pinned_frequency(float(np.median(np.diff(near))))
+    return min(RECEPTANCE.highest_line, RECEPTANCE.pinned_pinned_share * pinned_pinned)
 
 
 def _fault_of_channel(test: HammerInput, channel: str) -> str | None:

@@ -14,7 +14,6 @@ from turnout.mismatch.engine.thresholds import threshold as prior
 LOCAL_RAIL = "decisions/local-rail-properties.md"
 CROSSING_PANELS = "decisions/crossing-panels.md"
 COMMON_PARAMETERS = "decisions/common-parameter-derivatives.md"
-PIN_PIN = "decisions/marginalized-errors.md"
 ERROR_MODES = "decisions/marginalized-errors.md"
 WHEEL_ROUGHNESS = "decisions/wheel-roughness-errors.md"
 RUNNING_SURFACE = "decisions/running-surface-priors.md"
@@ -122,9 +121,9 @@ class ReceptancePriors:
 
     lowest_line: float = prior(35.0, "Hz", "of the lines, below the ballast resonance", "convention")
     highest_line: float = prior(900.0, "Hz", "of the lines, above the railpad resonance", "convention")
-    pin_pin_share: float = prior(
-        0.85, "share of the pin-pin frequency", "above which no line is used: 3 % of that frequency change it by 0.2",
-        PIN_PIN)
+    pinned_pinned_share: float = prior(
+        0.85, "share of the pinned-pinned frequency",
+        "above which no line is used: an error of 3 % of that frequency changes a receptance by 0.2", ERROR_MODES)
     n_lines: int = prior(44, "lines", "in geometric steps of 8 % between these two", "numerical")
     line_step: float = prior(2.0, "Hz", "to which lines are rounded", "numerical")
     decay_rate: float = prior(
