@@ -83,7 +83,7 @@ class Rail:
         Examples
         --------
         >>> round(Rail(6.42e6, 60.21, 2.485e8, 0.24).pinned_pinned_frequency(0.6))
-        1069
+        1070
         """
         wave_number = np.pi / bay
         bending = self.bending_stiffness * wave_number**2

@@ -150,8 +150,9 @@ def _mappings(value: Any) -> Iterator[ParameterSet]:
 
 def _errors(parameters: ParameterSet, key: str, number: Number) -> Iterator[ConfigError]:
     low, high = RANGES.get((key, number.unit), (None, None))
-    size = abs(number.value) if key == "length" else number.value  # a blade may point to smaller positions
-    if low is not None and high is not None and size and not low <= size <= high:
+    is_surface = ".surfaces[" in (parameters.place.entry or "")  # it may extend to smaller positions
+    size = abs(number.value) if key == "length" and is_surface else number.value
+    if low is not None and high is not None and number.value and not low <= size <= high:
         problem = f"{number.value:g} {number.unit} is outside {low:g} to {high:g} {number.unit}"
         is_diameter = key == "radius" and low <= 0.5 * number.value <= high
         hint = f": half a diameter of {number.value:g} m is {0.5 * number.value:g} m" if is_diameter else ""

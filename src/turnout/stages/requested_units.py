@@ -146,7 +146,7 @@ class _NightlyScan:
                 raise ConfigError(path, "--turnout", observation, f"Write --turnout {turnout}")
 
     def notes(self, day: str) -> tuple[str, ...]:
-        """Errors of campaigns.csv, if none of its valid rows is of this day.
+        """Errors of campaigns.csv, if it states no temperature for this day: one of them may be the reason.
 
         Parameters
         ----------
@@ -158,7 +158,8 @@ class _NightlyScan:
         tuple of str
             The errors as text.
         """
-        return () if self.turnout.campaigns[day].listed else tuple(str(error) for error in self.note_errors)
+        is_stated = self.turnout.campaigns[day].rail_temperature is not None
+        return () if is_stated else tuple(str(error) for error in self.note_errors)
 
     def select(self, unit: Unit, names: set[str]) -> RequestedUnit:
         """The requested files of a unit, with a remark on the others that the nightly run includes.

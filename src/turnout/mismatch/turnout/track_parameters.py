@@ -33,9 +33,6 @@ COMMON_PARAMETERS = (
     ("sleeper_mass", "sleeper", "mass", TRACK.common_mass_sd),
 )
 
-# Errors of the model in values of the whole track; those of the others are smaller than their standard errors.
-MODEL_SDS = {"rail_shear": TRACK.rail_shear_model_sd, "sleeper_mass": TRACK.sleeper_mass_model_sd}
-
 
 @dataclass(frozen=True)
 class SupportParameter:
@@ -88,7 +85,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             meaning=f"ln {name}",
             group="track",
             at=WHOLE_TRACK,
-            model_sd=MODEL_SDS.get(name, 0.0),
+            model_sd=_model_sd(name),
         )
         for name, _, _, sd in COMMON_PARAMETERS
     ]
@@ -105,7 +102,7 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
     for name, sd in rail_sds(zone).items():
         bounds = (-TRACK.bound_sds * sd, TRACK.bound_sds * sd)
         at = WHOLE_TRACK if (name, sd) in RAIL_SDS else None  # a casting's value may stand for a cause beside it
-        meaning, model_sd = f"ln {words[name]}", MODEL_SDS.get(name, 0.0)
+        meaning, model_sd = f"ln {words[name]}", _model_sd(name)
         nuisances.append(Nuisance(name, "-", 0.0, sd, None, bounds, meaning, group="rail", at=at, model_sd=model_sd))
     tracks = zone.turnout.track, *zone.turnout.tracks.values()
     nuisances += [*chair_nuisances(tracks), *toe_nuisances(tracks)]
@@ -123,6 +120,11 @@ def track_nuisances(zone: Zone, trains: Iterable[str]) -> list[Nuisance]:
             )
         )
     return nuisances
+
+
+def _model_sd(name: str) -> float:
+    """Error of the model in a value of the whole track; those that are not stated are below their standard errors."""
+    return float(getattr(TRACK, f"{name}_model_sd", 0.0))
 
 
 def steps_of(values: np.ndarray) -> np.ndarray:
