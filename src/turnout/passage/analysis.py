@@ -206,7 +206,7 @@ def _axle_count_doubts(
         )
         doubts.append(Rejection("axles_uncertain", lead, min_contrast, text))
     elif is_named and axles.lead < min_lead:
-        text = f"{n}, but with one vehicle exchanged another number is nearly as likely: {axles.lead:.1f} nat less"
+        text = f"{n}, but with a vehicle exchanged another number is nearly as likely ({axles.lead:.1f} nat less)"
         doubts.append(Rejection("axles_uncertain", axles.lead, min_lead, text))
     elif is_named and axles.further > MAX_LEFT_HEIGHT:
         text = f"{n}, but a wheel of {axles.further:.2f} times the median amplitude is at none of them"

@@ -152,9 +152,9 @@ def settle_count(envelopes: SensorEnvelopes, fitted: FittedRow) -> tuple[FittedR
         Its wheels.
     lead : float
         Log evidence over the likeliest row with one vehicle exchanged and another number of axles; infinite where the
-        pattern has none. [nat]
+        pattern has none, 0 where vehicles were exchanged: equal and free amplitudes then disagree. [nat]
     """
-    fit = _fit_row(envelopes, fitted)
+    fit, given = _fit_row(envelopes, fitted), fitted
     for _ in range(len(fitted.vehicles)):
         rivals = _rivals(envelopes, fitted)
         if not rivals:
@@ -164,7 +164,7 @@ def settle_count(envelopes: SensorEnvelopes, fitted: FittedRow) -> tuple[FittedR
         if lead >= 0.0:
             break
         fitted, fit = rival, rival_fit
-    return fitted, fit, abs(lead)
+    return fitted, fit, abs(lead) if fitted is given else 0.0
 
 
 def _log_posterior(row: FittedRow, fit: AmplitudeFit) -> float:
