@@ -152,9 +152,9 @@ def settle_count(envelopes: SensorEnvelopes, fitted: FittedRow) -> tuple[FittedR
         Its wheels.
     lead : float
         Log evidence over the likeliest row with one vehicle exchanged and another number of axles; infinite where the
-        pattern has none, 0 where vehicles were exchanged: equal and free amplitudes then disagree. [nat]
+        pattern has none, 0 where the count is not that of ``fitted``: equal and free amplitudes disagree. [nat]
     """
-    fit, given = _fit_row(envelopes, fitted), fitted
+    fit, n_given = _fit_row(envelopes, fitted), fitted.comb.offsets.size
     for _ in range(len(fitted.vehicles)):
         rivals = _rivals(envelopes, fitted)
         if not rivals:
@@ -164,7 +164,7 @@ def settle_count(envelopes: SensorEnvelopes, fitted: FittedRow) -> tuple[FittedR
         if lead >= 0.0:
             break
         fitted, fit = rival, rival_fit
-    return fitted, fit, abs(lead) if fitted is given else 0.0
+    return fitted, fit, abs(lead) if fitted.comb.offsets.size == n_given else 0.0
 
 
 def _log_posterior(row: FittedRow, fit: AmplitudeFit) -> float:

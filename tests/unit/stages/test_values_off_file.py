@@ -8,6 +8,7 @@ import pytest
 
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout.mismatch.turnout.priors import TRACK
 from turnout.stages.values_off_file import sentences_on_values
 
 SHEAR = Nuisance("rail_shear", "-", 0.0, 0.12, meaning="ln shear stiffness of the rail", group="rail")
@@ -67,3 +68,9 @@ def test_all_values_of_the_whole_track_of_a_case_can_be_stated():
         (sentence,) = sentences_of((nuisance, 4.0 * nuisance.sd, 0.01))
         assert sentence.endswith(": 4.0 times its tolerance.")
         assert "_" not in sentence.removesuffix(nuisance.name.removeprefix("wheels_"))
+
+
+def test_the_shear_of_the_rail_and_the_mass_of_sleepers_have_an_error_of_the_model():
+    case = PlannedCase(small_plan(), families=("sensor_gain",))
+    errors = {n.name: n.model_sd for n in case.nuisances if n.model_sd}
+    assert errors == {"rail_shear": TRACK.rail_shear_model_sd, "sleeper_mass": TRACK.sleeper_mass_model_sd}
