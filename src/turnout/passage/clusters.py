@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 MIN_MEMBER_SHARE = 1e-4  # of a cluster's members that are farther away; a passage below it is outside
 MIN_SD = np.array([0.01, 0.02])  # least standard deviations of ln(speed) and ln(load)
+MAX_SHIFT = 2.0  # standard deviations between the means of a cluster and the previous one whose id it keeps
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def fit_clusters(passages: Sequence[Mapping], settings: PassageSettings, previou
     settings : PassageSettings
         Largest number of clusters of a type, and the seed.
     previous : Clusters or None
-        A cluster nearest to one of these keeps its id; new clusters get new numbers.
+        As many clusters as possible keep the id of one of these, see ``MAX_SHIFT``; the others get new numbers.
 
     Returns
     -------
@@ -199,20 +200,16 @@ def _with_ids(
     previous_clusters: Sequence[Cluster],
     next_number: int,
 ) -> list[Cluster]:
-    """Clusters with ids: that of the nearest previous cluster where it is nearer than two of its standard deviations.
+    """Clusters with ids: that of a previous cluster within ``MAX_SHIFT``, chosen so that most and the nearest keep them.
 
     The others get numbers from ``next_number`` on.
     """
     ids = {}
-    if previous_clusters and len(previous_clusters[0].mean) == len(components[0][1]):
-        distance = np.array(
-            [
-                [np.sqrt((m - c.mean) @ np.linalg.solve(c.covariance, m - c.mean)) for c in previous_clusters]
-                for _, m, _ in components
-            ]
-        )
-        for i, j in zip(*scipy.optimize.linear_sum_assignment(np.minimum(distance, 1e6))):
-            if distance[i, j] < 2.0:
+    if previous_clusters:
+        distance = np.array([[_distance(m, s, c) for c in previous_clusters] for _, m, s in components])
+        # a pair too far apart costs the same at any distance: it must not decide about the others
+        for i, j in zip(*scipy.optimize.linear_sum_assignment(np.minimum(distance, MAX_SHIFT))):
+            if distance[i, j] < MAX_SHIFT:
                 ids[i] = previous_clusters[j].id
     clusters = []
     for i, (weight, mean, covariance) in enumerate(components):
@@ -221,6 +218,16 @@ def _with_ids(
             next_number += 1
         clusters.append(Cluster(ids[i], type_, mean, covariance, float(weight), round(weight * n)))
     return sorted(clusters, key=lambda c: _number(c.id))
+
+
+def _distance(mean: np.ndarray, covariance: np.ndarray, previous: Cluster) -> float:
+    """Distance of two means in standard deviations of the wider cluster: one of few passages has nearly no width.
+
+    Only the speeds are compared where the loads are known in one of the clusters alone.
+    """
+    n = min(len(mean), len(previous.mean))
+    shift = mean[:n] - previous.mean[:n]
+    return min(float(np.sqrt(shift @ np.linalg.solve(c[:n, :n], shift))) for c in (covariance, previous.covariance))
 
 
 def _number(id_: str) -> int:

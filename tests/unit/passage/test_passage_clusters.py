@@ -68,6 +68,51 @@ def test_the_id_of_a_traffic_that_ended_is_not_used_again(settings):
     assert [c.id for c in clusters_of([other], without).clusters] == ["IC3/4"]
 
 
+@pytest.mark.parametrize("new_speed", [40.0, 110.0, 200.0, 230.0])
+def test_a_lasting_traffic_keeps_its_id_wherever_another_one_begins(new_speed, settings):
+    """80 km/h ends and another speed begins: on a line, two pairs far apart cost as much as one kept and one farther."""
+
+    def rows(rng, speed, n):
+        speeds, loads = speed * np.exp(0.03 * rng.standard_normal(n)), 12.0 * np.exp(0.06 * rng.standard_normal(n))
+        return [{"train_type": "IC3", "speed_kmh": float(v), "axle_load_t": float(p)} for v, p in zip(speeds, loads)]
+
+    for seed in range(5):
+        rng = np.random.default_rng([40, seed])
+        lasting = rows(rng, 160.0, 200)
+        first = fit_clusters(lasting + rows(rng, 80.0, 100), settings)
+        again = fit_clusters(lasting + rows(rng, new_speed, 100), settings, first)
+        assert [first.assign("IC3", v, 12.0) for v in (160.0, 80.0)] == ["IC3/1", "IC3/2"]
+        assert [again.assign("IC3", v, 12.0) for v in (160.0, new_speed)] == ["IC3/1", "IC3/3"]
+
+
+def test_a_traffic_keeps_the_id_that_its_first_passage_got(settings):
+    """One passage has no width of its own: the mean of the next ones is many of its standard deviations away."""
+    for seed in range(10):
+        rng = np.random.default_rng([41, seed])
+        speeds, loads = 140.0 * np.exp(0.05 * rng.standard_normal(30)), 12.0 * np.exp(0.06 * rng.standard_normal(30))
+        rows = [{"train_type": "IC3", "speed_kmh": float(v), "axle_load_t": float(p)} for v, p in zip(speeds, loads)]
+        clusters = None
+        for n in (1, 6, 11, 30):
+            clusters = fit_clusters(rows[:n], settings, clusters)
+        assert [c.id for c in clusters.clusters] == ["IC3/1"]
+
+
+@pytest.mark.parametrize("n_loaded", [(100, 101), (101, 100)])
+def test_ids_stay_when_half_of_the_loads_are_known_or_no_longer(n_loaded, settings):
+    """Up to half, the clusters follow from the speed alone; the mean speeds are those of the traffic in both cases."""
+    rng = np.random.default_rng(42)
+    speeds = np.repeat([160.0, 80.0], 100) * np.exp(0.04 * rng.standard_normal(200))
+    order = rng.permutation(200)
+    clusters = None
+    for n in n_loaded:
+        rows = [
+            {"train_type": "IC3", "speed_kmh": float(speeds[k]), "axle_load_t": 12.0 + 0.01 * i if i < n else None}
+            for i, k in enumerate(order)
+        ]
+        clusters = fit_clusters(rows, settings, clusters)
+        assert {clusters.assign("IC3", v, None) for v in (160.0, 80.0)} == {"IC3/1", "IC3/2"}
+
+
 def test_ids_stay_when_a_night_is_added_and_the_clusters_are_fitted_again(settings):
     rng = np.random.default_rng(2)
     rows, _ = night(rng, 600)
