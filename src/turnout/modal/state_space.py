@@ -147,7 +147,7 @@ def assemble(
     random_fits = random_mode_fits(records, rate, bands, settings.null_draws) if len(records) else None
     fit_results = {
         "fit_per_impact": tuple(float(f) for f in fits),
-        "fit_null": None if random_fits is None else float(np.quantile(random_fits, 0.95)),
+        "fit_null": None if random_fits is None else float(np.quantile(random_fits, 0.95, method="weibull")),
         "fit_null_draws": settings.null_draws,
         "scale": scale,
     }

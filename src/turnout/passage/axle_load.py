@@ -48,7 +48,10 @@ class LoadCalibration:
 
 @dataclass(frozen=True)
 class LoadFinding:
-    """Mean axle load with standard error [t], and ``per_axle`` (n_axle,) [t], which is less accurate."""
+    """Mean axle load with standard error [t], and ``per_axle`` (n_axle,) [t], which is less accurate.
+
+    1.96 standard errors on either side are a 95 % interval: those from few trains or axles are enlarged for it.
+    """
 
     mean: float
     se: float
@@ -266,9 +269,8 @@ def axle_load(
             continue
         regressors = np.array([1.0, np.log(speed / calibration.speed)])
         logs.append(np.log(mean) - regressors @ [calibration.log_gain, calibration.exponent])
-        errors.append(
-            np.sqrt(regressors @ calibration.covariance @ regressors + calibration.scatter**2 + (error / mean) ** 2)
-        )
+        by_trains = float(regressors @ calibration.covariance @ regressors + calibration.scatter**2)
+        errors.append(_student_error(by_trains, calibration.n - 2, float(error / mean) ** 2, amplitudes.size - 1))
         shapes.append(amplitudes / np.mean(amplitudes))
         shared = calibration.shared
     if not logs:
@@ -277,9 +279,20 @@ def axle_load(
     log_mean = float(np.sum(weight * logs) / weight.sum())
     contributions = weight * np.array(errors) / weight.sum()
     variance = shared * contributions.sum() ** 2 + (1.0 - shared) * np.sum(contributions**2)
-    between = float(np.sqrt(np.sum(weight * (np.array(logs) - log_mean) ** 2) / weight.sum())) if len(logs) > 1 else 0.0
-    relative = float(max(np.sqrt(variance), between / np.sqrt(len(logs))))
+    # of the mean, from the differences of the sensors: one sensor whose gain has changed moves the mean as much
+    between = np.sum(weight * (np.array(logs) - log_mean) ** 2) / (weight.sum() * max(len(logs) - 1, 1))
+    relative = float(np.sqrt(max(variance, between)))
     if relative > settings.load_relative_error_maximum:
         return None
     mean = float(np.exp(log_mean))
     return LoadFinding(mean, relative * mean, mean * np.mean(shapes, axis=0))
+
+
+def _student_error(by_trains: float, n_train: int, by_axles: float, n_axle: int) -> float:
+    """Standard error for a 95 % interval, from two variances with their degrees of freedom (Welch, Satterthwaite).
+
+    Five trains determine their scatter to a third only: where it is small by chance, the interval would be too short.
+    """
+    variance = by_trains + by_axles
+    freedom = variance**2 / (by_trains**2 / n_train + by_axles**2 / n_axle)
+    return float(np.sqrt(variance) * scipy.stats.t.ppf(0.975, freedom) / scipy.stats.norm.ppf(0.975))

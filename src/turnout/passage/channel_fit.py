@@ -280,7 +280,7 @@ def _impacts_and_test(
     spread = max(min(settings.place_error / speed, settings.time_search) * rate, 1.0)
     search_range = settings.time_search * rate
     times = impact_times(white, expected, basis, search_range, noise, spread, settings.ambiguity_odds)
-    return times, direction_test(white, np.sort(times.times), basis, noise, settings.chi_squared_level)
+    return times, direction_test(white, np.sort(times.times), basis, noise, settings.chi_squared_level, True)
 
 
 def _judge(scores: Scores, null: NullBand | None, test: DirectionTest, settings: PassageSettings) -> tuple[str, str]:

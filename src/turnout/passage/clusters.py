@@ -200,7 +200,7 @@ def _with_ids(
     previous_clusters: Sequence[Cluster],
     next_number: int,
 ) -> list[Cluster]:
-    """Clusters with ids: that of a previous cluster within ``MAX_SHIFT``, chosen so that most and the nearest keep them.
+    """Clusters with ids: those of previous clusters within ``MAX_SHIFT``, so that most and the nearest keep theirs.
 
     The others get numbers from ``next_number`` on.
     """

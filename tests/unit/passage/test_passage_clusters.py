@@ -70,7 +70,7 @@ def test_the_id_of_a_traffic_that_ended_is_not_used_again(settings):
 
 @pytest.mark.parametrize("new_speed", [40.0, 110.0, 200.0, 230.0])
 def test_a_lasting_traffic_keeps_its_id_wherever_another_one_begins(new_speed, settings):
-    """80 km/h ends and another speed begins: on a line, two pairs far apart cost as much as one kept and one farther."""
+    """80 km/h ends, another speed begins: on a line, two pairs far apart cost as much as one kept and one farther."""
 
     def rows(rng, speed, n):
         speeds, loads = speed * np.exp(0.03 * rng.standard_normal(n)), 12.0 * np.exp(0.06 * rng.standard_normal(n))

@@ -168,4 +168,14 @@ def test_the_null_band_ignores_scores_that_are_not_finite():
 
     made = [Scores(float(k), np.nan, float(k), np.zeros((1, 3)), 1, 2) for k in range(101)]
     band = NullBand.of(made)
-    assert band.fit == pytest.approx(95.0) and np.isnan(band.forecast) and band.n == 101
+    assert band.fit == pytest.approx(95.9) and np.isnan(band.forecast) and band.n == 101
+
+
+@pytest.mark.parametrize(("n", "n_above"), [(19, 0), (39, 1), (99, 4)])
+def test_a_further_random_model_is_above_the_null_with_a_probability_of_five_per_cent(n, n_above):
+    """Of n + 1 models in random order each rank is as likely: the k-th of n is exceeded with (n + 1 - k) / (n + 1)."""
+    from turnout.passage.scores import Scores
+
+    band = NullBand.of([Scores(float(k), float(k), float(k), np.zeros((1, 3)), 1, 2) for k in range(n)])
+    assert (n_above + 1) / (n + 1) == pytest.approx(0.05, abs=1e-9)
+    assert (band.fit, band.forecast, band.leave_one_out) == pytest.approx((n - 1 - n_above,) * 3)

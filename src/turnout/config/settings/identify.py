@@ -86,7 +86,13 @@ class IdentifySettings:
         0.5, "", "share of the half-power band of a mode that must pass the coherence gate", minimum=0.0, maximum=1.0
     )
     confidence: float = setting(0.95, "", "level of the intervals", minimum=0.5, maximum=0.999)
-    null_draws: int = setting(60, "", "random pole sets behind the null of the fit", minimum=10, maximum=10000)
+    null_draws: int = setting(
+        60,
+        "",
+        "random pole sets behind the null of the fit; fewer than 19 have no 95 % quantile",
+        minimum=19,
+        maximum=10000,
+    )
     split_frequency: float = setting(200.0, "Hz", "frequency at which method paper splits its bands", minimum=1.0)
     paper_band_high: float = setting(800.0, "Hz", "upper end of the paper's high band", minimum=1.0)
     paper_filter_order: int = setting(

@@ -38,7 +38,9 @@ class PassageSettings:
         0.0,
         1.0,
     )
-    null_models: int = setting(30, "", "random pole pairs behind each null band", 5, 1000)
+    null_models: int = setting(
+        30, "", "random models behind each null band; fewer than 19 have no 95 % quantile", 19, 1000
+    )
     scored_share: float = setting(
         1.0, "", "share of the passages that are scored; of the others only the peak acceleration is kept", 0.0, 1.0
     )
@@ -71,7 +73,9 @@ class PassageSettings:
         0.005,
         0.5,
     )
-    load_trains_minimum: int = setting(5, "", "trains of known weight that a calibration needs", 2)
+    load_trains_minimum: int = setting(
+        8, "", "trains of known weight that a calibration needs; its error is too uncertain with fewer", 2
+    )
     # files of the analysis
     axle_patterns: str = setting(
         "config/vehicles/axle_patterns.yaml", "", "axle patterns of known trains, from the folder of the run"
