@@ -245,17 +245,17 @@ def teeth_of(profiles: Profiles, comb: Comb, start: float) -> tuple[np.ndarray, 
     residuals : (n_sensor, n) array of float
         Profiles without the comb. [-]
     """
-    size, half = 2 * (profiles.spectra.shape[2] - 1), N_TAPS // 2
-    index = round((start + LEAD_LENGTH) / COMB_STEP)
+    low = round((start + LEAD_LENGTH) / COMB_STEP) - N_TAPS // 2
+    n_model = comb.teeth.size + N_TAPS - 1
+    before, after = max(-low, 0), max(low + n_model - profiles.values.shape[2], 0)
     teeth, residuals = [], []
-    for spectrum, values in zip(profiles.spectra[:, 0], profiles.values[:, 0]):
-        correlation = np.fft.irfft(spectrum * np.fft.rfft(comb.teeth, size).conj(), size)
-        tooth = comb.inverse @ correlation[index - half : index + half + 1]
-        model, low = np.convolve(comb.teeth, tooth), index - half
-        residual, inside = values.copy(), slice(max(low, 0), min(low + model.size, values.size))
-        residual[inside] -= model[inside.start - low : inside.stop - low]
+    for values in profiles.values[:, 0]:
+        residual = np.pad(values, (before, after))  # a wheel may have passed before the record
+        inside = residual[low + before :][:n_model]
+        tooth = comb.inverse @ np.correlate(inside, comb.teeth, "valid")
+        inside -= np.convolve(comb.teeth, tooth)
         teeth.append(tooth)
-        residuals.append(residual)
+        residuals.append(residual[before : before + values.size])
     return np.array(teeth), np.array(residuals)
 
 

@@ -140,6 +140,9 @@ def inconsistent_positions(
 def half_shifts(envelopes: SensorEnvelopes, motion: Motion) -> np.ndarray:
     """(n_sensor, 2) shift [m] of each sensor against the others, in the first and second half of the train.
 
+    Only the part of the train that every sensor recorded is compared: in a recording that begins or ends within the
+    train, a sensor would seem shifted towards the wheels that it has not missed.
+
     Parameters
     ----------
     envelopes : SensorEnvelopes
@@ -150,17 +153,28 @@ def half_shifts(envelopes: SensorEnvelopes, motion: Motion) -> np.ndarray:
     Returns
     -------
     (n_sensor, 2) array of float
-        Shift in the first and the second half. [m]
+        Shift in the first and the second half. A half of which the sensors have less than twice
+        ``MAX_POSITION_SHIFT`` in common has the shift of the other one, 0 if neither has more. [m]
     """
     extent = motion.distance(np.array([envelopes.begin, envelopes.end]))
     middle = motion.direction * np.mean(envelopes.positions)
     start, stop = extent[0] - middle - 30.0, extent[1] - middle + 30.0
+    duration = envelopes.levels.values.shape[1] * envelopes.levels.step
+    recorded = motion.distance(np.array([[0.0], [duration]])) - motion.direction * envelopes.positions
+    first, last = max(start, recorded[0].max()), min(stop, recorded[1].min())
+    max_shift = min(MAX_TRIED_SHIFT, 0.5 * (last - first))
+    if max_shift < MAX_POSITION_SHIFT:
+        return np.zeros((len(envelopes.positions), 2))
     values = along_train(envelopes.levels.values, envelopes.levels.step, envelopes.positions, motion, start, stop)
-    values = values - values.mean(axis=1, keepdims=True)
+    offsets = start + np.arange(values.shape[1]) * GRID_STEP
+    in_common = (offsets >= first) & (offsets <= last)
+    values = np.where(in_common, values - values[:, in_common].mean(axis=1, keepdims=True), 0.0)
     n, shifts = values.shape[1], np.zeros((len(values), 2))
-    lags = np.arange(-int(MAX_TRIED_SHIFT / GRID_STEP), int(MAX_TRIED_SHIFT / GRID_STEP) + 1)
-    for k, half in enumerate((slice(0, n // 2), slice(n // 2, n))):
-        rows = values[:, half]
+    lags = np.arange(-int(max_shift / GRID_STEP), int(max_shift / GRID_STEP) + 1)
+    halves = (slice(0, n // 2), slice(n // 2, n))
+    comparable = [k for k in (0, 1) if np.sum(in_common[halves[k]]) * GRID_STEP >= 2.0 * MAX_POSITION_SHIFT]
+    for k in comparable:
+        rows = values[:, halves[k]]
         size = 2 ** int(np.ceil(np.log2(2 * rows.shape[1])))
         spectra = np.fft.rfft(rows, size, axis=1)
         for i in range(len(rows)):
@@ -168,4 +182,4 @@ def half_shifts(envelopes: SensorEnvelopes, motion: Motion) -> np.ndarray:
             median_of_others = np.median(np.delete(rows, i, axis=0), axis=0)
             correlation = np.fft.irfft(spectra[i] * np.fft.rfft(median_of_others, size).conj(), size)
             shifts[i, k] = lags[np.argmax(correlation[lags])] * GRID_STEP
-    return shifts
+    return shifts[:, [k if k in comparable else 1 - k for k in (0, 1)]]

@@ -1,13 +1,24 @@
 """A row of axles that is only a part of the train: signals before or behind it are detected."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import PATTERN_FILE, RATE, recording_of, rolling_noise, sensors_for
+from benchmarks.passage_truth import (
+    IC3,
+    PATTERN_FILE,
+    PATTERNS,
+    RATE,
+    passing_times,
+    recording_of,
+    rolling_noise,
+    sensors_for,
+)
 
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_patterns import offsets, read_patterns
+from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, N_TAPS, Comb, teeth_of
 from turnout.passage.comb_search import continues_beyond
 from turnout.passage.kinematics import Motion
 from turnout.passage.train_detection import audible_sensors, sensor_envelopes
@@ -64,3 +75,49 @@ def test_sensors_of_the_neighbouring_track_are_not_used_beside_one_sensor_of_the
     samples = rolling_noise(rng, positions=(2.0, 9.0, 14.0)).samples * np.array([[1.0], [0.08], [0.08]])
     samples += 1e-3 * rng.standard_normal(samples.shape)
     assert audible_sensors(sensor_envelopes(samples, RATE, (2.0, 9.0, 14.0), 0.001)).tolist() == [0]
+
+
+PLACES = (-12.0, 3.6, 13.8, 24.6, 26.4, 36.0)  # m, those of config/layouts
+COACHES_OF_TRAIN = np.concatenate([26.4 * k + np.array([2.5, 5.0, 21.5, 24.0]) for k in range(6)])
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(
+    ("offsets", "first", "last"),
+    [
+        *((offsets, *part) for offsets in (IC3, COACHES_OF_TRAIN) for part in ((0.0, 0.6), (0.4, 1.0))),
+        (COACHES_OF_TRAIN, 0.25, 0.75),
+    ],
+)
+def test_a_part_of_a_train_is_no_fault_of_a_clock(offsets, first, last, direction, settings):
+    """Sensors over 48 m record different parts of it; the first wheels may have passed before the recording."""
+    recording = rolling_noise(np.random.default_rng(11), offsets, 22.0, PLACES, direction, lead=2.0)
+    start, *_, end = passing_times(offsets, PLACES, 22.0, 0.0, direction, 2.0)[0 if direction > 0 else -1]
+    begin = int((start + first * (end - start)) * RATE) if first else 0
+    stop = int((start + last * (end - start)) * RATE) if last < 1.0 else recording.n_sample
+    passage = analyse(
+        replace(recording, samples=recording.samples[:, begin:stop]), sensors_for(recording), PATTERNS, settings
+    )
+    assert passage.n_axle and not {"clock_drift", "two_trains"} & {f.reason for f in passage.findings}
+    assert "train_cut_off" in {f.reason for f in passage.findings}
+    assert passage.speed.speed == pytest.approx(22.0, abs=4.0 * passage.speed.se)
+
+
+@pytest.mark.parametrize("first_axle", [-90.0, -30.0, -14.0, 3.0, 55.0, 70.0])
+def test_wheels_outside_the_recorded_part_have_no_signal_in_it(first_axle):
+    """The normal equations written out, with 0 for what was not recorded: 12 m before the audible part, 60 m of it."""
+    offsets, rng = np.array([0.0, 2.52, 16.5, 19.02, 40.02]), np.random.default_rng(12)
+    values, comb, half = rng.standard_normal((2, 1200)), Comb.of(offsets), N_TAPS // 2
+    teeth, residuals = teeth_of(SimpleNamespace(values=values[:, None]), comb, first_axle)
+    first = round((first_axle + LEAD_LENGTH) / COMB_STEP)
+    for row, tooth, residual in zip(values, teeth, residuals):
+        recorded = [(first + i + k, i, k) for i in range(comb.teeth.size) for k in range(-half, half + 1)]
+        recorded = [r for r in recorded if 0 <= r[0] < row.size]
+        correlation, model = np.zeros(N_TAPS), np.zeros(row.size)
+        for point, i, k in recorded:
+            correlation[k + half] += comb.teeth[i] * row[point]
+        expected = comb.inverse @ correlation
+        for point, i, k in recorded:
+            model[point] += comb.teeth[i] * expected[k + half]
+        np.testing.assert_allclose(tooth, expected, atol=1e-9)
+        np.testing.assert_allclose(residual, row - model, atol=1e-9)
