@@ -22,7 +22,7 @@ from turnout.passage.channel_fit import fit_channel
 from turnout.passage.clusters import fit_clusters
 from turnout.passage.impact_timing import impact_times
 from turnout.passage.impulse_fit import onsets
-from turnout.passage.model_tests import direction_test, null_bases, null_scores
+from turnout.passage.model_tests import NullBand, direction_test, null_bases, null_scores
 from turnout.passage.score_regression import effects
 from turnout.passage.scores import fit_percent, score
 from turnout.passage.segmentation import cut_passages
@@ -40,6 +40,8 @@ SENSOR_SUBSETS = ((7,), (4, 5), (2, 5, 9), tuple(range(12)))
 def bars() -> Iterator[Bar]:
     yield from scores_and_times()
     yield from noise_passages()
+    yield from null_level()
+    yield from partial_trains()
     yield from real_axle_times()
     yield from axle_geometry()
     yield from simulated_fleet()
@@ -130,6 +132,55 @@ def noise_passages() -> Iterator[Bar]:
     yield Bar("noise: largest forecast with the best of 30 random models", max(null_best), 7.0, "%", "<=", "n=40")
     above = float(np.mean(np.array(leave_one_out) > np.quantile(null_left, 0.95)))
     yield Bar("noise: leave-one-out above the 95 % quantile of its null", above, 0.15, "", "<=", "n=40")
+
+
+def null_level() -> Iterator[Bar]:
+    """Random models against null bands of 30 others, on four records each of noise, rolling wheels and impacts."""
+    rng, through = np.random.default_rng(12), band_pass(80, 800, 4, RATE)
+    bases = null_bases(4, through, RATE, replace(SETTINGS, null_models=200, null_seed=12))
+    above = []
+    for k in range(12):
+        speed = rng.uniform(20.0, 45.0)
+        record, times = impact_record(rng, LOCATIONS[k % len(LOCATIONS)], speed=speed), (0.6 + IC3 / speed) * RATE
+        samples = record.samples
+        if k % 3 == 1:
+            samples, times = rng.standard_normal(samples.size), record.times
+        elif k % 3 == 2:
+            samples = passage_truth.rolling_noise(rng, IC3, speed, (0.0,), lead=0.6).samples[0]
+        scores = null_scores(apply_filter(samples, through), times, bases, SETTINGS)
+        for _ in range(100):
+            order = rng.permutation(len(scores))
+            band = NullBand.of([scores[i] for i in order[:30]])
+            above += [
+                (
+                    scores[i].fit > band.fit,
+                    scores[i].forecast > band.forecast,
+                    scores[i].leave_one_out > band.leave_one_out,
+                )
+                for i in order[30:60]
+            ]
+    for name, share in zip(("fit", "forecast", "leave-one-out"), np.mean(above, axis=0)):
+        yield Bar(f"random models above the null of 30 others, {name}", 100 * share, 5.5, "%", "<=", "12 records")
+
+
+def partial_trains() -> Iterator[Bar]:
+    """Recordings that begin or end within the train, six sensors over 48 m."""
+    rng, positions = np.random.default_rng(13), (-12.0, 3.6, 13.8, 24.6, 26.4, 36.0)
+    coaches = (26.4 * np.arange(6)[:, None] + [2.5, 5.0, 21.5, 24.0]).ravel()
+    tally = {"clock_drift": 0, "two_trains": 0, "train_cut_off": 0}
+    for k in range(36):
+        offsets, direction, speed = (IC3, coaches)[k % 2], (1, -1)[k // 2 % 2], rng.uniform(12.0, 30.0)
+        recording = passage_truth.rolling_noise(rng, offsets, speed, positions, direction, lead=2.0)
+        begin, stop = (2.0 + share * offsets[-1] / speed for share in (rng.uniform(0.2, 0.4), rng.uniform(0.6, 0.8)))
+        part = slice(int(begin * RATE) if k % 3 else None, int(stop * RATE) if k % 3 != 1 else None)
+        recording = replace(recording, samples=recording.samples[:, part])
+        passage = analyse(recording, passage_truth.sensors_for(recording), shipped_patterns(), SETTINGS)
+        for reason in tally:
+            tally[reason] += reason in {f.reason for f in passage.findings}
+    yield Bar("parts of trains: marked as cut off", tally["train_cut_off"], None, "of 36", "")
+    yield Bar(
+        "parts of trains: clocks or second trains reported", tally["clock_drift"] + tally["two_trains"], 2, "", "<="
+    )
 
 
 def real_axle_times() -> Iterator[Bar]:
