@@ -49,9 +49,13 @@ class FittedGroup:
     sections: str
     route: str
 
+    def without_jacobian(self) -> FittedGroup:
+        """The same without the Jacobian of its fit, by far its largest item."""
+        return replace(self, fit=self.fit.without_jacobian())
 
-class AgreeingInformation(MutableMapping[str, tuple[GroupInformation, ...]]):
-    """Information by key on disk, one file for each visit: that of another belief before it is replaced.
+
+class KeyedInformation(MutableMapping[str, tuple[GroupInformation, ...]]):
+    """Information by ``key_of`` on disk, one file for each visit: that of another belief before it is replaced.
 
     Parameters
     ----------
@@ -163,7 +167,7 @@ def agreeing_visits(
         k = next(differing, None)
         if k is None:
             return current
-        key = _key(current[k], steps[k].predicted)
+        key = key_of(current[k], steps[k].predicted)
         information = store.get(key)
         if information is None:
             try:
@@ -179,7 +183,19 @@ def agreeing_visits(
         n_done = k + 1
 
 
-def _key(visit: VisitInformation, belief: Belief) -> str:
+def key_of(visit: VisitInformation, belief: Belief) -> str:
+    """Key of a visit and the belief before it.
+
+    Parameters
+    ----------
+    visit : VisitInformation
+    belief : Belief
+
+    Returns
+    -------
+    str
+        Another one where any number of either differs.
+    """
     content = hashlib.sha256(belief.mean.tobytes() + belief.covariance.tobytes())
     for group in sorted(visit.groups, key=lambda g: (g.group, g.vector.tobytes())):
         content.update(group.group.encode() + group.vector.tobytes() + group.matrix.tobytes())

@@ -38,21 +38,19 @@ from turnout.mismatch.turnout.calibration import (
 from turnout.mismatch.turnout.further_passages import names_beyond
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import changes_of, further_candidates, without_accepted
-from turnout.stages.agreeing_visits import (
-    AgreeingInformation,
-    FittedGroup,
-    agreeing_visits,
-)
+from turnout.stages.agreeing_visits import FittedGroup, KeyedInformation, agreeing_visits
 from turnout.stages.checkpoint import SUFFIX
 from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, unit_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs, mismatch_context
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
+from turnout.stages.restarted_visits import restarted_visits
 from turnout.stages.stored_visits import (
     FOLDER,
     MAX_FITTED_AXLES,
     USED_ANSWERS,
+    fit_group,
     parameters_of,
     read_visits,
     store_visit,
@@ -69,11 +67,13 @@ from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
+    from turnout.mismatch.calibrated.belief import Belief
     from turnout.records import Unit
     from turnout.stages.mismatch_groups import Group
     from turnout.stages.stored_visits import StoredVisit
 
 AGREEING = "linearized-again"  # folder of visits that agree with the earlier ones, see ``agreeing_visits``
+RESTARTED = "fitted-again"  # folder of visits that differ from the earlier ones, see ``restarted_visits``
 MAX_FITS_IN_MEMORY = 12  # of the newest visits; others are fitted again where a visit seems to differ
 MAX_PASSAGES_AND_AXLES = (60, 1000)  # of a group of sections at one visit
 
@@ -271,11 +271,17 @@ class _VisitFits:
         """Fits of the groups of a visit, from memory or made again."""
         return self._in_memory.get(label) or self._fit(label)
 
-    def _fit(self, label: str) -> list[FittedGroup]:
+    def from_belief(self, label: str, belief: Belief) -> list[FittedGroup]:
+        """Fits of the groups of a visit that begin at the means of a belief, with their Jacobians. None is stored."""
+        return self._fit(label, belief)
+
+    def _fit(self, label: str, start: Belief | None = None) -> list[FittedGroup]:
         about = {"turnout": self.turnout, "visit": label, "version": self.versions[label], "without": self.without}
         about["answers"] = {sections: a for (visit, sections), a in self.answers.items() if visit == label}
-        print(f"{self.turnout.id}: fit of visit {label}", file=sys.stderr, flush=True)
-        fitted, reasons = _fit_visit(self.folder, self.units[label], self.raw_root, self.work, self.track, about)
+        again = " from the values that earlier visits predict" if start else ""
+        print(f"{self.turnout.id}: fit of visit {label}{again}", file=sys.stderr, flush=True)
+        paths = self.folder, self.raw_root, self.work, self.track
+        fitted, reasons = _fit_visit(*paths, self.units[label], about, start)
         self.notes.extend(reasons)
         return fitted
 
@@ -291,9 +297,10 @@ def _model_of_visits(
     turnout_track, _ = track_of(turnout, fits.track)
     accepted = changes_of(turnout_track.terms)
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
-    again = AgreeingInformation(fits.folder / AGREEING / turnout.id, fits.versions)
     settings = turnout.settings["mismatch"]
+    again, restarted = (KeyedInformation(fits.folder / f / turnout.id, fits.versions) for f in (AGREEING, RESTARTED))
     informed = agreeing_visits(parameters, informed, events, fits.of_visit, again, settings.threshold)
+    informed = restarted_visits(parameters, informed, events, fits.of_visit, fits.from_belief, restarted)
     stored = with_information(stored, informed)
     history = estimate_history(parameters, visits_of(without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)
@@ -331,15 +338,17 @@ def _model_of_visits(
 
 def _fit_visit(
     folder: Path,
-    units: Sequence[Unit],
     raw_root: str | Path,
     work: str | Path,
     track: str | None,
+    units: Sequence[Unit],
     about: Mapping[str, Any],
+    start: Belief | None,
 ) -> tuple[list[FittedGroup], list[str]]:
-    """Fit the groups of a visit and store their information: fits, and reasons why a group could not be fitted.
+    """Fit the groups of a visit: fits, and reasons why a group could not be fitted.
 
     ``about["answers"]`` are those of its diagnosis, by sections. A visit with answers is fitted as it was diagnosed.
+    Information is stored of fits that begin at the values of the file, where ``start`` is None.
     """
     turnout, fitted, notes, answers = about["turnout"], list[FittedGroup](), list[str](), about["answers"]
     turnout_track, accepted = track_of(turnout, track)
@@ -359,7 +368,11 @@ def _fit_visit(
             case = TrackCase(campaign, turnout.settings["mismatch"], accepted=on_route)
             faults = [sentence for fault in case.data.layout_faults for sentence in fault.sentences()]
             notes += [f"visit {about['visit']}: {sentence}" for sentence in faults]
-            fitted.append(store_visit(folder, group, case, answers.get(", ".join(group.labels), ""), about))
+            if start is None:
+                fitted.append(store_visit(folder, group, case, answers.get(", ".join(group.labels), ""), about))
+            else:
+                settings = turnout.settings["mismatch"]
+                fitted.append(fit_group(group, case, settings, about["without"], start=start))
         except (SimulationError, np.linalg.LinAlgError) as error:
             notes.append(f"visit {about['visit']}, sections {', '.join(group.labels)}: {error}")
     return fitted, notes

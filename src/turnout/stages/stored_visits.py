@@ -37,7 +37,9 @@ from turnout.stages.track_files import digest_of_model
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
+    from turnout.config.settings.mismatch import MismatchSettings
     from turnout.config.turnout import TurnoutConfig
+    from turnout.mismatch.calibrated.belief import Belief
     from turnout.mismatch.engine.fit import Fit
     from turnout.records import Unit
     from turnout.stages.mismatch_groups import Group
@@ -107,6 +109,61 @@ def version_of(
     return {"code": code, "model": model, "recordings": recordings}
 
 
+def fit_group(
+    group: Group,
+    case: TrackCase,
+    settings: MismatchSettings,
+    without: Collection[str] = (),
+    store: MutableMapping[str, Any] | None = None,
+    start: Belief | None = None,
+) -> FittedGroup:
+    """Fit of a group of sections at one visit, with values far beyond their priors where the evidence asks for them.
+
+    Parameters
+    ----------
+    group : Group
+        The sections.
+    case : TrackCase
+        Their case.
+    settings : MismatchSettings
+    without : collection of str
+        Names of effects that are left out of the library.
+    store : mapping or None
+        Fits of the diagnosis, which has the base fit.
+    start : Belief or None
+        Begins at its means. None: at the values of the file.
+
+    Returns
+    -------
+    FittedGroup
+
+    Raises
+    ------
+    SimulationError
+        The base model cannot be simulated.
+    """
+    means = {} if start is None else dict(zip(start.names, start.mean.tolist()))
+    at_start = {n: means[p.name] for n, p in calibrated_parameters(case, group.route).items() if p.name in means}
+    search, fit = fit_base(Search.of(case, settings, None, store), at_start)
+    assert isinstance(search.case, TrackCase)
+    parameters = calibrated_parameters(search.case, group.route)
+    positions = [nuisance for nuisance, p in parameters.items() if p.name.startswith(NOSE_POSITION)]
+    if start is None:
+        fit = fit_from_nose_positions(search, fit, positions)
+    may_be_large = [
+        nuisance
+        for nuisance, p in parameters.items()
+        if p.may_change and p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in without
+    ]
+    dampers = {f"{p.group}_{p.index}": n for n, p in parameters.items() if p.group.endswith("_damper")}
+    partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
+    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
+    case, fit = with_reserved_passages(search.case, fit, one_of_each_group(search.case))
+    if positions:
+        fit = _fit_again(case, fit, may_be_large, partners)
+    return FittedGroup(*with_reserved_passages(case, fit), parameters, ", ".join(group.labels), group.route)
+
+
 def store_visit(
     folder: Path,
     group: Group,
@@ -115,7 +172,7 @@ def store_visit(
     about: Mapping[str, Any],
     store: MutableMapping[str, Any] | None = None,
 ) -> FittedGroup:
-    """Write the information of a group of sections at one visit.
+    """Fit a group of sections at one visit and write its information.
 
     Parameters
     ----------
@@ -135,35 +192,19 @@ def store_visit(
     Returns
     -------
     FittedGroup
-        The fit that the information is of.
+        The fit that the information is of, without its Jacobian.
 
     Raises
     ------
     SimulationError
         The base model cannot be simulated.
     """
-    search, fit = fit_base(Search.of(case, about["turnout"].settings["mismatch"], None, store))
-    assert isinstance(search.case, TrackCase)
-    parameters = calibrated_parameters(search.case, group.route)
-    positions = [nuisance for nuisance, p in parameters.items() if p.name.startswith(NOSE_POSITION)]
-    fit = fit_from_nose_positions(search, fit, positions)
-    may_be_large = [
-        nuisance
-        for nuisance, p in parameters.items()
-        if p.may_change and p.group in dict(CALIBRATION.least_sizes) and NAMES[p.group] not in about.get("without", ())
-    ]
-    dampers = {f"{p.group}_{p.index}": n for n, p in parameters.items() if p.group.endswith("_damper")}
-    partners = {n: dampers[key] for n in may_be_large if (key := _damper_key(parameters[n])) in dampers}
-    fit = fit_large_values(search, fit, may_be_large, CALIBRATION.change_sds, partners)
-    sections = ", ".join(group.labels)
-    case, fit = with_reserved_passages(search.case, fit, one_of_each_group(search.case))
-    if positions:
-        fit = _fit_again(case, fit, may_be_large, partners)
-    fitted = FittedGroup(*with_reserved_passages(case, fit), parameters, sections, group.route)
-    information = visit_groups(fitted.case, fitted.fit, sections, group.route)
+    settings = about["turnout"].settings["mismatch"]
+    fitted = fit_group(group, case, settings, about.get("without", ()), store)
+    information = visit_groups(fitted.case, fitted.fit, fitted.sections, group.route)
     levels = channel_levels(fitted.case, fitted.fit)
-    _write_visit(folder, group, parameters, answer, about, information, levels)
-    return replace(fitted, fit=fitted.fit.without_jacobian())
+    _write_visit(folder, group, fitted.parameters, answer, about, information, levels)
+    return fitted.without_jacobian()
 
 
 def store_answer(folder: Path, group: Group, case: TrackCase, answer: str, about: Mapping[str, Any]) -> None:

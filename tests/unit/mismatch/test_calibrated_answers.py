@@ -1,5 +1,6 @@
 """Answers of the calibrated model after each visit, on seeded linear histories with a known change."""
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -192,7 +193,15 @@ def test_intact_histories_have_no_finding():
 
 def test_a_change_below_the_smallest_size_has_no_name():
     answer = last_answers(histories(np.random.default_rng(8), 6, step("gain_A1", 0.07, 3)))["change"]
-    assert answer.verdict in ("none", "unknown")  # 0.08 is the smallest change of a gain that matters
+    assert answer.verdict == "none"  # 0.08 is the smallest change of a gain that matters
+
+
+def test_a_small_change_that_makes_visits_differ_has_its_name(monkeypatch):
+    """The same change in more exact recordings: the visits are not used, and "unknown" helps nobody."""
+    monkeypatch.setattr(sys.modules[__name__], "SD", 0.4 * SD)
+    answer = last_answers(histories(np.random.default_rng(9), 6, step("gain_A1", 0.07, 3)))["change"]
+    assert (answer.verdict, answer.names, answer.parameter) == ("named", ("sensor_gain",), "gain_A1")
+    assert answer.size == pytest.approx(0.07, abs=2.0 * answer.sd) and answer.onset == (1.0, 1.5)
 
 
 WAVES = Waves((2.0, 9.0), 0.0)

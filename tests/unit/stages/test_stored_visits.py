@@ -35,10 +35,11 @@ def test_a_folder_that_does_not_exist_yet_is_no_error(tmp_path):
 def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypatch, tmp_path, parameter, expected):
     """The second fit is stored. The tests of worn noses test the fits themselves; here, fits are only names."""
     case, parameters = object.__new__(TrackCase), {"n": StateParameter(parameter, 0.0, 0.1, 0.0, "surface")}
-    first, again = (SimpleNamespace(name=name, without_jacobian=lambda: None) for name in ("first", "again"))
+    first, again = (SimpleNamespace(name=name) for name in ("first", "again"))
+    first.without_jacobian, again.without_jacobian = lambda: first, lambda: again
     written = {}
     replaced = {
-        "fit_base": lambda search: (SimpleNamespace(case=case), first),
+        "fit_base": lambda search, values: (SimpleNamespace(case=case), first),
         "calibrated_parameters": lambda *_: parameters,
         "fit_from_nose_positions": lambda search, fit, positions: fit,
         "fit_large_values": lambda search, fit, *_: fit,
@@ -56,7 +57,6 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
     turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
     description = {"turnout": turnout, "visit": "2026-01-01", "version": {}}
     group = SimpleNamespace(labels=("A",), route="main")
-    monkeypatch.setattr(stored_visits, "replace", lambda fitted, fit: fitted)
     stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")
     assert written["levels"] == {"channel A1 in the passages": 0.5}

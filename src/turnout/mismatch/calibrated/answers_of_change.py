@@ -170,7 +170,12 @@ def change_answer(
     gain = _evidence_of_name(relevant, by_name)
     if gain < least:
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
-        return _on_surface(_answer_without_name(by_stated_errors, visit, by_name), by_stated_errors, surface)
+        answer = _answer_without_name(by_stated_errors, visit, by_name)
+        if answer.verdict == "none" or is_alarmed:
+            return _on_surface(answer, by_stated_errors, surface)
+        return change_answer(  # what makes a visit differ has a name, however small it is
+            parameters, visits, events, candidates, threshold, margin, True, with_trains, surface
+        )
     leader = relevant[0]
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     if is_under_load(leader.effect):

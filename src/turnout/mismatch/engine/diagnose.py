@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -139,13 +139,15 @@ def diagnose(
     return Diagnosis(verdicts, base, fit, frames, verification, latent, findings.scores, location)
 
 
-def fit_base(search: Search) -> tuple[Search, Fit]:
+def fit_base(search: Search, values: Mapping[str, float] | None = None) -> tuple[Search, Fit]:
     """Fit without any effect, with the errors of the observations as that fit gives them.
 
     Parameters
     ----------
     search : Search
         Its store may have the fit already.
+    values : mapping or None
+        Nuisance parameters where the fit starts; others start where the case says, or at their prior mean.
 
     Returns
     -------
@@ -159,7 +161,7 @@ def fit_base(search: Search) -> tuple[Search, Fit]:
         If the base model cannot be simulated.
     """
     iterations = search.settings.base_iterations
-    base = search.stored_fit("base", lambda: fit_jointly(search.case, iterations=iterations))
+    base = search.stored_fit("base", lambda: fit_jointly(search.case, values=values, iterations=iterations))
     assert base is not None
     return search.with_updated_errors(base)
 
