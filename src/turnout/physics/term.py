@@ -35,7 +35,8 @@ class Parameter:
 
     At ``neutral`` the term vanishes; ``bounds`` limit the plausible range; both are in ``unit``. ``meaning`` is a short
     description, ``source`` the source of the range. ``prior`` is (mean, standard deviation) or None. ``has_open_ends``:
-    a fit that ends at a bound asks for a value beyond it, which is another effect.
+    a fit that ends at a bound asks for a value beyond it, which is another effect. ``model_error_share``: share by
+    which an estimate errs, since the shape of the true effect is another; the size has that of its effect.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Parameter:
     source: str
     prior: tuple[float, float] | None = None
     has_open_ends: bool = False
+    model_error_share: float = 0.0
 
 
 class SleeperState(Protocol):

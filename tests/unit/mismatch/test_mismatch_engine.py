@@ -251,6 +251,20 @@ def test_the_error_of_a_size_includes_the_model_error_of_its_effect():
     assert np.allclose(loose.psi_se**2, fit.psi_se**2 + (0.15 * fit.psi) ** 2, atol=0.0, rtol=1e-12)
 
 
+def test_further_parameters_have_model_errors_of_their_own():
+    case = Line(lambda x: x + 0.4 * x**2)
+    strict, fit = case.candidates[0], fit_jointly(case, (case.candidates[0],), np.array([0.3]))
+    (size,) = strict.parameters
+    length = replace(size, name="length", neutral=0.6, model_error_share=0.2)
+    effect = replace(strict.effect, parameters=(size, length), model_error_share=0.15)
+    several = replace(
+        fit, values={}, candidates=(replace(strict, effect=effect), strict), psi=np.array([0.3, 0.5, 0.4]),
+        covariance=np.diag([1e-4, 4e-4, 9e-4]),
+    )  # fmt: skip
+    expected = [1e-4 + (0.15 * 0.3) ** 2, 4e-4 + (0.2 * 0.5) ** 2, 9e-4]
+    assert np.allclose(several.psi_se**2, expected, atol=0.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize("n", [100, 200])  # with one dense matrix, and with the modes
 def test_modes_in_single_precision_whiten_as_in_double(n):
     rng = np.random.default_rng(4)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
 
 from turnout import physics
 from turnout.mismatch.turnout.receptance_model import tangent_links
@@ -391,3 +392,24 @@ def test_half_the_contact_constant_has_the_stiffness_of_hertz():
     """1.5 k^(2/3) W^(1/3): a factor 0.5 gives 0.63 at 75 kN."""
     soft, base = physics.ContactStiffness(0.5).vehicle(car()).contact, car().contact
     assert soft.tangent(75e3) / base.tangent(75e3) == pytest.approx(0.5 ** (2 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", [lambda u: 1.0 - u, lambda u: np.cos(0.5 * np.pi * u) ** 2, lambda u: (1.0 - u) ** 2])
+def test_the_error_of_the_length_of_a_dip_covers_shapes_that_its_formula_does_not_have(shape):
+    """A V, a cosine and a cusp of 0.7 m: the least-squares fit of the formula to each of them. [m]"""
+    x = np.linspace(-1.0, 1.0, 2001)
+    true = np.where(np.abs(x) < 0.35, shape(np.minimum(np.abs(x) / 0.35, 1.0)), 0.0)
+
+    def formula(parameters):
+        depth, length, sharpness = parameters
+        dip = physics.SurfaceDip(0.0, depth, length, sharpness)
+        return sum(path(x) for path in dip.paths(None, None))
+
+    sign = np.sign(formula((1e-3, 0.7, 0.0))[1000])
+    bounds = ([0.0, 0.1, 0.0], [6e-3, 2.0, 1.0])
+    found = least_squares(
+        lambda p: 1e3 * formula(p) - sign * true, (1e-3, 0.6, 0.5), bounds=bounds, x_scale=(1e-3, 1.0, 1.0)
+    )
+    length = found.x[1]
+    (share,) = (p.model_error_share for p in physics.SurfaceDip.parameters if p.name == "length")
+    assert abs(length - 0.7) < 1.96 * share * length

@@ -116,12 +116,14 @@ class Fit:
 
     @property
     def psi_se(self) -> np.ndarray:
-        """(n_term,) standard errors of the terms' parameters; a size also errs by its ``model_error_share``."""
+        """(n_term,) standard errors of the terms' parameters, with the errors of the models of their effects."""
         errors, first = np.sqrt(np.maximum(np.diag(self.covariance)[len(self.values) :], 0.0)), 0
         for candidate in self.candidates:
-            if candidate.parameters:
-                size = self.psi[first] - candidate.parameters[0].neutral
-                errors[first] = np.hypot(errors[first], candidate.effect.model_error_share * size)
+            for k, p in enumerate(candidate.parameters, first):
+                share, neutral = (
+                    (p.model_error_share, 0.0) if k > first else (candidate.effect.model_error_share, p.neutral)
+                )
+                errors[k] = np.hypot(errors[k], share * (self.psi[k] - neutral))
             first += len(candidate.parameters)
         return errors
 
