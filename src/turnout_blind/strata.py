@@ -49,7 +49,7 @@ def plan_cases(
     full : bool
         All strata, or the fast tier.
     only : collection of str or None
-        Kinds beside the controls; None: all.
+        Kinds beside the controls, which are at most as many as the other cases; None: all.
     panel : str
         Panel of all cases.
 
@@ -87,7 +87,8 @@ def plan_cases(
             )
     cases += [("double", _draw_pair(rng, effects)) for _ in range(counts["double"])]
     if only is not None:
-        cases = [m for m in cases if all(k in only for k, _ in m[1])]
+        with_effects = [m for m in cases if m[1] and all(k in only for k, _ in m[1])]
+        cases = cases[: min(counts["control"], len(with_effects))] + with_effects
     order = rng.permutation(len(cases))
     shuffled = (cases[i] for i in order.tolist())
     return [CasePlan(stratum, kinds, (seed, 23, k), panel) for k, (stratum, kinds) in enumerate(shuffled)]

@@ -106,7 +106,7 @@ def test_a_user_adds_an_effect_as_one_file(tmp_path):
     effects = load_effects(tmp_path)
     assert effects["squeal"].ladder == (1.0, 2.0)
     plans = plan_cases(3, effects, only={"squeal"})
-    assert Counter(p.stratum for p in plans) == {"control": 60, "single": 2}
+    assert Counter(p.stratum for p in plans) == {"control": 2, "single": 2}
     (tmp_path / "empty.py").write_text("x = 1\n")
     with pytest.raises(ValueError, match=r"empty\.py: defines no EFFECT"):
         load_effects(tmp_path)
@@ -197,3 +197,11 @@ def test_a_silent_channel_does_not_count_in_the_visibility_of_an_effect():
     after = np.array([1.1 * np.sin(600.0 * t), 0.0 * t])
     assert _relative_difference(before, after, (30.0, 800.0), 3) == pytest.approx(100.0 / 11.0, rel=1e-6)
     assert _relative_difference(before, 0.0 * after, (30.0, 800.0), 3) == 0.0
+
+
+def test_a_set_of_a_few_kinds_has_as_many_controls_as_other_cases():
+    plans = plan_cases(3, load_effects(), only={"bilinear_clip", "pad"})
+    others = [p for p in plans if p.stratum != "control"]
+    assert {k for p in others for k, _ in p.effects} == {"bilinear_clip", "pad"}
+    assert len(plans) == 2 * len(others) and "control" not in {p.stratum for p in others}
+    assert len({p.stratum == "control" for p in plans[:8]}) == 2  # both are among the first ones
