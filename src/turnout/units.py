@@ -160,6 +160,32 @@ _CANONICAL |= dict.fromkeys(("m s-2", "m s^-2", "m s⁻²", "m / s²", "m / s^2"
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
 
 
+CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))  # letters of units in Russian
+CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
+GRAM = "г"  # in Russian; the acceleration of gravity is written with a Latin letter
+
+
+def in_latin(text: str) -> str:
+    """A text with the letters of Russian units in Latin.
+
+    Parameters
+    ----------
+    text : str
+        A unit, or a number with its unit.
+
+    Returns
+    -------
+    str
+        Unchanged without a Cyrillic letter.
+
+    Examples
+    --------
+    >>> in_latin("20 кГц"), in_latin("м/с²"), in_latin("мкс"), in_latin("kN")
+    ('20 kHz', 'm/s²', 'µs', 'kN')
+    """
+    return text.replace("мк", "µ").translate(CYRILLIC) if CYRILLIC_LETTER.search(text) else text
+
+
 @dataclass(frozen=True)
 class Conversion:
     """SI = ``scale`` * number + ``offset``, of ``dimension`` (a key of ``UNITS``)."""
@@ -202,7 +228,7 @@ def conversion(unit: str) -> Conversion:
     factor = 1.0
     if (match := _NUMBER.match(text)) and text not in _CANONICAL:
         factor, text = float(match[1]), match[2].strip()
-    name = _CANONICAL.get(text)
+    name = _CANONICAL.get(text if text == GRAM else in_latin(text))
     if name is None or not math.isfinite(factor) or factor == 0:
         alike = sorted({known for spelling, known in _CANONICAL.items() if spelling.lower() == text.lower()})
         hint = f" (did you mean {' or '.join(map(repr, alike))}?)" if alike else ""

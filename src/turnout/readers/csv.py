@@ -15,7 +15,8 @@ What is recognised:
 Without names channels are called "0", "1" ... All lines of the head are entries in which
 ``turnout.readers.rate_statements`` finds the sampling rate.
 
-The text is UTF-8, UTF-16, or UTF-32 with a byte order mark. Head lines that are neither are read as Windows-1252.
+The text is UTF-8, UTF-16, or UTF-32 with a byte order mark. Head lines that are neither are read as Windows-1252;
+the layout may name a channel as it reads in another 8-bit encoding, such as that of Russian or Chinese.
 A last line without line break may end in a truncated number: it is left out and reported, unless its last number has as
 many decimals as all others.
 """
@@ -41,11 +42,12 @@ from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
 from turnout.readers.number_notations import has_other_notation, with_plain_numbers
 from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
+from turnout.readers.repeated_heads import check_separate, tables_of
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
-from turnout.readers.start_columns import start_in_cells
+from turnout.readers.start_columns import start_or_clock_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.texts import decode_text, wide_encoding
+from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
 
 
@@ -76,10 +78,30 @@ def read_raw(source: Source) -> RawFile:
     if not lazy or has_other_notation(source.head):
         lazy, data = False, with_plain_numbers(data[:end])
         end = len(data)
-    end, remarks = _end_of_rows(data, end, source)
+    end, remarks = _end_of_rows(data, _end_of_text(data, end), source)
     if isinstance(data, bytes):
         data = data[:end]
     head = read_head(data, source)
+    if tables := tables_of(data[:end], head.offset, head.separator):
+        raw_files = [_read_damaged_table(table, source) for table in tables]
+        records = tuple(record for raw in raw_files for record in raw.records)
+        check_separate(records, source)
+        remarks += tuple(remark for raw in raw_files for remark in raw.remarks)
+        return RawFile(records, raw_files[0].expected, remarks)
+    raw = _read_table(data, end, lazy, head, source)
+    return replace(raw, remarks=remarks + raw.remarks)
+
+
+def _read_damaged_table(table: bytes, source: Source) -> RawFile:
+    """Records of one of several tables of a text; the error about a damaged one is its record."""
+    try:
+        return _read_table(table, len(table), False, read_head(table, source), source)
+    except ReadError as error:
+        return RawFile((error,))
+
+
+def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source) -> RawFile:
+    """Records of a head and the rows below it; ``end`` is the byte behind the rows."""
     names, units, offset, separator = head.names, head.units, head.offset, head.separator
     if separator == BLANK:
         data = data[:end]
@@ -91,12 +113,13 @@ def read_raw(source: Source) -> RawFile:
         columns, footer = lazy_columns(source, data, offset, end, separator, names, time)
     else:
         columns, footer = columns_in_memory(source, data[:end], offset, separator, names)
+    remarks: tuple[ReadError, ...] = ()
     if time is None:  # else such a row has no time that fits
-        remarks += tuple(_outer_row_remarks(data, head, min(end, len(data)), source))
+        remarks = tuple(_outer_row_remarks(data, head, min(end, len(data)), source))
     head = head._replace(entries=(*head.entries, *footer))
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head.notes, source)
-    first = start_in_cells(first_cells(data, offset, separator), names)
+    first = start_or_clock_in_cells(first_cells(data, offset, separator), names)
     marks = ambiguous_marks(columns, data, offset, separator)
     records = tuple(_records(columns, head, time, facts, source, first, marks))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
@@ -208,6 +231,16 @@ def _shape(row: bytes) -> tuple[int, int]:
     return len(cells), len(decimals[1]) if decimals else 0
 
 
+EMPTY_LINE = re.compile(rb"[;,\t| \"\r]*")
+
+
+def _end_of_text(data: bytes | mmap, end: int) -> int:
+    """Byte behind the last line with content: spreadsheets write rows of separators alone below the table."""
+    while (start := data.rfind(b"\n", 0, max(end - 1, 0)) + 1) and EMPTY_LINE.fullmatch(data[start:end].rstrip(b"\n")):
+        end = start
+    return end
+
+
 END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text
 
 
@@ -277,7 +310,7 @@ def _records(
             axis_starts=(first,) if k == 0 else (),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
-            aliases=tuple((head.written[i],) for i in selected),
+            aliases=tuple((head.written[i], *other_readings(names[i])) for i in selected),
             marked_numbers={k: marks[i] for k, i in enumerate(selected) if i in marks},
             undecided=undecided,
             unit_conflicts=unit_conflicts,

@@ -17,7 +17,7 @@ from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.time_numbers import SINCE
-from turnout.units import conversion
+from turnout.units import conversion, in_latin
 
 
 def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
@@ -94,7 +94,7 @@ def seconds_per_number(unit: str, source: Source) -> float:
 
 
 def _plain_unit(unit: str) -> str:
-    return unit.strip().replace("\u03bc", "µ")
+    return in_latin(unit.strip()).replace("\u03bc", "µ")
 
 
 def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:

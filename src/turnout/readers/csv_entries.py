@@ -21,12 +21,36 @@ from turnout.readers.source import CONDITIONS
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_sensitivities import SENSITIVITY, is_sensitivity_name
-from turnout.readers.time_texts import is_day, looks_dated
+from turnout.readers.stated_units import known_unit
+from turnout.readers.time_texts import is_day, looks_dated, parse_time
 from turnout.readers.unit_names import UNIT_WORD, is_unit_name
 
-HEAD_LINE = re.compile(
-    rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*(?:{COLON}|[=,;\t])\s*(.*)$"
-)
+MARK = rf"(?:{COLON}|[=;\t]|(?<!\d),|,(?!\d))"  # behind a name; a comma between two digits is a decimal mark
+HEAD_LINE = re.compile(rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*{MARK}\s*(.*)$")
+UNIT_BEHIND_COMMA = re.compile(r"^([^,:=;\t]+),\s*([^\W\d][^\s,:=;\t]*)(?=\s*[:=;\t]\s*[+-]?[.,]?\d)")
+
+
+def with_unit_in_brackets(line: str) -> str:
+    """A line of a head with the unit of its name in brackets.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+
+    Returns
+    -------
+    str
+        Unchanged if no known unit stands between a comma and the mark before a number.
+
+    Examples
+    --------
+    >>> [with_unit_in_brackets(line) for line in ("Sampling rate, kHz: 20", "Date, time: 13.05.2026", "t, s;F, kN")]
+    ['Sampling rate [kHz]: 20', 'Date, time: 13.05.2026', 't, s;F, kN']
+    """
+    match = UNIT_BEHIND_COMMA.match(line)
+    is_unit = match and (rate_unit(match[2]) or known_unit(match[2]))
+    return f"{match[1]} [{match[2]}]{line[match.end() :]}" if match and is_unit else line
 
 
 def entries_of_lines(
@@ -82,7 +106,7 @@ def entries_of_lines(
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
         if len(cells) == 1 and (dated := _dated_line(text)):
             pairs.append(dated)
-        elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn and not _ends_in_time(match[1]):
+        elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn and not _is_statement(match[1], text):
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
         entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
@@ -113,14 +137,17 @@ def _is_of_condition(entry: Entry) -> bool:
 OTHER_CONDITIONS = frozenset("temperature temperatur geschwindigkeit vitesse hastighed humidity".split())
 
 
-def _ends_in_time(name: str) -> bool:
-    """Whether a text is no name but a statement: its last words are a time, "Record length 0.5 s"."""
+def _is_statement(name: str, text: str) -> bool:
+    """Whether the beginning of a text is no name: "Record length 0.5 s", and "Wed May 13 10" of "... 10:20:30 2026"."""
+    if name[-1].isdigit() and len(text) <= MAX_STAMP and parse_time(text):
+        return True
     match = re.search(r" \d+(?:[.,]\d+)? ?([^\W\d]+)$", name)
     unit = rate_unit(match[1]) if match else None
     return unit is not None and unit.is_step
 
 
 MAX_WORDS_OF_START = 5
+MAX_STAMP = 60  # characters of a line that is a time stamp
 
 
 def _dated_line(text: str) -> tuple[str, str] | None:

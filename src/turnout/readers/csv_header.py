@@ -18,7 +18,7 @@ from turnout.readers.csv_cells import (
     is_row,
 )
 from turnout.readers.csv_columns import are_names, describes_columns, names_and_units
-from turnout.readers.csv_entries import HEAD_LINE, entries_of_lines
+from turnout.readers.csv_entries import HEAD_LINE, entries_of_lines, with_unit_in_brackets
 from turnout.readers.entries import Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import (
@@ -39,6 +39,7 @@ HEAD_NAMES = {*TIMES_OF_START, *RECORD_COUNT_NAMES, "n_samples"}
 NUMERIC_HEAD_NAMES = {
     *TEMPERATURES, *SAMPLE_COUNT_NAMES,
 }  # a head line only if a number follows, else the name of a column  # fmt: skip
+EMPTY_LINES = re.compile(rb"\n+")
 GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 
 
@@ -83,9 +84,13 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
     head_lines: list[str] = []
     position = 0
     while position < len(data):
+        if empty := EMPTY_LINES.match(data, position):
+            head_lines += [""] * len(empty[0])
+            position = empty.end()
+            continue
         end = data.find(b"\n", position)
         end = len(data) if end < 0 else end
-        line = decode_line(data[position:end])
+        line = with_unit_in_brackets(decode_line(data[position:end]))
         # a comma is the decimal mark where another separator stands
         separator = next((s for s in SEPARATORS if s in line), ",")
         cells = cells_of(line, separator)
@@ -136,7 +141,8 @@ def _complete_head(
     }
     stated = [i for i, name in enumerate(names) if STATEMENT.fullmatch(name) and not cells[i]]
     lines_of_entries = ["" if describes_columns(cells_of(t, separator), names, units) else t for t in head_lines]
-    separator_of_head = "," if separator == BLANK else separator  # a word is no cell of a head
+    # a word is no cell of a head, and where numbers have decimal commas a comma separates none
+    separator_of_head = (";" if "," in "".join(cells) else ",") if separator == BLANK else separator
     entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
     for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))

@@ -119,13 +119,13 @@ def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) 
     """Byte at which lines of words begin that end the text, as "End of data"; ``end``, its own end, without one.
 
     A line with a number in one of its cells is a row of samples with an error in it, unless it begins with the word
-    for a statistic, as "Max;2000;90".
+    for a statistic, as "Max;2000;90". Behind the mark of a comment a number may stand, "# 500 samples".
     """
     number = re.compile(rb'"?[-+]?[.,]?\d[\d.,eE+-]*"?')
     for _ in range(MAX_FOOTER_LINES):
         start = max(data.rfind(b"\n", offset, end - 1), offset - 1) + 1
         line = data[start:end].strip()
-        if line and not re.match(rb"[\W_]*(?!(?i:nan|inf(?:inity)?)\b)[A-Za-z\x80-\xff]", line):
+        if line and not re.match(rb"[#%!]|//|[\W_]*(?!(?i:nan|inf(?:inity)?)\b)[A-Za-z\x80-\xff]", line):
             break
         has_number = any(number.fullmatch(cell.strip()) for cell in line.split(separator.encode())[1:])
         if has_number and not STATISTICS.match(decode_line(line)):

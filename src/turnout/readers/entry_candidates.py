@@ -26,7 +26,7 @@ from turnout.readers.metadata_subjects import (
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_statements import USUAL_RATES, statements_of_value
-from turnout.readers.rate_units import CYRILLIC, SECONDS, RateUnit, rate_unit, words_of
+from turnout.readers.rate_units import SECONDS, RateUnit, rate_unit, words_of
 from turnout.readers.rate_vocabulary import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
 from turnout.readers.scale_vocabulary import (
     INVERSIONS,
@@ -43,7 +43,7 @@ from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import known_unit
 from turnout.readers.time_texts import looks_dated
 from turnout.readers.unit_names import UNIT_WORD, is_unit_of_other
-from turnout.units import Conversion
+from turnout.units import Conversion, in_latin
 
 RATE, SCALE, UNIT, DURATION = "sampling rate", "scale", "unit", "duration"
 RATE_OR_SCALE, SCALE_OR_OFFSET = "rate, scale or offset", "scale or offset"
@@ -119,7 +119,6 @@ CONVERTED = re.compile(
     r"|angewend\w*|applique\w*"
 )
 AFFIRMED = frozenset("yes true ja oui si on 1".split())
-CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
 # Names that a format defines: start of the abscissa, state of the scaling, versions, numbers of dimensions.
 STANDARD_NAMES = frozenset(
     ("x0", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major", "minor", "writerversion",
@@ -171,8 +170,7 @@ def candidates(name: str, group: str, text: str) -> tuple[Candidate, ...]:
     >>> [c.statement for c in candidates("Mode", "", "20 kS/s @ 24 bit")], candidates("Filter", "", "BE 5 kHz")
     (['sampling rate'], ())
     """
-    text = " ".join(text[:MAX_TEXT].split())
-    text = text.translate(CYRILLIC) if CYRILLIC_LETTER.search(text) else text
+    text = in_latin(" ".join(text[:MAX_TEXT].split()))
     is_standard = plain_word(name) in STANDARD_NAMES or is_scale_name(group)
     if is_standard or text.casefold() in NO_STATEMENT or DATED.match(text) or looks_dated(text):
         return ()
@@ -340,6 +338,9 @@ def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Cand
         return
     if value == 1.0 and any(map(INVERTED.fullmatch, words_of(name))):
         yield Candidate(SCALE, number)
+    if LEVEL_UNIT.fullmatch(name.strip()) and value:  # the name is the unit, and no number is a code: "dB: 20"
+        yield Candidate(SCALE_OR_OFFSET, number, True)
+        return
     if value in (0.0, 1.0) or (WHOLE_NUMBER.fullmatch(number) and is_code(value)):
         return
     if subject == WEAK and LENGTH.search(" ".join(words_of(name))):

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 
+from turnout.units import in_latin
+
 PER = {"per", "pro", "par", "por", "al", "pr", "je"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
@@ -37,8 +39,6 @@ TIME_STEMS = (
 )
 PREFIXES = {"": Fraction(1), "k": Fraction(10**3), "m": Fraction(10**6), "g": Fraction(10**9)}
 RATE_UNIT = re.compile(r"(k|m|g)?(?:hz|hertz|sps)")
-
-CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))  # letters of units in Russian
 
 
 @lru_cache(maxsize=4096)
@@ -93,7 +93,7 @@ def rate_unit(text: str) -> RateUnit | None:
     >>> rate_unit("kS/s").scale, rate_unit("µs/pt").is_step, rate_unit("Samples per second").scale, rate_unit("V")
     (Fraction(1000, 1), True, Fraction(1, 1), None)
     """
-    latin = text.replace("мк", "µ").translate(CYRILLIC)
+    latin = in_latin(text)
     plain = latin.strip("[](){} .").casefold().replace("é", "e").replace("\u03bc", "µ")
     plain = re.sub(r"\s*(?:/|per\s+)\s*(?:ch|chan|channel|kanal)$", "", plain)
     if match := RATE_UNIT.fullmatch(plain):

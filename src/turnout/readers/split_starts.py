@@ -106,9 +106,13 @@ def _with_start(record: RawRecord, entries: tuple[Entry, ...]) -> RawRecord:
 
 
 def _with_joined_start(record: RawRecord) -> RawRecord:
-    """The record with the start of two entries, one of the day and one of the time of day."""
+    """The record with the start of two entries, one of the day and one of the time of day.
+
+    The time of day may also be that of the first sample in a column of such times.
+    """
     days = _texts(record.entries, is_day)
     clocks = _texts(record.entries, lambda text: bool(CLOCK_ALONE.fullmatch(text)))
+    clocks = clocks or {text: "time" for _, text in record.axis_starts if days and CLOCK_ALONE.fullmatch(text)}
     if not clocks:
         stated = [day for day, name in days.items() if is_of_begin(name)]
         return replace(record, unread_start=stated[0]) if stated else record

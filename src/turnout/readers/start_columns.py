@@ -65,6 +65,33 @@ def start_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime
     return start, "" if start else dated[0] + question
 
 
+def start_or_clock_in_cells(cells: Sequence[str], names: Sequence[str]) -> tuple[datetime | None, str]:
+    """As ``start_in_cells``, with the time of day alone where no date is beside it.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        Cells of the first row.
+    names : sequence of str
+        Names of the columns.
+
+    Returns
+    -------
+    tuple of (datetime or None, str)
+        A clock that begins at 0 counts from the beginning of the recording and is none.
+
+    Examples
+    --------
+    >>> start_or_clock_in_cells(["10:00:00,5", "1,5"], ["Zeit", "Kraft"]), start_or_clock_in_cells(["00:00:00"], ["t"])
+    ((None, '10:00:00,5'), (None, ''))
+    """
+    start, text = start_in_cells(cells, names)
+    if start or text:
+        return start, text
+    clocks = [cell for cell in (plain_stamp(cell).strip() for cell in cells) if TIME_OF_DAY.fullmatch(cell)]
+    return None, clocks[0] if len(clocks) == 1 and not clocks[0].startswith("00:00:00") else ""
+
+
 def start_in_columns(columns: Mapping[str, Column]) -> tuple[datetime | None, str]:
     """Start time in the first row of columns that are texts, or were before they became durations.
 
@@ -76,12 +103,12 @@ def start_in_columns(columns: Mapping[str, Column]) -> tuple[datetime | None, st
     Returns
     -------
     tuple of (datetime or None, str)
-        As ``start_in_cells``.
+        As ``start_or_clock_in_cells``.
     """
     clocks = {name: column for name, column in columns.items() if isinstance(column, ClockColumn) and len(column)}
     cells = {name: column.first_text for name, column in clocks.items()}
     cells |= {name: _text(c) for name, c in columns.items() if c.dtype.kind in "OUST" and c.ndim == 1 and len(c)}
-    start, text = start_in_cells([*cells.values()], [*cells])
+    start, text = start_or_clock_in_cells([*cells.values()], [*cells])
     elapsed = [column[0] / np.timedelta64(1, "us") for column in clocks.values()]
     return (start + timedelta(microseconds=float(elapsed[0])) if start and len(elapsed) == 1 else start), text
 
@@ -104,9 +131,9 @@ def starts_of_axes(record: RawRecord) -> list[tuple[datetime | None, str]]:
     -------
     list of tuple of (datetime or None, str)
         The start, or the text of one that cannot be read. Axes that count from the start of the recording take no
-        part.
+        part, and times of day without a date neither.
     """
-    starts = list(record.axis_starts)
+    starts = [(start, text) for start, text in record.axis_starts if not TIME_OF_DAY.fullmatch(text)]
     if record.time is not None and len(record.time) > 1:
         starts.append(_start_of_time_column(record.time, record.time_label, record.is_time_in_seconds))
     for name, unit, column in zip(record.names, record.units, record.samples):

@@ -29,6 +29,40 @@ def decode_text(data: bytes) -> str:
         return data.decode("cp1252", "replace")
 
 
+# Of letters that Windows-1252 does not have: Central European, Cyrillic, Greek, Turkish, Chinese, Japanese, Korean.
+OTHER_ENCODINGS = ("cp1250", "cp1251", "cp1253", "cp1254", "gb18030", "big5", "cp932", "cp949")
+
+
+def other_readings(text: str) -> tuple[str, ...]:
+    """What a text that was decoded as Windows-1252 is in the other encodings of older loggers.
+
+    Nothing in such a text says which is meant: only a name that is known beforehand decides.
+
+    Parameters
+    ----------
+    text : str
+        Decoded text.
+
+    Returns
+    -------
+    tuple of str
+        Empty for one in ASCII, and for one with a letter that Windows-1252 does not have.
+
+    Examples
+    --------
+    >>> "力" in other_readings("力".encode("gbk").decode("cp1252")), other_readings("force")
+    (True, ())
+    """
+    if text.isascii():
+        return ()
+    try:
+        data = text.encode("cp1252")
+    except UnicodeEncodeError:
+        return ()
+    readings = (data.decode(encoding, "replace") for encoding in OTHER_ENCODINGS)
+    return tuple(reading for reading in dict.fromkeys(readings) if "\ufffd" not in reading)
+
+
 def wide_encoding(head: bytes) -> str:
     """Encoding of a text in UTF-16 or UTF-32, by its byte order mark or by the zero bytes of its letters in UTF-16.
 

@@ -39,6 +39,8 @@ def rate_of_time(time: np.ndarray) -> tuple[float, float, int | None]:
     """
     time = np.asarray(time, dtype=float)
     span = time[-1] - time[0]
+    if is_coarse(time):
+        return float((time.size - 1) / span), float(2 * _resolution(time) / span), None
     step = float(np.median(np.diff(time[:STEP_SAMPLES])))
     for start, block in _blocks(time):
         jumps = np.abs(np.diff(block) - step) > 0.5 * step
@@ -51,6 +53,47 @@ def rate_of_time(time: np.ndarray) -> tuple[float, float, int | None]:
     return float(rate), float(max(2 * deviation / span, 1e-9)), None
 
 
+MIN_COARSENESS = 1.05  # steps between two different times: a clock that stands still once leaves this at 1
+
+
+def is_coarse(time: np.ndarray) -> bool:
+    r"""Whether a clock with steps longer than the sampling step wrote a time column: samples share their times.
+
+    .. math:: r = \min_{t_{k+1} \ne t_k} (t_{k+1} - t_k), \quad |t_k - t_0 - k / f_s| \le r
+
+    Parameters
+    ----------
+    time : (n,) array of float
+        The time column. [s]
+
+    Returns
+    -------
+    bool
+        False if the times leave the straight line by more than the step of the clock: samples are missing.
+
+    Examples
+    --------
+    >>> seconds = np.arange(100) / 2000.0
+    >>> is_coarse(np.floor(seconds * 1000.0) / 1000.0), is_coarse(seconds), is_coarse(np.maximum(seconds, 0.01))
+    (True, False, False)
+    """
+    steps = np.diff(time)
+    if not np.any(steps == 0.0) or np.any(steps < 0.0) or np.count_nonzero(steps) < MIN_CLOCK_STEPS:
+        return False
+    resolution, step = _resolution(time), (time[-1] - time[0]) / (time.size - 1)
+    deviation = np.abs(time - time[0] - step * np.arange(time.size)).max()
+    return bool(resolution >= MIN_COARSENESS * step and deviation <= resolution * (1.0 + 1e-6))
+
+
+MIN_CLOCK_STEPS = 3  # of a coarse clock
+
+
+def _resolution(time: np.ndarray) -> float:
+    """Least difference of two different times that follow each other. [s]"""
+    steps = np.diff(time)
+    return float(steps[steps > 0.0].min())
+
+
 def _blocks(time: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """(first index, samples) of consecutive blocks that share one sample; so hours need little memory."""
     for start in range(0, max(time.size - 1, 1), BLOCK_SIZE):
@@ -58,7 +101,7 @@ def _blocks(time: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
 
 
 def check_time(time: np.ndarray, where: str, source: Source) -> None:
-    """Check that a time column increases evenly.
+    """Check that a time column increases evenly, or as evenly as a clock with longer steps shows it.
 
     Parameters
     ----------
@@ -78,6 +121,8 @@ def check_time(time: np.ndarray, where: str, source: Source) -> None:
         if not np.isfinite(block).all():
             problem = f"the time of sample {start + int(np.argmin(np.isfinite(block)))} is not a number"
             raise source.error(where, problem, reason="not_finite")
+    if is_coarse(time):
+        return
     backwards = (start + int(np.argmax(b)) for start, block in _blocks(time) if (b := np.diff(block) <= 0).any())
     if (k := next(backwards, None)) is not None:
         problem = (
@@ -87,6 +132,9 @@ def check_time(time: np.ndarray, where: str, source: Source) -> None:
         remedy = "Check the logger's clock and export the record again"
         if time[k] == time[k + 1]:
             remedy += ", the time with more digits if it was rounded"
+        elif time[k + 1] == time[0]:
+            problem = f"its time begins again after {k + 1} samples: another record follows"
+            remedy = "Export each record to a file, or number the records in a column 'record'"
         raise source.error(where, problem, remedy, reason="clock_backwards")
     rate, _, gap = rate_of_time(time)
     if gap is not None:

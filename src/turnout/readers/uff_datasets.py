@@ -281,7 +281,7 @@ def file_units(data: bytes | mmap, sets: Iterable[UffDataset]) -> FileUnits | No
             try:
                 if int(lines[1][:10]) == 1:
                     return FileUnits(1.0, 1.0)
-                length, force = (float(text) for text in _fields(lines[2].replace("D", "E"), [25, 25]))
+                length, force = map(_number, lines[2].split()[:2])
             except (ValueError, IndexError):
                 return None
             is_usable = np.isfinite([length, force]).all() and length > 0.0 and force > 0.0

@@ -182,8 +182,9 @@ def test_the_error_of_unreadable_rows_states_their_content(tmp_path, cells, word
         read_text(tmp_path, "Zeit;force;rail\n" + f"{cells}\n" * 30)
 
 
-def test_the_error_of_a_time_with_too_few_digits_proposes_more_digits(tmp_path):
-    text = "Time [s];force [N];rail [m/s²]\n" + rows([f"{t:.4f}" for t in TIME], FORCE, RAIL)
+def test_the_error_of_a_time_that_stands_still_proposes_more_digits(tmp_path):
+    times = [f"{t:.5f}" for t in TIME]
+    text = "Time [s];force [N];rail [m/s²]\n" + rows([*times[:100], times[99], *times[101:]], FORCE, RAIL)
     assert "the time with more digits if it was rounded" in str(only_error(read_text(tmp_path, text)))
 
 

@@ -1,0 +1,176 @@
+"""Text files whose head comes again below the rows, and what people write below the last row."""
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+RATE, N = 20000.0, 200
+LAYOUT = RawDescription(
+    (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration")), rate=RATE
+)  # fmt: skip
+NAMES = "t [s];force [N];rail [m/s2]"
+
+
+def signals(k):
+    """Force and response of record ``k``, (2, N): noise, which never repeats, and an impact."""
+    noise = np.random.default_rng(k).normal(size=(2, N)).round(4)
+    noise[0, 50:60] += 1000.0
+    return noise
+
+
+def rows_of(k, first=0.0):
+    return [f"{first + i / RATE:.5f};{f:.4f};{a:.4f}" for i, (f, a) in enumerate(signals(k).T)]
+
+
+def read_lines(lines, folder, description=LAYOUT):
+    (folder / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return read("a.csv", folder, description)
+
+
+def assert_error(words, *arguments):
+    result = read_lines(*arguments)
+    assert not result.recordings
+    assert words in str(result.errors[0])
+
+
+@pytest.mark.parametrize(
+    "above",
+    [[], [""], ["Test {}"], ["# Impact {}"], ["Test;{}", "Operator: Meier", ""], ["Max;;1003;3", "", "Test {}"]],
+)
+def test_a_head_that_comes_again_begins_another_record(above, tmp_path):
+    lines = ["fs: 20000"]
+    for k in range(3):
+        lines += [line.format(k + 1) for line in above] + [NAMES, *rows_of(k)]
+    result = read_lines(lines, tmp_path)
+    assert not result.errors
+    assert len(result.recordings) == 3
+    for k, recording in enumerate(result.recordings):
+        np.testing.assert_allclose(recording.read(0, N), signals(k), atol=1e-9)
+
+
+def test_each_head_states_the_start_of_its_record_and_the_first_lines_are_about_the_file(tmp_path):
+    lines = ["rail_temperature: 12.5"]
+    for k in range(3):
+        lines += [f"Start time: 2026-05-13 08:3{k}:00", "force [N];rail [m/s2]"]
+        lines += [row.partition(";")[2] for row in rows_of(k)]
+    result = read_lines(lines, tmp_path)
+    first = datetime(2026, 5, 13, 8, 30)
+    assert [r.started_at for r in result.recordings] == [first + timedelta(minutes=k) for k in range(3)]
+    assert [r.conditions["rail_temperature"] for r in result.recordings] == [12.5] * 3
+
+
+def test_a_time_that_goes_on_below_a_repeated_head_is_one_record(tmp_path):
+    lines = [NAMES, *rows_of(0), NAMES, *rows_of(1, first=N / RATE)]
+    with pytest.raises(ReadError, match=r"table 2 of 2: .* the time goes on: it is one record. Delete the lines"):
+        read_lines(lines, tmp_path)
+
+
+def test_without_time_and_starts_nothing_says_whether_another_record_begins(tmp_path):
+    rows = [[row.partition(";")[2] for row in rows_of(k)] for k in range(2)]
+    lines = ["force [N];rail [m/s2]", *rows[0], "force [N];rail [m/s2]", *rows[1]]
+    with pytest.raises(ReadError, match=r"nothing says whether another record begins.*column 'record'"):
+        read_lines(lines, tmp_path)
+
+
+def test_a_damaged_table_costs_its_record_and_its_line_keeps_its_number(tmp_path):
+    tables = [[NAMES, *rows_of(k)] for k in range(3)]
+    tables[1][10] = "0.00045;abc;1.0"
+    result = read_lines([line for table in tables for line in table], tmp_path)
+    assert len(result.recordings) == 2
+    (error,) = result.errors
+    assert str(error).startswith(f"a.csv, line {N + 1 + 11}, column 'force': 'abc' is no number")
+
+
+@pytest.mark.parametrize(
+    "tail", [";;\n;;", "# 200 samples\n# end", "// 2026-05-13 end", '"";"";""', "% 3 rows left out"]
+)
+def test_empty_rows_and_comments_below_the_rows_are_left_out(tail, tmp_path):
+    result = read_lines([NAMES, *rows_of(0), tail], tmp_path)
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+@pytest.mark.parametrize("row", ["# 0.01;1.5;2.5", ";;2.5", "0.01;;"])
+def test_a_row_with_a_number_below_the_rows_is_not_left_out(row, tmp_path):
+    try:
+        result = read_lines([NAMES, *rows_of(0), row], tmp_path)
+    except ReadError:
+        return
+    assert result.errors
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["Abtastfrequenz 25,6 kHz", "Sampling rate, kHz: 25.6", "Частота дискретизации, кГц: 25,6", "Rate, Hz;25600"],
+)
+def test_a_comma_in_a_line_of_the_head_separates_no_decimals_and_no_unit(line, tmp_path):
+    """Formerly, "25,6 kHz" was a name that ends in 25 and a rate of 6 kHz."""
+    rows = [row.partition(";")[2] for row in rows_of(0)]
+    right, wrong = (RawDescription(LAYOUT.channels, rate=rate) for rate in (25600.0, 6000.0))
+    result = read_lines([line, "force [N];rail [m/s2]", *rows], tmp_path, right)
+    assert not result.errors
+    assert_error("sampled at 25600 Hz instead of 6000 Hz", [line, "force [N];rail [m/s2]", *rows], tmp_path, wrong)
+
+
+@pytest.mark.parametrize(
+    ("names", "encoding"),
+    [
+        (("Siła", "Szyna"), "cp1250"),
+        (("Сила", "Рельс"), "cp1251"),
+        (("力", "加速度"), "gbk"),
+        (("Δύναμη", "Τροχιά"), "cp1253"),
+    ],
+)
+def test_the_layout_names_channels_in_the_8_bit_encoding_of_the_logger(names, encoding, tmp_path):
+    text = "\n".join([f"t [s];{names[0]} [N];{names[1]} [m/s2]", *rows_of(0)]) + "\n"
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    channels = (RawChannel("force", names[0], "force"), RawChannel("rail", names[1], "acceleration"))
+    result = read("a.csv", tmp_path, RawDescription(channels, rate=RATE))
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+def test_russian_units_behind_names(tmp_path):
+    kilonewtons = [f"{i / RATE:.5f};{f / 1000:.7f};{a:.4f}" for i, (f, a) in enumerate(signals(0).T)]
+    channels = (RawChannel("force", "Сила", "force"), RawChannel("rail", "Рельс", "acceleration"))
+    lines = ["t, с;Сила, кН;Рельс, м/с²", *kilonewtons]
+    result = read_lines(lines, tmp_path, RawDescription(channels, rate=RATE))
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-3)
+
+
+def coarse(resolution, n=2000):
+    return np.floor(np.arange(n) / RATE / resolution + 1e-6) * resolution
+
+
+@pytest.mark.parametrize("resolution", [1e-3, 1e-2, 0.0156, 8e-5])
+def test_samples_may_share_the_times_of_a_coarse_clock(resolution, tmp_path):
+    noise = np.random.default_rng(0).normal(size=(2, 2000)).round(4)
+    lines = [NAMES] + [f"{t:.6f};{f:.4f};{a:.4f}" for t, f, a in zip(coarse(resolution), *noise)]
+    result = read_lines(lines, tmp_path)
+    assert not result.errors
+    assert result.recordings[0].rate == RATE
+    assert_error("instead of 51200 Hz", lines, tmp_path, RawDescription(LAYOUT.channels, rate=51200.0))
+
+
+@pytest.mark.parametrize("fault", ["gap", "repeated", "stopped"])
+def test_faults_of_a_coarse_clock_and_of_a_fine_one_are_errors(fault, tmp_path):
+    times = coarse(1e-3)
+    if fault == "gap":
+        times[1000:] += 0.01
+    else:
+        times = np.arange(2000) / RATE
+        times[1000 : 1001 if fault == "repeated" else 1100] = times[999]
+    noise = np.random.default_rng(0).normal(size=(2, 2000)).round(4)
+    assert_error("stands still", [NAMES] + [f"{t:.6f};{f:.4f};{a:.4f}" for t, f, a in zip(times, *noise)], tmp_path)
+
+
+def test_a_time_that_begins_again_is_said_to_be_another_record(tmp_path):
+    assert_error(
+        f"its time begins again after {N} samples: another record follows", [NAMES, *rows_of(0), *rows_of(1)], tmp_path
+    )
