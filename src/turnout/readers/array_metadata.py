@@ -28,6 +28,7 @@ from turnout.readers.scale_vocabulary import is_scale_name
 from turnout.readers.source import CONDITIONS, Source
 from turnout.readers.stated_scales import entry_statements
 from turnout.readers.texts import decode_text
+from turnout.readers.time_texts import time_of_vector
 
 WORD_START = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")  # in "ChannelNames"
 
@@ -94,7 +95,7 @@ class Metadata:
         return self.parent.get(names) if self.parent else None
 
     def record_value(self, names: Sequence[str], k: int, n: int) -> Any:
-        """As ``get``, but entry ``k`` if there is one entry per record.
+        """As ``get``, but entry ``k`` if there is one entry per record; a date vector is one entry.
 
         Parameters
         ----------
@@ -117,6 +118,9 @@ class Metadata:
         value = self.get(names)
         if isinstance(value, np.ndarray) and value.ndim == 0:
             value = value[()]
+        rows = value if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) == n else [value] * n
+        if time := time_of_vector(rows[k]):
+            return time
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
             value = np.ravel(np.asarray(value))
             value = value[k if value.size == n else 0] if value.size else None

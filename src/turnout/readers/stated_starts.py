@@ -14,7 +14,7 @@ from turnout.readers.rate_statements import MIN_EPOCH
 from turnout.readers.rate_units import seconds_of, words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.time_numbers import SINCE, is_declared
-from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time
+from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time, time_of_vector
 
 START = re.compile(
     r"start|begin|debut|inici|inizi|zacat|trigg|record|aufnahm|aufzeich|mess|measur|mesur|medic|misur|enregistr|registr|grab"
@@ -30,6 +30,7 @@ OTHER = re.compile(
     r"|tisk|vytis|udskr|gedruckt|imprim|uloz|zapis|gespeich|speicher|guardad|salvat|opgesl|konec|koniec|^fine$|einde"
     r"|maint|wartung|^tamp|stopf|grind|schleif|repair|repar|replac|ersetz|renew|erneuer"
 )
+T_ZERO = re.compile(r"(?<![^\W_])t_?0(?![^\W_])", re.IGNORECASE)  # the start of a waveform, a time or an offset
 OF_MOMENT = frozenset("at on am um le el den utc".split())
 OF_BEGIN = frozenset("of the der de la du del og at on".split())
 DATE_WORD = re.compile(r"date|datum|dato$|stamp|stempel|horodat|fecha|datenum|epoch")
@@ -39,6 +40,11 @@ TIME_WORD = re.compile(
 MAX_UNREAD = 120  # characters of a start that cannot be read
 MAX_PRE_TRIGGER = 3600.0  # s
 MAX_ZONE_DIFFERENCE = timedelta(hours=26)  # two zones on both sides of the date line
+
+
+def _words_of_start(name: str) -> tuple[str, ...]:
+    """The words of a name, in which t0 is the start."""
+    return words_of(T_ZERO.sub(" start ", name))
 
 
 @lru_cache(maxsize=4096)
@@ -57,10 +63,10 @@ def is_start_name(name: str) -> bool:
 
     Examples
     --------
-    >>> [is_start_name(n) for n in ("Recorded on", "Date/Time", "Calibration date", "End time", "Operator")]
-    [True, True, False, False, False]
+    >>> [is_start_name(n) for n in ("Recorded on", "Date/Time", "t0", "Calibration date", "End time", "Operator")]
+    [True, True, True, False, False, False]
     """
-    words = words_of(name)
+    words = _words_of_start(name)
     return any(START.search(word) for word in words) and not any(OTHER.search(word) for word in words)
 
 
@@ -81,7 +87,7 @@ def is_of_begin(name: str) -> bool:
     >>> [is_of_begin(n) for n in ("Start", "Messbeginn", "Startdatum", "Start position", "Messdatum")]
     [True, True, True, False, False]
     """
-    words = words_of(name)
+    words = _words_of_start(name)
     further_words = [
         word for word in words if not (START.search(word) or DATE_WORD.search(word) or TIME_WORD.search(word))
     ]
@@ -188,6 +194,8 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
     value, declared = entry.value, entry.name
     if isinstance(value, (datetime, np.datetime64)):
         yield str(value), parse_time(value)
+    elif time := time_of_vector(value):
+        yield str(value), time
     elif isinstance(value, str) and not NUMBER_TEXT.fullmatch(value.strip()):
         if looks_dated(value.strip()):
             yield value.strip(), parse_time(value.strip())

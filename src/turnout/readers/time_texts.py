@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 
 from turnout.readers.calendar_dates import dated_time
-from turnout.readers.stamp_texts import DAY_OF_YEAR, month_of, with_calendar_date
+from turnout.readers.stamp_texts import DAY_OF_YEAR, month_of, plain_stamp
 from turnout.readers.time_numbers import time_of_digits, time_of_number
 
 NUMBER_TEXT = re.compile(r"\d+(?:\.\d*)?(?:[eE]\+?\d+)?")
 DAY_DIGITS = 8  # of a date without marks, YYYYMMDD
 DATED = re.compile(
-    r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}\D+\d{1,2}[:.h-]\d{2}|\d{8}[T _-]?\d{4,6}|\d{4}-?(?:W\d\d|\d{3}T)|\d{4}年"
+    r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}\D+\d{1,2}(?:[:.-]|\s?h\s?)\d{2}"
+    r"|\d{8}[T _-]?\d{4,6}|\d{4}-?(?:W\d\d|\d{3}T)|\d{4}年"
 )
 ISO_CHARACTERS = re.compile(r"[\dTtWZz:+.,_ -]+")
-WORDED_DATE = re.compile(r"[^\W\d]{3,}\.?.*\d{1,2}:\d{2}")
+WORDED_DATE = re.compile(r"[^\W\d]{3,}\.?.*\d{1,2}\s?[:h]\s?\d{2}")
 # A date without a time of day, in ISO 8601 also by its week. It is no start: midnight would be a guess.
 DATE_ALONE = re.compile(
     r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}|\d{8}(?:\.0)?|\d{4}-?W\d{2}(?:-?\d)?"
@@ -25,8 +26,15 @@ CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d{1,9})?))?")
 DOTTED_DATE = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{4})[\sT,;]+(\d{1,2}):(\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)")
 # A time of day as in "13.05.2026 10.20.30", and the words beside one: "13.05.2026 um 10:20:30 Uhr".
 DOTTED_CLOCK = re.compile(r"(?<=\d{4}[ T])(\d{1,2})\.(\d{2})\.(\d{2})(?!\.|\d)")
-BEFORE_CLOCK = re.compile(r"(?<=\d),? (?:um|at|kl\.?|à|om|alle|ore|ob) (?=\d{1,2}[:.]\d{2})", re.IGNORECASE)
+BEFORE_CLOCK = re.compile(r"(?<=\d),? (?:um|at|kl\.?|à|om|alle|ore|ob) (?=\d{1,2}\s?[:.h]\s?\d{2})", re.IGNORECASE)
 BEHIND_CLOCK = re.compile(r"(?<=\d) (?:Uhr|hrs?|h)\.?$", re.IGNORECASE)
+HOURS_AND_MINUTES = re.compile(r"(?<=[\sT])(\d{1,2})\s?h\s?(\d{2})(?:\s?(?:m|min)?\s?(\d{2}(?:[.,]\d{1,9})?)\s?s?)?$")
+WEEKDAY = re.compile(r"^[^\W\d]{2,10}\.?,? (?=\d)")  # in front of a date
+# The date vector of MATLAB as a text, "[2026 5 13 8 30 12.25]".
+VECTOR = re.compile(
+    r"[\[(]?\s*(\d{4})(?:\.0*)?" + r"[\s,;]+(\d{1,2})(?:\.0*)?" * 4 + r"[\s,;]+(\d{1,2}(?:\.\d*)?)\s*[\])]?",
+)
+VECTOR_YEARS = range(1990, 2062)  # of digital loggers
 WITH_UTC = re.compile(r"(.*\d) ?\(?(?:UTC|GMT)\)?")
 MONTHS = {m: i for i, m in enumerate("jan feb mar apr may jun jul aug sep oct nov dec".split(), start=1)}
 
@@ -50,7 +58,44 @@ def looks_dated(text: str) -> bool:
     [True, True, True, False]
     """
     is_worded = WORDED_DATE.search(text) and month_of(text) and re.search(r"\d{4}", text)
-    return bool(DATED.match(text) or DAY_OF_YEAR.match(text) or is_worded)
+    return bool(DATED.match(text) or DAY_OF_YEAR.match(text) or is_worded or time_of_vector(text))
+
+
+def time_of_vector(value: Any) -> datetime | None:
+    """Time of a date vector: year, month, day, hour, minute and second as six numbers, or as a text of them.
+
+    Parameters
+    ----------
+    value : any
+        Value of an entry.
+
+    Returns
+    -------
+    datetime or None
+        Without a zone; None for anything else, and for numbers that are no time of a digital logger.
+
+    Examples
+    --------
+    >>> time_of_vector([2026, 5, 13, 8, 30, 12.25]), time_of_vector("[2026 5 13 8 30 12]"), time_of_vector([1, 2])
+    (datetime.datetime(2026, 5, 13, 8, 30, 12, 250000), datetime.datetime(2026, 5, 13, 8, 30, 12), None)
+    """
+    if isinstance(value, str):
+        match = VECTOR.fullmatch(value.strip())
+        numbers = [float(text) for text in match.groups()] if match else []
+    else:
+        is_numeric = isinstance(value, (list, tuple, np.ndarray)) and np.size(value) == len(DATE_PARTS)
+        array = np.ravel(np.asarray(value)) if is_numeric else np.empty(0)
+        numbers = array.tolist() if array.dtype.kind in "fiu" else []
+    if not numbers or numbers[0] not in VECTOR_YEARS or any(number != int(number) for number in numbers[:5]):
+        return None
+    try:
+        minute = datetime(*map(int, numbers[:5]))  # type: ignore[arg-type]
+    except ValueError:
+        return None
+    return minute + timedelta(seconds=numbers[5]) if 0.0 <= numbers[5] < 60.0 else None
+
+
+DATE_PARTS = ("year", "month", "day", "hour", "minute", "second")
 
 
 def is_date(text: str) -> bool:
@@ -194,12 +239,14 @@ def _time_of_stamp(value: Any) -> datetime | None:
         return stamp if isinstance(stamp, datetime) else None
     if not isinstance(value, str):
         return None
+    if vector := time_of_vector(value):
+        return vector
     if match := WITH_UTC.fullmatch(value.strip()):
         time = _time_of_stamp(match[1])
         return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
-    if DAY_OF_YEAR.match(value):
-        value = with_calendar_date(value)
-    value = DOTTED_CLOCK.sub(r"\1:\2:\3", BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", value)))
+    value = BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", WEEKDAY.sub("", value.strip())))
+    value = HOURS_AND_MINUTES.sub(lambda match: f"{match[1]}:{match[2]}:{match[3] or '00'}", value)
+    value = plain_stamp(DOTTED_CLOCK.sub(r"\1:\2:\3", value))
     if time := dated_time(value.strip()):
         return time
     if match := DOTTED_DATE.fullmatch(value.strip()):

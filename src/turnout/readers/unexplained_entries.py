@@ -34,6 +34,7 @@ from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.scale_vocabulary import INVERSIONS, scale_meaning
 from turnout.readers.stated_units import same_unit
+from turnout.readers.time_texts import time_of_vector
 
 MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
 DURATION_TOLERANCE = 0.02  # relative
@@ -155,10 +156,12 @@ def _unexplained_candidate(
 
 
 def _texts(value: Any, n_sample: int) -> tuple[str, ...]:
-    """The texts of a value; none of one number per sample, or of samples of several channels."""
+    """The texts of a value; none of a date vector, of one number per sample, or of samples of several channels."""
     if isinstance(value, str):
         return (value,)
     values = value.ravel() if isinstance(value, np.ndarray) else value
+    if time_of_vector(value):
+        return ()
     if not isinstance(values, (list, tuple, np.ndarray)):
         return (text_of_value(value),) if np.isscalar(value) else ()
     is_list = len(values) <= MAX_ENTRIES and n_sample not in getattr(value, "shape", (len(values),))

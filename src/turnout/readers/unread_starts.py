@@ -13,7 +13,7 @@ from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_starts import DATE_WORD, OTHER, TIME_WORD, is_start_name
 from turnout.readers.time_numbers import SINCE
-from turnout.readers.time_texts import stated_time
+from turnout.readers.time_texts import stated_time, time_of_vector
 
 YEAR = r"(?:19|20)\d{2}"
 DATE = (
@@ -23,6 +23,7 @@ DATE = (
 CLOCK = r"\d{1,2}(?::\d{2}(?::\d{2})?|\s?h\s?\d{2}|\.\d{2}\.\d{2})"
 MOMENT = re.compile(
     rf"(?<![\d.,]){DATE}(?!\d)\D{{1,12}}{CLOCK}(?!\d)|(?<![\d.,]){CLOCK}\D{{1,12}}{DATE}(?!\d)"
+    rf"|[^\W\d]{{3,}}\.? +\d{{1,2}} +{CLOCK} +{YEAR}(?!\d)"
     rf"|(?<!\d){YEAR}(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])[T _-](?:[01]\d|2[0-3])[0-5]\d"
 )
 DAY_ALONE, CLOCK_ALONE = (
@@ -104,6 +105,8 @@ def possible_start(record: RawRecord) -> str:
 
 def _text_of_time(entry: Entry) -> str:
     """Name and time of an entry that is a time stamp or counts from a declared origin; "" for a time of no logger."""
+    if time_of_vector(entry.value):
+        return f"{entry.name}: {entry.value}"
     is_stamp = isinstance(entry.value, datetime | np.datetime64)
     if np.ndim(entry.value) or not (is_stamp or SINCE.search(entry.name)):
         return ""

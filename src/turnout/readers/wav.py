@@ -288,6 +288,9 @@ def _entries(texts: dict[str, str], comment: str) -> Iterator[Entry]:
     if notes := _notes(comment):
         yield from entries_of(notes, "comment")
     for name, text in texts.items():
+        if name == "date":  # the chunk ICRD: when the recording was made
+            yield Entry("chunk ICRD", "recording date", text)
+            continue
         if name != "comment" or not notes:
             yield from entries_of_text(text, name)
             yield Entry(name, FREE_TEXT, text)

@@ -27,8 +27,9 @@ SCALES = {
     "Level correction": "3 dB", "Mean removed": 2, "Baseline": 1.5, "Slope1": 2.0, "Comment": "amplifier gain 10",
     "data_scale": 0.5, "Voltage gain": 10,
 }  # fmt: skip
-STARTS = ["05/06/2024 10:00:00 AM", "2024-05-13T25:00:00", "2024-367T10:00:00", "13. Mayo 2024 10:00:00 PM"]
+STARTS = ["05/06/2024 10:00:00 AM", "2024-05-13T25:00:00", "2024-367T10:00:00", "13. Mayo 2024 14:00:00 PM"]
 READ_STARTS = [
+    "13. Mayo 2024 10:00:00 AM",
     "13 May 2024 10:00:00",
     "Mon May 13 10:00:00 2024",
     "2024/05/13 10:00:00",

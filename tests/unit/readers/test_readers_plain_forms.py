@@ -193,7 +193,7 @@ def test_a_large_number_under_another_name_is_no_start(tmp_path, name):
     assert is_read(samples) and start is None and "start time" not in message
 
 
-@pytest.mark.parametrize("name", ["t0", "when", "moment"])
+@pytest.mark.parametrize("name", ["instant", "when", "moment"])
 def test_a_time_stamp_under_an_unknown_name_is_reported(tmp_path, name):
     np.savez(tmp_path / "a.npz", force=FORCE, rail=RAIL, fs=RATE, **{name: np.datetime64(START)})
     samples, start, message = outcome(tmp_path / "a.npz", units=SI)
@@ -202,7 +202,7 @@ def test_a_time_stamp_under_an_unknown_name_is_reported(tmp_path, name):
     assert outcome(tmp_path / "b.npz", units=SI)[2] == ""
 
 
-@pytest.mark.parametrize("name", ["start_time", "acquired", "t0", "calibrated"])
+@pytest.mark.parametrize("name", ["start_time", "acquired", "t0", "when", "calibrated"])
 @pytest.mark.parametrize(
     ("unit", "origin", "seconds"),
     [
@@ -218,10 +218,10 @@ def test_a_unit_with_an_origin_belongs_to_the_number_beside_it(tmp_path, name, u
         file[name].attrs["units"] = f"{unit} since {origin:%Y-%m-%d}"
     samples, start, message = outcome(tmp_path / "a.h5", units=SI)
     assert is_read(samples)
-    if name in ("start_time", "acquired"):
+    if name in ("start_time", "acquired", "t0"):
         assert abs(start.replace(tzinfo=None) - START) < timedelta(milliseconds=1) and message == ""
     else:
-        assert start is None and ("start time 't0 [" in message) == (name == "t0")
+        assert start is None and ("start time 'when [" in message) == (name == "when")
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5, -0.125])
