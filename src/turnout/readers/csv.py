@@ -83,7 +83,7 @@ def read_raw(source: Source) -> RawFile:
         data = data[:end]
     head = read_head(data, source)
     if tables := tables_of(data[:end], head.offset, head.separator):
-        raw_files = [_read_damaged_table(table, source) for table in tables]
+        raw_files = [_read_damaged_table(table, len(tables), source) for table in tables]
         records = tuple(record for raw in raw_files for record in raw.records)
         check_separate(records, source)
         remarks += tuple(remark for raw in raw_files for remark in raw.remarks)
@@ -92,16 +92,16 @@ def read_raw(source: Source) -> RawFile:
     return replace(raw, remarks=remarks + raw.remarks)
 
 
-def _read_damaged_table(table: bytes, source: Source) -> RawFile:
+def _read_damaged_table(table: bytes, n_table: int, source: Source) -> RawFile:
     """Records of one of several tables of a text; the error about a damaged one is its record."""
     try:
-        return _read_table(table, len(table), False, read_head(table, source), source)
+        return _read_table(table, len(table), False, read_head(table, source), source, n_table)
     except ReadError as error:
         return RawFile((error,))
 
 
-def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source) -> RawFile:
-    """Records of a head and the rows below it; ``end`` is the byte behind the rows."""
+def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source, n_table: int = 1) -> RawFile:
+    """Records of a head and the rows below it; ``end`` is the byte behind the rows, ``n_table`` counts the tables."""
     names, units, offset, separator = head.names, head.units, head.offset, head.separator
     if separator == BLANK:
         data = data[:end]
@@ -121,7 +121,7 @@ def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: So
     facts = Metadata(head.notes, source)
     first = start_or_clock_in_cells(first_cells(data, offset, separator), names)
     marks = ambiguous_marks(columns, data, offset, separator)
-    records = tuple(_records(columns, head, time, facts, source, first, marks))
+    records = tuple(_records(columns, head, time, facts, source, first, marks, n_table))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
 
 
@@ -261,6 +261,7 @@ def _records(
     source: Source,
     first: tuple[datetime | None, str],
     marks: Mapping[int, str],
+    n_table: int,
 ) -> Iterator[RawRecord | ReadError]:
     """The records: one of all rows, or one per number in the column ``record``."""
     names, units, entries = head.names, head.units, head.entries
@@ -273,12 +274,16 @@ def _records(
     }
     selected = [i for i, name in enumerate(names) if name != numbering and i != time and columns[i].dtype.kind in "fiu"]
     selected = [i for i in selected if names[i] or len(selected) == 1 or not _says_nothing(columns[i])]
-    seconds = None if time is None else np.asarray(columns[time]) * seconds_per_number(units[time], source)
+    seconds = (
+        None
+        if time is None or _is_empty(columns[time])
+        else np.asarray(columns[time]) * seconds_per_number(units[time], source)
+    )
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
     n = len(spans)
     promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
-    if promised is None and rows is not None and rows > n_row:
+    if promised is None and rows is not None and n_row < rows != n_row * n_table:
         promised = int(rows)
     of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
     undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
@@ -310,7 +315,7 @@ def _records(
             axis_starts=(first,) if k == 0 else (),
             conditions=facts.conditions(k, n),
             time=None if seconds is None else seconds[a:b],
-            aliases=tuple((head.written[i], *other_readings(names[i])) for i in selected),
+            aliases=tuple((*head.aliases[i], *other_readings(names[i])) for i in selected),
             marked_numbers={k: marks[i] for k, i in enumerate(selected) if i in marks},
             undecided=undecided,
             unit_conflicts=unit_conflicts,
@@ -338,6 +343,10 @@ def _label(names: Sequence[str], units: Sequence[str], i: int) -> str:
 def _counts_rows(column: Column) -> bool:
     """Whether each row has a number of its own: a logger counts the samples of one record."""
     return len(column) > 1 and bool(np.all(np.diff(np.asarray(column[:])) != 0.0))
+
+
+def _is_empty(column: Column) -> bool:
+    return column.dtype.kind == "f" and bool(np.isnan(column[:]).all())
 
 
 def _says_nothing(column: Column) -> bool:

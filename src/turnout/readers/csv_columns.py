@@ -13,6 +13,7 @@ from turnout.readers.attached_units import (
     names_and_units_in,
     unit_behind_mark,
 )
+from turnout.readers.csv_cells import is_number
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
@@ -179,13 +180,14 @@ COMMENT = re.compile(r"comm?ent|komment|remar[kq]|bemerk|notes?$|anmerk|osserv|o
 class Columns(NamedTuple):
     """Names and units of the columns, and the ``further`` names beside them for which the rows have no cells.
 
-    ``written`` are the names with the units in them; ``conflicts`` tells by the number of a column of two units for it.
+    ``aliases`` are for each column its name with the unit, and what the other lines of words have in its place;
+    ``conflicts`` tells by the number of a column of two units for it.
     """
 
     names: list[str]
     units: list[str]
     further: list[str]
-    written: list[str]
+    aliases: list[tuple[str, ...]]
     conflicts: dict[int, str]
 
 
@@ -210,7 +212,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     if not lines:
         names = [str(i) for i in range(count)]
         names = [*names[:-1], ""] if open_end and count > 1 else names
-        return Columns(names, [""] * count, [], names, {})
+        return Columns(names, [""] * count, [], [(name,) for name in names], {})
     name_line, unit_line = names_among(lines)
     written = lines[name_line]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
@@ -223,7 +225,8 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         for i, (cell, other) in enumerate(zip(written, below))
         if (unit := _contradicting_unit(cell, other))
     }
-    return Columns(names, units, further, written, conflicts)
+    others = [line for i, line in enumerate(lines) if i not in (name_line, unit_line) and not any(map(is_number, line))]
+    return Columns(names, units, further, [*zip(written, *others)], conflicts)
 
 
 def _contradicting_unit(cell: str, unit: str) -> str:

@@ -101,6 +101,9 @@ def entries_of_lines(
                 pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
             elif name and is_day(second) and re.match(r"\d{1,2}[:.]\d{2}", third):  # "Start;13.05.2026;10:20:30"
                 pairs = [(name, f"{second} {third}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
+        if len(filled) == 2 and rate_unit(filled[1]) and (match := HEAD_LINE.match(filled[0])) and is_number(match[3]):
+            yield Entry(place, match[1], f"{match[3]} {filled[1]}")  # "fs: 20;kHz"
+            continue
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
             pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole

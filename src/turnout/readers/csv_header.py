@@ -46,8 +46,8 @@ GROUPED_NUMBER = re.compile(rf"\d{{1,3}}(?:{THOUSANDS_MARK}\d{{3}})+(?!\d)")
 class Head(NamedTuple):
     """Lines above the numbers of a text file: ``notes`` by name, ``names`` and ``units`` of the columns.
 
-    The first number is at byte ``offset``; ``entries`` are all entries of the head with their lines. ``written`` are
-    the names with their units, ``unit_conflicts`` tells by the number of a column of two units for it.
+    The first number is at byte ``offset``; ``entries`` are all entries of the head with their lines. ``aliases`` are
+    further names of the columns, ``unit_conflicts`` tells by the number of a column of two units for it.
     """
 
     notes: dict[str, float | str]
@@ -56,7 +56,7 @@ class Head(NamedTuple):
     offset: int
     separator: str
     entries: tuple[Entry, ...]
-    written: list[str]
+    aliases: list[tuple[str, ...]]
     unit_conflicts: dict[int, str]
 
 
@@ -126,10 +126,10 @@ def _complete_head(
     texts = [cells_of(text, separator) for text in text_lines]
     if separator == BLANK:
         texts = [words for words in texts if len(words) == len(cells)]
-    texts += _commented_names(head_lines[-1:], texts, len(cells), separator)
+    texts += _commented_names(head_lines[-MAX_LINES_OF_NAMES:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
     _check_width(texts, cells, separator, len(head_lines), source)
-    names, units, further, written, conflicts = names_and_units(texts, cells)
+    names, units, further, aliases, conflicts = names_and_units(texts, cells)
     if further:
         problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
         where = f"line {len(head_lines) + 1}"
@@ -148,7 +148,7 @@ def _complete_head(
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
     names = ["" if i in stated else name for i, name in enumerate(names)]
     conditions = _conditions(text_lines, separator, names)
-    return Head({**conditions, **notes, **scales}, names, units, offset, separator, entries, written, conflicts)
+    return Head({**conditions, **notes, **scales}, names, units, offset, separator, entries, aliases, conflicts)
 
 
 def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str] | None:
@@ -198,6 +198,7 @@ def _value_of_condition(name: str, value: str, unit: str) -> float | str:
 
 
 STATEMENT = re.compile(r"[^\d\W][^=]*=\s*[+-]?\d.*")  # in place of a name, above cells that are empty
+MAX_LINES_OF_NAMES = 2  # behind a #: names and units
 NAMES_REMEDY = "Export the file again with one cell in each row for each name"
 NO_TEXT_REMEDY = (
     f"{COPY_AGAIN}; if the logger writes binary numbers, export them as text or in another format that is read"
@@ -217,11 +218,11 @@ def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
 
 
 def _commented_names(
-    last_line: Sequence[str], texts: Sequence[Sequence[str]], n: int, separator: str
+    last_lines: Sequence[str], texts: Sequence[Sequence[str]], n: int, separator: str
 ) -> list[list[str]]:
-    """Cells of the line directly above the numbers if it names the columns behind a #, and no other line does."""
-    names = [cells_of(line.lstrip("#%"), separator) for line in last_line if line.startswith(("#", "%"))]
-    if any(len(text) >= n for text in texts):
+    """Cells of the lines directly above the numbers that name the columns behind a #, if no other line does."""
+    names = [cells_of(line.lstrip("#%"), separator) for line in last_lines if line.startswith(("#", "%"))]
+    if any(len(text) >= n and not text[0].startswith(("#", "%")) for text in texts):
         return []
     return [cells for cells in names if len(cells) == n and not any(map(is_number, cells))]
 

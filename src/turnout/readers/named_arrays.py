@@ -256,7 +256,7 @@ def _units_of(channels: Mapping[str, Array], facts: Metadata, ordered: bool, whe
 def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Source) -> RawRecord:
     """The record of a matrix (channel, sample) or (sample, channel)."""
     block = np.atleast_2d(block) if isinstance(block, np.ndarray) else block
-    names, units = channel_names(facts), split_texts(list_of_texts(facts.get(UNIT_NAMES)))
+    names, units = _names_and_units(facts, block.shape)
     if block.ndim != 2 or block.dtype.kind not in "fiu":
         raise source.error(where, f"{block.dtype} of shape {block.shape} is no matrix of samples")
     rows = len(names) or min(block.shape)
@@ -273,6 +273,16 @@ def _record(block: Any, facts: Metadata, k: int, n: int, where: str, source: Sou
         return record
     name, axis = next(iter(axes.items()))  # each variable of samples beside a matrix is no channel of it
     return replace(record, time=np.asarray(axis, dtype=float), time_label=name)
+
+
+def _names_and_units(facts: Metadata, shape: tuple[int, ...]) -> tuple[list[str], list[str]]:
+    """Names and units of the channels of a matrix, which the only group beside it with as many names may list, too."""
+    described = [facts]
+    if not channel_names(facts):
+        groups = [Metadata(v, facts.source) for v in facts.variables.values() if isinstance(v, Mapping)]
+        nested = [group for group in groups if len(channel_names(group)) in shape]
+        described = nested if len(nested) == 1 else described
+    return channel_names(described[0]), split_texts(list_of_texts(described[0].get(UNIT_NAMES)))
 
 
 def _vectors_of_whole_numbers(variables: Mapping[str, Any], n_sample: int) -> dict[str, np.ndarray]:

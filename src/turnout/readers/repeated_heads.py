@@ -7,9 +7,11 @@ from mmap import mmap
 
 from turnout.errors import ReadError
 from turnout.readers.csv_cells import cells_of, decode_line, is_row
+from turnout.readers.csv_rows import STATISTICS
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 
+NOT_BLANK = re.compile(rb"[^\s]")
 LETTER = re.compile(rb"[A-Za-z\x80-\xff]")
 DELETE_REMEDY = "Delete the lines between the rows"
 NUMBER_REMEDY = "Export each record to a file, with a time column, or number the records in a column 'record'"
@@ -48,19 +50,35 @@ def tables_of(data: bytes | mmap, offset: int, separator: str) -> list[bytes]:
     position = data.find(b"\n" + last_line, offset - 1)
     while position >= 0:
         end = position + 1 + len(last_line)
-        if not data[end:].strip():
-            break
-        start = _start_of_head(data, position + 1, offset, separator)
-        n_own = n_own or data[start:end].count(b"\n")
-        starts.append(start)
+        if _is_row_next(data, end, separator):
+            start = _start_of_head(data, position + 1, offset, separator)
+            n_own = n_own or data[start:end].count(b"\n")
+            starts.append(start)
         position = data.find(b"\n" + last_line, end - 1)
     if len(starts) == 1:
         return []
     lines = head.splitlines(keepends=True)
     of_file = b"".join(lines[: max(len(lines) - n_own, 0)])
-    tables = [data[a:b] for a, b in pairwise([*starts, len(data)])]
+    tables = [_without_statistics(data[a:b]) for a, b in pairwise([*starts, len(data)])]
     n_skipped = [data[len(of_file) : start].count(b"\n") for start in starts]
     return tables[:1] + [of_file + b"\n" * n + table for n, table in zip(n_skipped[1:], tables[1:])]
+
+
+def _is_row_next(data: bytes | mmap, position: int, separator: str) -> bool:
+    """Whether the first line with content from byte ``position`` on is a row of numbers."""
+    content = NOT_BLANK.search(data, position)
+    if not content:
+        return False
+    end = data.find(b"\n", content.start())
+    line = data[content.start() : end if end >= 0 else len(data)]
+    return is_row(cells_of(decode_line(line), separator))
+
+
+def _without_statistics(table: bytes) -> bytes:
+    """A table without the statistics of the table above it, "Max;2000;90", which begin it."""
+    lines = table.splitlines(keepends=True)
+    n = next((i for i, line in enumerate(lines) if line.strip() and not STATISTICS.match(decode_line(line))), 0)
+    return b"".join(b"\n" if i < n else line for i, line in enumerate(lines))
 
 
 def _start_of_head(data: bytes | mmap, end: int, first: int, separator: str) -> int:

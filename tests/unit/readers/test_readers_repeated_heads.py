@@ -174,3 +174,53 @@ def test_a_time_that_begins_again_is_said_to_be_another_record(tmp_path):
     assert_error(
         f"its time begins again after {N} samples: another record follows", [NAMES, *rows_of(0), *rows_of(1)], tmp_path
     )
+
+
+@pytest.mark.parametrize(("stated", "n_read"), [(3 * N, 3), (N, 3), (4 * N, 0)])
+def test_a_number_of_samples_in_the_first_lines_may_count_those_of_all_tables(stated, n_read, tmp_path):
+    lines = [f"Number of samples;{stated}"]
+    for k in range(3):
+        lines += [f"Test {k + 1}", NAMES, *rows_of(k)]
+    result = read_lines(lines, tmp_path)
+    assert (len(result.recordings), len(result.errors)) == (n_read, 3 - n_read)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        ["#t;force;rail", "#s;N;m/s2"],
+        ["# t;force;rail", "# [s];[N];[m/s2]"],
+        ["Time;force;rail", ";PCB 086;PCB 352", "[s];[N];[m/s2]"],
+        ["Channel;force;rail", "t [s];CH1 [N];CH2 [m/s2]"],
+        ["Kanal;force;rail", "Sensor;S1;S2", "t;CH1;CH2", "s;N;m/s2"],
+    ],
+)
+def test_the_layout_names_a_channel_by_any_line_of_words_above_the_rows(head, tmp_path):
+    result = read_lines([*head, *rows_of(0)], tmp_path)
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+def test_units_in_a_line_behind_a_mark_of_a_comment_are_those_of_the_file(tmp_path):
+    """Formerly, the units were the names."""
+    channels = tuple(RawChannel(c.name, c.source, c.quantity, unit="N") for c in LAYOUT.channels[:1])
+    layout = RawDescription((*channels, LAYOUT.channels[1]), rate=RATE)
+    assert_error("the file says 'kN', the layout 'N'", ["#t;force;rail", "#s;kN;m/s2", *rows_of(0)], tmp_path, layout)
+
+
+def test_a_word_in_two_lines_is_the_name_in_the_line_of_names(tmp_path):
+    result = read_lines(["Was;rail;force", NAMES, *rows_of(0)], tmp_path)
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+def test_the_unit_of_a_rate_may_be_in_the_next_cell(tmp_path):
+    rows = [row.partition(";")[2] for row in rows_of(0)]
+    lines = ["fs: 20;kHz", "force [N];rail [m/s2]", *rows]
+    assert not read_lines(lines, tmp_path).errors
+    assert_error("instead of 25600 Hz", lines, tmp_path, RawDescription(LAYOUT.channels, rate=25600.0))
+
+
+def test_a_column_of_time_without_numbers_is_no_time(tmp_path):
+    result = read_lines(["fs: 20000", NAMES, *(";" + row.partition(";")[2] for row in rows_of(0))], tmp_path)
+    assert not result.errors
+    np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
