@@ -13,6 +13,7 @@ from turnout.readers.attached_units import (
     names_and_units_in,
     unit_behind_mark,
 )
+from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.csv_cells import is_number
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
@@ -256,8 +257,10 @@ def is_line_of_names(cells: Sequence[str], names: Sequence[str]) -> bool:
     Returns
     -------
     bool
-        False for a single column, of which another line may repeat the name.
+        False for a single column, of which another line may repeat the name, and for times, "Time;10:00:00;10:00:00".
     """
+    if any(map(is_clock_or_date, cells)):
+        return False
     cells = [cells[0].lstrip("#% "), *cells[1:]]
     bare = [name for name, _ in names_and_units_in(cells)]
     return len(names) > 1 and bare[: len(names)] == list(names)

@@ -99,7 +99,9 @@ def entries_of_lines(
                 pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
             elif name and rate_unit(second) and is_number(third):
                 pairs = [(name, f"{third} {second}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
-            elif name and is_day(second) and re.match(r"\d{1,2}[:.]\d{2}", third):  # "Start;13.05.2026;10:20:30"
+            elif (
+                name and is_day(second) and not is_day(third) and re.match(r"\d{1,2}[:.]\d{2}", third)
+            ):  # "Start;13.05.2026;10:20:30"
                 pairs = [(name, f"{second} {third}"), *(p for p in pairs if p not in ((name, second), (second, third)))]
         if len(filled) == 2 and rate_unit(filled[1]) and (match := HEAD_LINE.match(filled[0])) and is_number(match[3]):
             yield Entry(place, match[1], f"{match[3]} {filled[1]}")  # "fs: 20;kHz"

@@ -224,3 +224,13 @@ def test_a_column_of_time_without_numbers_is_no_time(tmp_path):
     result = read_lines(["fs: 20000", NAMES, *(";" + row.partition(";")[2] for row in rows_of(0))], tmp_path)
     assert not result.errors
     np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+def test_times_for_each_column_directly_above_the_rows_are_a_start_and_no_names(tmp_path):
+    head = ["Trace;force;rail", "Unit;N;m/s2", "Date;13.05.2026;13.05.2026", "Time;08:30:12.5;08:30:12.5"]
+    layout = tuple(RawChannel(c.name, c.source, c.quantity, unit=u) for c, u in zip(LAYOUT.channels, ("N", "m/s²")))
+    rows = [";" + row.partition(";")[2] for row in rows_of(0)]
+    result = read_lines([*head, *rows], tmp_path, RawDescription(layout, rate=RATE))
+    (recording,) = result.recordings
+    assert recording.started_at == datetime(2026, 5, 13, 8, 30, 12, 500000)
+    np.testing.assert_allclose(recording.read(0, N), signals(0), atol=1e-9)
