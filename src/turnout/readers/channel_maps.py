@@ -192,6 +192,10 @@ def index_of(
         else f"{CORRECT_SOURCE}, or find out why the logger did not record the channel"
     )
     problem = f"there is no channel {wanted!r}; there are {_name_list(record.names)}"
+    stated = next((e for e in record.entries if isinstance(e.value, str) and _key_of_name(e.value) == key), None)
+    if stated:
+        problem += f", and {wanted!r} is the value of {stated.name!r} in {stated.place}"
+        hint = "Name the channel by its number in the layout, from 0; nothing in the file gives this name to a channel"
     raise source.error(where, problem, hint, reason="channel_missing")
 
 

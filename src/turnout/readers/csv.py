@@ -82,7 +82,7 @@ def read_raw(source: Source) -> RawFile:
     if isinstance(data, bytes):
         data = data[:end]
     head = read_head(data, source)
-    if tables := tables_of(data[:end], head.offset, head.separator):
+    if tables := tables_of(data, head.offset, head.separator):
         raw_files = [_read_damaged_table(table, len(tables), source) for table in tables]
         records = tuple(record for raw in raw_files for record in raw.records)
         check_separate(records, source)

@@ -7,6 +7,8 @@ from dataclasses import replace
 from datetime import datetime
 from functools import lru_cache
 
+import numpy as np
+
 from turnout.errors import ReadError
 from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
@@ -23,7 +25,7 @@ from turnout.readers.stated_starts import (
     with_stated_start,
 )
 from turnout.readers.stated_zones import ABBREVIATION, zone_in_name, zone_of
-from turnout.readers.time_texts import is_day, parse_time
+from turnout.readers.time_texts import DATE_PARTS, is_day, parse_time, time_of_vector
 
 CLOCK_ALONE = re.compile(
     r"(\d{1,2}:\d{2})(:\d{2}(?:[.,]\d{1,12})?)?((?: ?[AaPp]\.?[Mm]\.?)?(?:Z| ?UTC| ?[+-]\d{2}:?\d{2})?)"
@@ -85,10 +87,17 @@ def may_state_start(name: str) -> bool:
 
 def _entries_of_start(record: RawRecord, counts: Counter, n: int) -> tuple[Entry, ...]:
     """Entries that may state the start: those of the record alone if they do, else those of the file."""
-    entries = tuple(e for e in record.entries if may_state_start(e.name))
+    entries = tuple(e for e in (*record.entries, *_joined_parts(record.entries)) if may_state_start(e.name))
     of_record = tuple(e for e in entries if counts[_key(e)] < n)
     stated = _with_start(replace(record, started_at=None, unread_start=""), of_record)
     return of_record if stated.started_at or stated.unread_start else entries
+
+
+def _joined_parts(entries: Sequence[Entry]) -> list[Entry]:
+    """The start as a date vector if six entries state its parts as numbers, from ``year`` to ``second``."""
+    parts = {e.name.casefold(): e.value for e in entries if isinstance(e.value, (int, float, np.number))}
+    vector = [float(parts[part]) for part in DATE_PARTS if part in parts]
+    return [Entry("entries", "start", vector)] if time_of_vector(vector) else []
 
 
 def _with_start(record: RawRecord, entries: tuple[Entry, ...]) -> RawRecord:

@@ -191,3 +191,14 @@ def test_an_entry_that_is_called_by_a_level_alone_is_reported(write, tmp_path):
 @pytest.mark.parametrize("write", [write_mat, write_npz, write_hdf5, write_tdms])
 def test_a_level_of_0_changes_nothing(write, tmp_path):
     assert start_of(write, "dB", 0.0, tmp_path) == (None, ())
+
+
+@pytest.mark.parametrize("n_part", [6, 5])
+def test_six_entries_with_the_parts_of_a_date_are_a_start(n_part, tmp_path):
+    parts = dict(zip(["year", "month", "day", "hour", "minute", "second"][:n_part], VECTOR))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for channel, samples in SIGNALS.items():
+            file[channel] = samples
+        file.attrs.update({"fs": 20000.0, **parts})
+    (recording,) = read("a.h5", tmp_path, LAYOUT).recordings
+    assert recording.started_at == (START if n_part == 6 else None)

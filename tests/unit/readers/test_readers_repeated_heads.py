@@ -234,3 +234,19 @@ def test_times_for_each_column_directly_above_the_rows_are_a_start_and_no_names(
     (recording,) = result.recordings
     assert recording.started_at == datetime(2026, 5, 13, 8, 30, 12, 500000)
     np.testing.assert_allclose(recording.read(0, N), signals(0), atol=1e-9)
+
+
+def test_the_error_of_a_name_in_a_head_of_sections_states_where_it_is(tmp_path):
+    head = ["[Channel1]", "Name=force", "Unit=N", "[Channel2]", "Name=rail", "Unit=m/s2", "[Data]"]
+    rows = [row.partition(";")[2] for row in rows_of(0)]
+    words = "'force' is the value of 'Name' in line 2. Name the channel by its number in the layout, from 0"
+    assert_error(words, [*head, *rows], tmp_path)
+
+
+def test_tables_of_a_file_that_is_read_in_blocks(tmp_path):
+    lines = [line for k in range(3) for line in (NAMES, *rows_of(k))]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n")
+    result = read("a.csv", tmp_path, LAYOUT, max_duration=1e-3, max_whole_file_size=0)
+    recordings = [*result.recordings, *result.long_recordings]
+    assert len(recordings) == 3
+    np.testing.assert_allclose(recordings[2].read(0, N), signals(2), atol=1e-9)
