@@ -46,19 +46,18 @@ def tables_of(data: bytes | mmap, offset: int, separator: str) -> list[bytes]:
     last_line = next((line for line in reversed(head.splitlines(keepends=True)) if line.strip()), b"")
     if not LETTER.search(last_line):
         return []
-    starts, n_own = [0], 0
+    starts, own = [0], b""
     position = data.find(b"\n" + last_line, offset - 1)
     while position >= 0:
         end = position + 1 + len(last_line)
         if _is_row_next(data, end, separator):
             start = _start_of_head(data, position + 1, offset, separator)
-            n_own = n_own or data[start:end].count(b"\n")
+            own = own or data[start:end]
             starts.append(start)
         position = data.find(b"\n" + last_line, end - 1)
     if len(starts) == 1:
         return []
-    lines = head.splitlines(keepends=True)
-    of_file = b"".join(lines[: max(len(lines) - n_own, 0)])
+    of_file = _lines_of_file(head, own)
     tables = [_without_statistics(data[a:b]) for a, b in pairwise([*starts, len(data)])]
     n_skipped = [data[len(of_file) : start].count(b"\n") for start in starts]
     return tables[:1] + [of_file + b"\n" * n + table for n, table in zip(n_skipped[1:], tables[1:])]
@@ -79,6 +78,18 @@ def _without_statistics(table: bytes) -> bytes:
     lines = table.splitlines(keepends=True)
     n = next((i for i, line in enumerate(lines) if line.strip() and not STATISTICS.match(decode_line(line))), 0)
     return b"".join(b"\n" if i < n else line for i, line in enumerate(lines))
+
+
+def _lines_of_file(head: bytes, own: bytes) -> bytes:
+    """The first lines of a head, above the last ones that come again: ``own`` is the head of the second table."""
+    lines, repeated = head.splitlines(keepends=True), {_key_of_line(line) for line in own.splitlines()}
+    n = next((i for i in range(len(lines), 0, -1) if _key_of_line(lines[i - 1]) not in repeated | {b""}), 0)
+    return b"".join(lines[:n])
+
+
+def _key_of_line(line: bytes) -> bytes:
+    """What a line has in common with that of another record, "Test" of "Test 2" and "Start" of "Start: 10:00"."""
+    return re.sub(rb"[\d\s#%]+", b"", re.split(rb"[:=;,\t]", line, maxsplit=1)[0])
 
 
 def _start_of_head(data: bytes | mmap, end: int, first: int, separator: str) -> int:

@@ -64,6 +64,18 @@ def test_each_head_states_the_start_of_its_record_and_the_first_lines_are_about_
     assert [r.conditions["rail_temperature"] for r in result.recordings] == [12.5] * 3
 
 
+@pytest.mark.parametrize(
+    "own", [["Test {}"], ["", "# Test {}"], ["Impact {}", "Start: 2026-05-13 08:3{}:00"], ["a", "b", "c"]]
+)
+def test_the_lines_of_the_file_count_for_each_table_however_many_lines_a_table_has(own, tmp_path):
+    """Formerly, as many lines of the first head were its own as stand above the second table."""
+    lines = ["rail_temperature: 12.5"]
+    for k in range(3):
+        lines += [line.format(k) for line in own if k or own != ["a", "b", "c"]] + [NAMES, *rows_of(k)]
+    result = read_lines(lines, tmp_path)
+    assert [r.conditions.get("rail_temperature") for r in result.recordings] == [12.5] * 3
+
+
 def test_a_time_that_goes_on_below_a_repeated_head_is_one_record(tmp_path):
     lines = [NAMES, *rows_of(0), NAMES, *rows_of(1, first=N / RATE)]
     with pytest.raises(ReadError, match=r"table 2 of 2: .* the time goes on: it is one record. Delete the lines"):
