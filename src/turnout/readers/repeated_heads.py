@@ -46,18 +46,18 @@ def tables_of(data: bytes | mmap, offset: int, separator: str) -> list[bytes]:
     last_line = next((line for line in reversed(head.splitlines(keepends=True)) if line.strip()), b"")
     if not LETTER.search(last_line):
         return []
-    starts, own = [0], b""
+    starts, second_head = [0], b""
     position = data.find(b"\n" + last_line, offset - 1)
     while position >= 0:
         end = position + 1 + len(last_line)
         if _is_row_next(data, end, separator):
             start = _start_of_head(data, position + 1, offset, separator)
-            own = own or data[start:end]
+            second_head = second_head or data[start:end]
             starts.append(start)
         position = data.find(b"\n" + last_line, end - 1)
     if len(starts) == 1:
         return []
-    of_file = _lines_of_file(head, own)
+    of_file = _lines_of_file(head, second_head)
     tables = [_without_statistics(data[a:b]) for a, b in pairwise([*starts, len(data)])]
     n_skipped = [data[len(of_file) : start].count(b"\n") for start in starts]
     return tables[:1] + [of_file + b"\n" * n + table for n, table in zip(n_skipped[1:], tables[1:])]
@@ -80,9 +80,9 @@ def _without_statistics(table: bytes) -> bytes:
     return b"".join(b"\n" if i < n else line for i, line in enumerate(lines))
 
 
-def _lines_of_file(head: bytes, own: bytes) -> bytes:
-    """The first lines of a head, above the last ones that come again: ``own`` is the head of the second table."""
-    lines, repeated = head.splitlines(keepends=True), {_key_of_line(line) for line in own.splitlines()}
+def _lines_of_file(head: bytes, second_head: bytes) -> bytes:
+    """The first lines of a head, above the last ones that come again: ``second_head`` is that of the second table."""
+    lines, repeated = head.splitlines(keepends=True), {_key_of_line(line) for line in second_head.splitlines()}
     n = next((i for i in range(len(lines), 0, -1) if _key_of_line(lines[i - 1]) not in repeated | {b""}), 0)
     return b"".join(lines[:n])
 
