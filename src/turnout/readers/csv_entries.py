@@ -25,7 +25,9 @@ from turnout.readers.stated_units import known_unit
 from turnout.readers.time_texts import is_day, looks_dated, parse_time
 from turnout.readers.unit_names import UNIT_WORD, is_unit_name
 
-MARK = rf"(?:{COLON}|[=;\t]|(?<!\d),|,(?!\d))"  # behind a name; a comma between two digits is a decimal mark
+NOT_BEHIND_NUMBER = "".join(rf"(?<!\s\d{{{n}}})" for n in range(1, 7))  # a digit in a word, as in "CH1", is none
+# Behind a name; a comma within a number is a decimal mark.
+MARK = rf"(?:{COLON}|[=;\t]|{NOT_BEHIND_NUMBER},|,(?!\d))"
 HEAD_LINE = re.compile(rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*{MARK}\s*(.*)$")
 UNIT_BEHIND_COMMA = re.compile(r"^([^,:=;\t]+),\s*([^\W\d][^\s,:=;\t]*)(?=\s*[:=;\t]\s*[+-]?[.,]?\d)")
 

@@ -5,6 +5,8 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from mmap import mmap
 
+import numpy as np
+
 from turnout.errors import ReadError
 from turnout.readers.csv_cells import cells_of, decode_line, is_row
 from turnout.readers.csv_rows import STATISTICS
@@ -129,9 +131,9 @@ def _connections(records: Sequence[RawRecord | ReadError]) -> Iterator[tuple[str
         if isinstance(before, ReadError) or isinstance(record, ReadError):
             yield "", ""
         elif before.time is not None and record.time is not None and len(before.time) > 1:
-            step = (before.time[-1] - before.time[0]) / (len(before.time) - 1)
-            is_next = 0.5 * step < record.time[0] - before.time[-1] < 1.5 * step
-            yield ("and the time goes on: it is one record", DELETE_REMEDY) if is_next else ("", "")
+            step = np.diff(before.time).max()  # of a coarse clock, which may also repeat the last time
+            goes_on = abs(record.time[0] - before.time[-1]) < 1.5 * step and record.time[0] > before.time[0]
+            yield ("and the time goes on: it is one record", DELETE_REMEDY) if goes_on else ("", "")
         else:
             is_later = before.started_at and record.started_at and before.started_at != record.started_at
             yield ("", "") if is_later else ("and nothing says whether another record begins", NUMBER_REMEDY)

@@ -281,10 +281,12 @@ class RawRecord:
         Returns
         -------
         int or None
-            The first such row; None if the record does not have the channel.
+            The first such row, by a further name only where no channel has it as its name; None if the record does not
+            have the channel.
         """
-        aliases = (*self.aliases, *((),) * len(self.names))
-        return next((i for i, name in enumerate(self.names) if channel in (i, name, *aliases[i])), None)
+        rows = [i for i, name in enumerate(self.names) if channel in (i, name)]
+        rows += [i for i, aliases in enumerate(self.aliases) if channel in aliases]
+        return rows[0] if rows else None
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,38 @@ MONTH_WORDS = {
     1: "jan gen ene", 2: "feb fev", 3: "mar mrz maer", 4: "apr avr abr", 5: "may mai maj mag", 6: "jun juin giu",
     7: "jul juil lug", 8: "aug aou ago", 9: "sep set", 10: "oct okt ott", 11: "nov", 12: "dec dez dic des",
 }  # fmt: skip
+# Weekdays without "day", "tag", "dag", "di" behind them: English, German, French, Danish, Italian, Spanish, Dutch.
+WEEKDAYS = frozenset(
+    """
+    mon tue tues wed wednes thu thur thurs fri sat satur sun mo di mi do fr sa so die diens mit mittwoch donners frei
+    sams sonnabend sonn lun mar mercre mer jeu vendre ven same sam dimanche dim man tir tirs tis ons tor tors fre
+    lør søn lor son ma ti on to lø sø mercole gio giove vener sab sabato dom domenica lunes martes mie miercoles jueves
+    jue viernes vie sabado domingo maan dins woens donder vrij zater zon wo vr za zo
+    """.split()
+)
+
+
+def is_weekday(word: str) -> bool:
+    """Whether a word is the name of a weekday, or its beginning.
+
+    Parameters
+    ----------
+    word : str
+        Without a dot behind it.
+
+    Returns
+    -------
+    bool
+        Accents do not matter.
+
+    Examples
+    --------
+    >>> [is_weekday(word) for word in ("Wed", "Mittwoch", "mercredi", "lørdag", "sábado", "May", "UTC")]
+    [True, True, True, True, True, False, False]
+    """
+    letters = unicodedata.normalize("NFKD", word.casefold())
+    plain = "".join(c for c in letters if not unicodedata.combining(c))
+    return bool({plain, re.sub(r"(?:day|tag|dag|di)$", "", plain)} & WEEKDAYS)
 
 
 def month_of(text: str) -> int:

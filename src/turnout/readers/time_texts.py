@@ -1,13 +1,14 @@
 """Times of day as loggers print and store them."""
 
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
 
 from turnout.readers.calendar_dates import dated_time
-from turnout.readers.stamp_texts import DAY_OF_YEAR, month_of, plain_stamp
+from turnout.readers.stamp_texts import DAY_OF_YEAR, is_weekday, month_of, plain_stamp
 from turnout.readers.time_numbers import time_of_digits, time_of_number
 
 NUMBER_TEXT = re.compile(r"\d+(?:\.\d*)?(?:[eE]\+?\d+)?")
@@ -29,7 +30,7 @@ DOTTED_CLOCK = re.compile(r"(?<=\d{4}[ T])(\d{1,2})\.(\d{2})\.(\d{2})(?!\.|\d)")
 BEFORE_CLOCK = re.compile(r"(?<=\d),? (?:um|at|kl\.?|à|om|alle|ore|ob) (?=\d{1,2}\s?[:.h]\s?\d{2})", re.IGNORECASE)
 BEHIND_CLOCK = re.compile(r"(?<=\d) (?:Uhr|hrs?|h)\.?$", re.IGNORECASE)
 HOURS_AND_MINUTES = re.compile(r"(?<=[\sT])(\d{1,2})\s?h\s?(\d{2})(?:\s?(?:m|min)?\s?(\d{2}(?:[.,]\d{1,9})?)\s?s?)?$")
-WEEKDAY = re.compile(r"^[^\W\d]{2,10}\.?,? (?=\d)")  # in front of a date
+WORD_AHEAD = re.compile(r"^([^\W\d]{2,10})\.?,? +(?=\d{1,4}[-./]|\d{1,2}\.? *[^\W\d]{3})")  # of a whole date
 # The date vector of MATLAB as a text, "[2026 5 13 8 30 12.25]".
 VECTOR = re.compile(
     r"[\[(]?\s*(\d{4})(?:\.0*)?" + r"[\s,;]+(\d{1,2})(?:\.0*)?" * 4 + r"[\s,;]+(\d{1,2}(?:\.\d*)?)\s*[\])]?",
@@ -57,6 +58,7 @@ def looks_dated(text: str) -> bool:
     >>> [looks_dated(text) for text in ("05/13/2024 10:00 AM", "13 May 2024 10:00:00", "20240513T100000", "3.5 mm")]
     [True, True, True, False]
     """
+    text = _without_weekday(text)
     is_worded = WORDED_DATE.search(text) and month_of(text) and re.search(r"\d{4}", text)
     return bool(DATED.match(text) or DAY_OF_YEAR.match(text) or is_worded or time_of_vector(text))
 
@@ -79,20 +81,24 @@ def time_of_vector(value: Any) -> datetime | None:
     >>> time_of_vector([2026, 5, 13, 8, 30, 12.25]), time_of_vector("[2026 5 13 8 30 12]"), time_of_vector([1, 2])
     (datetime.datetime(2026, 5, 13, 8, 30, 12, 250000), datetime.datetime(2026, 5, 13, 8, 30, 12), None)
     """
+    numbers: Sequence[Any] = ()
     if isinstance(value, str):
         match = VECTOR.fullmatch(value.strip())
         numbers = [float(text) for text in match.groups()] if match else []
-    else:
-        is_numeric = isinstance(value, (list, tuple, np.ndarray)) and np.size(value) == len(DATE_PARTS)
-        array = np.ravel(np.asarray(value)) if is_numeric else np.empty(0)
-        numbers = array.tolist() if array.dtype.kind in "fiu" else []
-    if not numbers or numbers[0] not in VECTOR_YEARS or any(number != int(number) for number in numbers[:5]):
+    elif isinstance(value, np.ndarray):
+        numbers = np.ravel(value).tolist() if value.size == len(DATE_PARTS) else []
+    elif isinstance(value, (list, tuple)):
+        numbers = value
+    are_numbers = all(isinstance(n, (int, float, np.integer, np.floating)) for n in numbers)
+    if len(numbers) != len(DATE_PARTS) or not are_numbers:
+        return None
+    if numbers[0] not in VECTOR_YEARS or not np.isfinite(numbers).all() or any(n != int(n) for n in numbers[:5]):
         return None
     try:
         minute = datetime(*map(int, numbers[:5]))  # type: ignore[arg-type]
     except ValueError:
         return None
-    return minute + timedelta(seconds=numbers[5]) if 0.0 <= numbers[5] < 60.0 else None
+    return minute + timedelta(seconds=float(numbers[5])) if 0.0 <= numbers[5] < 60.0 else None
 
 
 DATE_PARTS = ("year", "month", "day", "hour", "minute", "second")
@@ -244,7 +250,7 @@ def _time_of_stamp(value: Any) -> datetime | None:
     if match := WITH_UTC.fullmatch(value.strip()):
         time = _time_of_stamp(match[1])
         return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
-    value = BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", WEEKDAY.sub("", value.strip())))
+    value = BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", _without_weekday(value.strip())))
     value = HOURS_AND_MINUTES.sub(lambda match: f"{match[1]}:{match[2]}:{match[3] or '00'}", value)
     value = plain_stamp(DOTTED_CLOCK.sub(r"\1:\2:\3", value))
     if time := dated_time(value.strip()):
@@ -262,6 +268,12 @@ def _time_of_stamp(value: Any) -> datetime | None:
         return datetime.fromisoformat(text)
     except ValueError:
         return None
+
+
+def _without_weekday(text: str) -> str:
+    """A time stamp without the weekday in front of its date. A month, as in "May 13, 2026", and a zone stay."""
+    match = WORD_AHEAD.match(text)
+    return text[match.end() :] if match and is_weekday(match[1]) else text
 
 
 def _with_dashes(match: re.Match[str]) -> str:

@@ -12,6 +12,7 @@ import soundfile
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from turnout.readers import read
+from turnout.readers.time_texts import parse_time, time_of_vector
 from turnout.records import RawChannel, RawDescription
 
 LAYOUT = RawDescription(
@@ -127,6 +128,38 @@ def test_notations_of_a_line(line, tmp_path):
     (tmp_path / "a.csv").write_text(f"{line}\nfs: 20000\nforce;rail\n{rows}")
     (recording,) = read("a.csv", tmp_path, LAYOUT).recordings
     assert is_near(recording.started_at)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "May 13, 2026 08:30:12.250",
+        "May 13 2026 08:30:12.250",
+        "May 13th, 2026 08:30:12.250",
+        "Wed, May 13, 2026 08:30:12.250",
+        "Mi, 13.05.2026 08:30:12,250",
+        "onsdag 13.05.2026 08:30:12.250",
+        "mer. 13/05/2026 08:30:12.250",
+    ],
+)
+def test_the_month_or_a_weekday_may_come_first(text, tmp_path):
+    """Formerly, a month in front was left out as if it were a weekday."""
+    start, errors = start_of(write_csv, "Start", text, tmp_path)
+    assert is_near(start)
+    assert not errors
+
+
+@pytest.mark.parametrize("word", ["PST", "CET", "before", "end"])
+def test_a_word_before_a_date_that_is_no_weekday_is_not_left_out(word):
+    """The zone would be lost, or the start be that of something else."""
+    assert parse_time(f"{word} 2026-05-13 08:30:12") is None
+
+
+@pytest.mark.parametrize(
+    "value", [[[1, 2], [3]], [1, 2, 3, 4, 5, [6, 7]], [2026, np.nan, 1, 1, 1, 1], [2026, np.inf, 1, 1, 1, 1], []]
+)
+def test_a_list_that_is_no_date_vector_is_no_error(value):
+    assert time_of_vector(value) is None
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Text files whose head comes again below the rows, and what people write below the last row."""
 
+import tracemalloc
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.readers.timing import is_coarse
 from turnout.records import RawChannel, RawDescription
 
 RATE, N = 20000.0, 200
@@ -82,6 +85,20 @@ def test_a_time_that_goes_on_below_a_repeated_head_is_one_record(tmp_path):
         read_lines(lines, tmp_path)
 
 
+@pytest.mark.parametrize("resolution", [1e-3, 1e-4])
+@pytest.mark.parametrize("first", [N - 1, N, N + 1])
+def test_a_coarse_clock_that_goes_on_below_a_repeated_head_is_one_record(resolution, first, tmp_path):
+    """The last time comes again, or the next one is 20 steps later."""
+
+    def rows(k, first):
+        times = np.floor((first + np.arange(N)) / RATE / resolution + 1e-6) * resolution
+        return [f"{t:.4f};{f:.4f};{a:.4f}" for t, (f, a) in zip(times, signals(k).T)]
+
+    with pytest.raises(ReadError, match="the time goes on: it is one record"):
+        read_lines([NAMES, *rows(0, 0), NAMES, *rows(1, first)], tmp_path)
+    assert len(read_lines([NAMES, *rows(0, 0), NAMES, *rows(1, 0)], tmp_path).recordings) == 2
+
+
 def test_without_time_and_starts_nothing_says_whether_another_record_begins(tmp_path):
     rows = [[row.partition(";")[2] for row in rows_of(k)] for k in range(2)]
     lines = ["force [N];rail [m/s2]", *rows[0], "force [N];rail [m/s2]", *rows[1]]
@@ -127,6 +144,13 @@ def test_a_comma_in_a_line_of_the_head_separates_no_decimals_and_no_unit(line, t
     result = read_lines([line, "force [N];rail [m/s2]", *rows], tmp_path, right)
     assert not result.errors
     assert_error("sampled at 25600 Hz instead of 6000 Hz", [line, "force [N];rail [m/s2]", *rows], tmp_path, wrong)
+
+
+@pytest.mark.parametrize("line", ["Rate1,20000", "Sampling rate CH12,20000", "fs_1,20000"])
+def test_a_digit_at_the_end_of_a_name_is_no_number_before_a_comma(line, tmp_path):
+    """Formerly, "Rate1,20000" was a rate of 1.2 kHz."""
+    rows = [row.partition(";")[2] for row in rows_of(0)]
+    assert not read_lines([line, "force [N];rail [m/s2]", *rows], tmp_path).errors
 
 
 @pytest.mark.parametrize(
@@ -182,6 +206,15 @@ def test_faults_of_a_coarse_clock_and_of_a_fine_one_are_errors(fault, tmp_path):
     assert_error("stands still", [NAMES] + [f"{t:.6f};{f:.4f};{a:.4f}" for t, f, a in zip(times, *noise)], tmp_path)
 
 
+def test_the_times_of_a_long_record_are_not_copied_to_see_that_its_clock_is_fine():
+    times = np.arange(2_000_000) / RATE
+    tracemalloc.start()
+    assert not is_coarse(times)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 0.5 * times.nbytes
+
+
 def test_a_time_that_begins_again_is_said_to_be_another_record(tmp_path):
     assert_error(
         f"its time begins again after {N} samples: another record follows", [NAMES, *rows_of(0), *rows_of(1)], tmp_path
@@ -223,6 +256,15 @@ def test_units_in_a_line_behind_a_mark_of_a_comment_are_those_of_the_file(tmp_pa
 def test_a_word_in_two_lines_is_the_name_in_the_line_of_names(tmp_path):
     result = read_lines(["Was;rail;force", NAMES, *rows_of(0)], tmp_path)
     np.testing.assert_allclose(result.recordings[0].read(0, N), signals(0), atol=1e-9)
+
+
+def test_a_direction_is_that_of_the_channel_with_this_name_and_not_with_this_further_name(tmp_path):
+    """The layout inverts the channel of which the file says so."""
+    layout = (RawChannel("a", "a", "acceleration", sign=-1), RawChannel("b", "b", "acceleration"))
+    lines = ["Direction of a: -z", "Was;b;a", "t [s];a [m/s2];b [m/s2]", *rows_of(0)]
+    assert not read_lines(lines, tmp_path, RawDescription(layout, rate=RATE)).errors
+    other_layout = (replace(layout[0], sign=1), layout[1])
+    assert read_lines(lines, tmp_path, RawDescription(other_layout, rate=RATE)).errors
 
 
 def test_the_unit_of_a_rate_may_be_in_the_next_cell(tmp_path):
