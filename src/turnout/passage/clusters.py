@@ -143,7 +143,7 @@ def fit_clusters(passages: Sequence[Mapping], settings: PassageSettings, previou
     settings : PassageSettings
         Largest number of clusters of a type, and the seed.
     previous : Clusters or None
-        As many clusters as possible keep the id of one of these, see ``MAX_SHIFT``; the others get new numbers.
+        Clusters keep the ids of these whose means are within ``MAX_SHIFT``; the others get new numbers.
 
     Returns
     -------
@@ -200,9 +200,10 @@ def _with_ids(
     previous_clusters: Sequence[Cluster],
     next_number: int,
 ) -> list[Cluster]:
-    """Clusters with ids: those of previous clusters within ``MAX_SHIFT``, so that most and the nearest keep theirs.
+    """Clusters with ids: those of the nearest previous clusters within ``MAX_SHIFT``.
 
-    The others get numbers from ``next_number`` on.
+    The sum of the distances is the least, of which each counts as ``MAX_SHIFT`` at most. The others get numbers from
+    ``next_number`` on.
     """
     ids = {}
     if previous_clusters:

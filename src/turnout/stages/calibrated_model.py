@@ -282,7 +282,8 @@ class _VisitFits:
         print(f"{self.turnout.id}: fit of visit {label}{again}", file=sys.stderr, flush=True)
         paths = self.folder, self.raw_root, self.work, self.track
         fitted, reasons = _fit_visit(*paths, self.units[label], about, start)
-        self.notes.extend(reasons)
+        if start is None:  # else the visit has been fitted already
+            self.notes.extend(reason for reason in reasons if reason not in self.notes)
         return fitted
 
 

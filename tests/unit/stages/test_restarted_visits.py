@@ -1,6 +1,7 @@
 """A visit whose fit from the file ends at a wrong maximum counts as fitted from the values of the earlier visits."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
+from turnout.stages import calibrated_model
 from turnout.stages import restarted_visits as restarted
 from turnout.stages.agreeing_visits import FittedGroup, KeyedInformation
 from turnout.stages.restarted_visits import restarted_visits
@@ -119,3 +121,14 @@ def test_stored_fits_are_used_until_an_earlier_visit_changes(history, tmp_path):
     )
     assert list(first.begun) == list(other.begun) == ["2022-01-01"] and again.begun == {}
     assert again.after == first.after
+
+
+def test_what_could_not_be_fitted_is_stated_once_and_not_for_a_second_fit_of_a_visit(monkeypatch):
+    reasons = iter((["layout"], ["layout", "the wheel leaves the track"], ["the second fit ends in an error"]))
+    monkeypatch.setattr(calibrated_model, "_fit_visit", lambda *_: ([], next(reasons)))
+    files = {"units": {"v": ()}, "versions": {"v": {}}, "answers": {}, "raw_root": "", "work": "", "track": None}
+    fits = calibrated_model._VisitFits(SimpleNamespace(id="t1"), Path(), **files, without=(), notes=[])
+    fits.fit_all(["v"])
+    fits.of_visit("v")
+    fits.from_belief("v", SimpleNamespace())
+    assert fits.notes == ["layout", "the wheel leaves the track"]

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from turnout.mismatch.calibrated import StateParameter
@@ -60,3 +61,31 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
     stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")
     assert written["levels"] == {"channel A1 in the passages": 0.5}
+
+
+def test_a_fit_begins_at_the_means_of_a_belief_by_the_names_of_the_turnout(monkeypatch):
+    """The belief also has parameters of other sections; a parameter that it does not know begins as in the file."""
+    case, begun = object.__new__(TrackCase), []
+    parameters = {n: StateParameter(name, 0.0, 0.1, 0.0, "surface") for n, name in (("a", "pad 3"), ("b", "gain A1"))}
+    first = SimpleNamespace(name="first")
+
+    def fit_base(search, values):
+        begun.append(values)
+        return SimpleNamespace(case=case), first
+
+    replaced = {
+        "fit_base": fit_base,
+        "calibrated_parameters": lambda *_: parameters,
+        "fit_from_nose_positions": lambda search, fit, positions: SimpleNamespace(name="moved"),
+        "fit_large_values": lambda search, fit, *_: fit,
+        "one_of_each_group": lambda case: (),
+        "with_reserved_passages": lambda case, fit, *_: (case, fit),
+    }
+    for name, function in replaced.items():
+        monkeypatch.setattr(stored_visits, name, function)
+    monkeypatch.setattr(stored_visits.Search, "of", lambda *_: None)
+    group = SimpleNamespace(labels=("A",), route="main")
+    belief = SimpleNamespace(names=("gain B7", "pad 3"), mean=np.array([0.7, 0.3]))
+    fits = [stored_visits.fit_group(group, case, None, start=start).fit for start in (None, belief)]
+    assert begun == [{}, {"a": 0.3}]
+    assert [fit.name for fit in fits] == ["moved", "first"]
