@@ -60,9 +60,11 @@ def tables_of(data: bytes | mmap, offset: int, separator: str) -> list[bytes]:
     if len(starts) == 1:
         return []
     of_file = _lines_of_file(head, second_head)
-    tables = [_without_statistics(data[a:b]) for a, b in pairwise([*starts, len(data)])]
-    n_skipped = [data[len(of_file) : start].count(b"\n") for start in starts]
-    return tables[:1] + [of_file + b"\n" * n + table for n, table in zip(n_skipped[1:], tables[1:])]
+    further_tables = [
+        of_file + b"\n" * data[len(of_file) : a].count(b"\n") + _without_statistics(data[a:b])
+        for a, b in pairwise([*starts[1:], len(data)])
+    ]
+    return [data[: starts[1]], *further_tables]
 
 
 def _is_row_next(data: bytes | mmap, position: int, separator: str) -> bool:
@@ -77,9 +79,14 @@ def _is_row_next(data: bytes | mmap, position: int, separator: str) -> bool:
 
 def _without_statistics(table: bytes) -> bytes:
     """A table without the statistics of the table above it, "Max;2000;90", which begin it."""
-    lines = table.splitlines(keepends=True)
-    n = next((i for i, line in enumerate(lines) if line.strip() and not STATISTICS.match(decode_line(line))), 0)
-    return b"".join(b"\n" if i < n else line for i, line in enumerate(lines))
+    n, position = 0, 0
+    while position < len(table):
+        end = table.find(b"\n", position) + 1 or len(table)
+        line = table[position:end]
+        if line.strip() and not STATISTICS.match(decode_line(line)):
+            break
+        n, position = n + 1, end
+    return b"\n" * n + table[position:]
 
 
 def _lines_of_file(head: bytes, second_head: bytes) -> bytes:

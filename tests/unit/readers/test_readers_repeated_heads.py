@@ -79,6 +79,12 @@ def test_the_lines_of_the_file_count_for_each_table_however_many_lines_a_table_h
     assert [r.conditions.get("rail_temperature") for r in result.recordings] == [12.5] * 3
 
 
+def test_a_number_in_the_first_lines_is_no_statistic_of_a_table_above(tmp_path):
+    """Formerly, it was reported of the second record alone."""
+    result = read_lines(["Maximum: 10", NAMES, *rows_of(0), NAMES, *rows_of(1)], tmp_path)
+    assert ["record 1 of 2: 'Maximum: 10' in line 1" in str(error) for error in result.errors] == [True]
+
+
 def test_a_time_that_goes_on_below_a_repeated_head_is_one_record(tmp_path):
     lines = [NAMES, *rows_of(0), NAMES, *rows_of(1, first=N / RATE)]
     with pytest.raises(ReadError, match=r"table 2 of 2: .* the time goes on: it is one record. Delete the lines"):
