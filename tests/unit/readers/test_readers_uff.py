@@ -361,8 +361,11 @@ UNITS_164 = [
 ]
 
 
+@pytest.mark.parametrize("column", ["25.17E", "17.8E"])  # that of the format, and one of other programs
 @pytest.mark.parametrize(("code", "length", "force", "newton", "metre"), UNITS_164)
-def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length, force, newton, metre, tmp_path):
+def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(
+    code, length, force, newton, metre, column, tmp_path
+):
     recording = Recording(
         np.random.default_rng(164).normal(size=(2, 64)), 1000.0, (Channel("f", "force"), Channel("a", "acceleration"))
     )
@@ -372,8 +375,8 @@ def test_ordinates_without_a_label_are_in_the_units_of_dataset_164(code, length,
         f"{line[:46]}{'NONE':<20}" if line[:10].strip() in ("12", "13") and line[46:66].strip() else line
         for line in lines
     ]
-    head = ["    -1", "   164", f"{code:10d}{'units':20}{2:10d}", f"{length:25.17E}{force:25.17E}{1.0:25.17E}"]
-    head += [f"{273.15:25.17E}", "    -1"]
+    factors = "".join(format(factor, column) for factor in (length, force, 1.0))
+    head = ["    -1", "   164", f"{code:10d}{'units':20}{2:10d}", factors, format(273.15, column), "    -1"]
     path.write_text("\n".join([*(h.replace("E", "D") if "E+" in h or "E-" in h else h for h in head), *lines]) + "\n")
     channels = (RawChannel("f", "f", "force"), RawChannel("a", "a", "acceleration"))
     found = read(path.name, tmp_path, RawDescription(channels, rate=1000.0)).recordings[0].samples
