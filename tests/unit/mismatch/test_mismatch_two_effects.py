@@ -444,3 +444,27 @@ def test_a_diagnosis_withdraws_an_effect_that_has_to_explain_everything_and_does
     found = diagnose(case)
     assert found.verdict.answer == answer
     assert bool(found.fit.candidates) == (answer == "named")
+
+
+class OneDayOfRipple(Shapes):
+    """The same with a ripple on the first day alone, which no effect describes."""
+
+    def __init__(self, known, component="", **true):
+        super().__init__(known, component, **true)
+        first, *others = self.observations
+        self.observations = (replace(first, data=first.data + 0.2 * SHAPES["ripple"]), *others)
+
+
+def test_an_effect_that_would_have_a_name_is_named_beside_a_leader_that_gets_none():
+    """The ripple leads by 23 nats, and the other days contradict it. The wave is in all recordings."""
+    found = diagnose(OneDayOfRipple(("wave", "ripple"), wave=0.06))
+    assert [(v.answer, v.names) for v in found.verdicts] == [("named", ("wave",))]
+    assert found.verdict.reason.startswith("a second effect without a name remains: with ripple, ")
+    assert found.fit.psi == pytest.approx([0.06], abs=0.02)  # four standard errors
+    assert "second_passes_without_first" in found.verdict.trail
+
+
+def test_an_effect_is_not_named_beside_a_rejected_leader_of_the_same_part():
+    """One of them may stand for an error in the shape of the other."""
+    found = diagnose(OneDayOfRipple(("wave", "ripple"), "spring", wave=0.06))
+    assert (found.verdict.answer, found.verdict.names) == ("unknown", ())

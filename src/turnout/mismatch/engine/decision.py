@@ -91,7 +91,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
          "{e.leader.in_words} would have a value that is physically impossible", HOW),
     Rule("single_source", lambda e: e.leader.single_source, "unknown",
-         "only {e.leader.single_source} shows {e.leader.in_words}, and no other recording confirms it", ENDS),
+         "{e.leader.in_words} shows in {e.leader.single_source} alone, and no other recording confirms it", ENDS),
     Rule("condition_contradicts", lambda e: e.contradicted, "unknown",
          "with {e.leader.in_words}, recordings of one condition are predicted worse than without it "
          "(evidence against it: {e.loss_in_words})", ENDS),
@@ -123,6 +123,8 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
     Rule("choice_not_decided", lambda e: e.is_choice and not e.both_stand, "choice", "", PAIRS),
     Rule("first_passes_beside_second", lambda e: e.first_is_unknown and e.first_passes_beside_second, "both again",
          "", PAIRS),
+    Rule("second_passes_without_first", lambda e: e.first_is_unknown and e.second_passes_without_first,
+         "second without first", "a second effect without a name remains: {e.first.reason}", PAIRS),
     Rule("first_stays_unknown", lambda e: e.first_is_unknown, "unknown first", "", PAIRS),
     Rule("no_pair", lambda e: not e.is_pair, "all", "", PAIRS),
     Rule("second_left_alone_explains_too_little", lambda e: e.first_is_redundant and e.second_explains_too_little,

@@ -272,6 +272,26 @@ class PairEvidence(_EvidenceBesideFirst):
         )
 
     @cached_property
+    def second_without_first(self) -> Verdict | None:
+        """Verdict on the second effect as if the first, which has no name alone, were not in the library.
+
+        None if it cannot be simulated alone, or if the two do not confirm one another.
+        """
+        if len(self.findings.verdicts) < 2 or self.converged_second is None:
+            return None
+        leader, second = self.first.scores[0], self.second_score
+        if not leader.is_independent_of(second):
+            return None
+        others = (s for s in self.first.scores[1:] if s.family != second.family and leader.is_independent_of(s))
+        return assess(self.search, self.findings.base, (second, *others))[0]
+
+    @property
+    def second_passes_without_first(self) -> bool:
+        """Whether the second effect has a name where the first one is not in the library."""
+        verdict = self.second_without_first
+        return verdict is not None and verdict.answer == "named" and verdict.names[:1] == self.second.names[:1]
+
+    @cached_property
     def converged_first(self) -> Fit:
         """The fit with the first effect alone, converged."""
         return self.search.converge(self.first.scores[0].fit)
@@ -359,7 +379,8 @@ class PairEvidence(_EvidenceBesideFirst):
 def settle_pair(findings: Findings) -> Findings:
     """The findings with those effects that remain of a pair, by the first of ``PAIR_RULES`` that applies.
 
-    A first effect that was rejected alone passes if it does so beside the second. A first name is dropped if it adds
+    A first effect that was rejected alone passes if it does so beside the second. If it does not, the second has a name
+    where it would have one without the first. A first name is dropped if it adds
     too little to the second, and a second one if reserved recordings are predicted worse with it. A choice of two
     rivals stays one unless both stand as a pair.
 
@@ -383,6 +404,12 @@ def settle_pair(findings: Findings) -> Findings:
         assert first is not None
         first = replace(first, trail=(*evidence.first.trail, *first.trail))
         return findings.after(rule, verdicts=(first, *verdicts[1:]), fit=first.scores[0].fit)
+    if rule.answer == "second without first":
+        second = evidence.second_without_first
+        assert second is not None
+        trail = (*evidence.first.trail, *second.trail)
+        second = replace(second, reason=rule.reason_for(evidence), trail=trail)
+        return findings.after(rule, verdicts=(second,), fit=second.scores[0].fit)
     if rule.answer == "unknown first":
         return findings.after(rule, verdicts=verdicts[:1], fit=base)
     if rule.answer == "first":
