@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from tests.unit.mismatch.blade_turnout import with_blade
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.map_fit import fit_jointly
-from turnout.mismatch.turnout import TrackCase
+from turnout.mismatch.turnout import TrackCase, screening
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 
 
@@ -68,3 +69,22 @@ def test_derivatives_by_the_chairs_follow_those_that_an_effect_leaves(case, name
     linear = np.concatenate([j[:, column] for j in jacobian])
     assert np.linalg.norm(exact) > 0.0
     assert np.linalg.norm(linear - exact) < 1e-3 * np.linalg.norm(exact)
+
+
+def test_a_start_at_which_the_model_cannot_be_simulated_has_no_column(monkeypatch):
+    """Such a start is not tried; all others keep their columns."""
+    plan = small_plan((15.0,), passages=False, hammer_positions=(24.0,))
+    hammer = TrackCase(measured_campaign(plan, (), 3), families=("rail_shear", "sensor_gain")).hammer_case()
+    fit = fit_jointly(hammer, iterations=0)
+    shear, gains = ([c for c in hammer.candidates if c.family == f] for f in ("rail_shear", "sensor_gain"))
+    before = hammer.screen(fit)
+    assert shear and gains and all((c.key, 0) in before for c in (*shear, *gains))
+
+    def failing(*_):
+        raise SimulationError("Newton's iteration did not converge at 0.1 s.")
+
+    monkeypatch.setattr(screening, "_whole_track_changes", failing)
+    columns = hammer.screen(fit)
+    assert not any(key == c.key for key, _ in columns for c in shear)
+    for c in gains:
+        assert all(np.array_equal(a, b) for a, b in zip(columns[c.key, 0], before[c.key, 0], strict=True))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine import search
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
@@ -109,3 +110,16 @@ def test_a_name_stays_if_the_search_for_a_second_effect_is_not_finished():
     for answer in kept:
         assert answer.names == ("bend",) and answer.verdict.grade == "B" and len(answer.verdicts) == 1
         assert "whether there is a second effect was not decided within" in answer.verdict.reason
+
+
+def test_a_name_stays_if_a_simulation_fails_in_the_search_for_a_second_effect(monkeypatch):
+    def failing(first):
+        raise SimulationError("the wheel leaves the track at 3 m.")
+
+    monkeypatch.setattr("turnout.mismatch.engine.diagnose._seek_further", failing)
+    found = diagnose(TwoEffects(None))
+    assert found.names == ("bend",) and len(found.verdicts) == 1
+    reason = (
+        "whether there is a second effect was not decided, since a simulation failed: the wheel leaves the track at 3 m"
+    )
+    assert found.verdict.reason == reason and "further_effect_not_sought_to_the_end" in found.verdict.trail

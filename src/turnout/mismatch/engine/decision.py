@@ -157,10 +157,10 @@ NAME_RULES: tuple[Rule[NameEvidence], ...] = (
 
 LIMIT_RULES: tuple[Rule[SearchLimit], ...] = (
     Rule("further_effect_not_sought_to_the_end", lambda e: e.has_verdict, "first",
-         "whether there is a second effect was not decided within {e.most} simulations of a train",
+         "whether there is a second effect was not decided{e.words}",
          "decisions/switch-panels.md"),
     Rule("search_too_long", _always, "unknown",
-         "the search was not finished within {e.most} simulations of a train", "decisions/switch-panels.md"),
+         "the search was not finished{e.words}", "decisions/switch-panels.md"),
 )
 UNPROVEN_RULES: tuple[Rule[UnprovenEvidence], ...] = (
     Rule("panel_not_proven", lambda e: e.reservation and e.has_name and not e.names_are_asked, "unknown",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from turnout.counts import count_of
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
@@ -30,7 +31,7 @@ from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.search_limit import SearchLimitError
+from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError
 from turnout.mismatch.engine.strained_values import conflict_of_files, strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
@@ -190,13 +191,16 @@ def _numerics_rule(search: Search, base: Fit) -> tuple[Rule | None, NumericalErr
 def _seek_effects(search: Search, base: Fit) -> Findings:
     """Verdicts on effects that are sought one after the other, each on top of those before.
 
-    The first one stands if the search for further effects, or the comparison with them, is not finished.
+    The first one stands if the search for further effects, or the comparison with them, is not finished or fails.
     """
     first, goes_on = _seek_effect(Findings(search, base, base), 0)
     try:
         return settle_pair(_seek_further(first) if goes_on else first)
     except SearchLimitError as error:
-        return settle_pair(replace(first, verdicts=(keep_first(first.verdicts[0], error.limit),)))
+        limit = error.limit
+    except SimulationError as error:
+        limit = SearchLimit(0, 0, failure=str(error).removesuffix("."))
+    return settle_pair(replace(first, verdicts=(keep_first(first.verdicts[0], limit),)))
 
 
 def _seek_further(first: Findings) -> Findings:

@@ -1,4 +1,4 @@
-"""Bound of a search: it ends with "cannot tell" and its reason once a case has cost too many simulations."""
+"""End of a search before its time: a case has cost too many simulations, or one of them fails."""
 
 from __future__ import annotations
 
@@ -15,12 +15,21 @@ if TYPE_CHECKING:
 class SearchLimit:
     """Number ``n`` of simulations that a search has cost, and the ``most`` that it may.
 
-    ``has_verdict``: the first effect had its verdict before, and a second one was sought.
+    ``has_verdict``: the first effect had its verdict before, and a second one was sought. ``failure``: of a simulation
+    that ended the search, in words; "" if it was the limit.
     """
 
     n: int
     most: int
     has_verdict: bool = False
+    failure: str = ""
+
+    @property
+    def words(self) -> str:
+        """What ended the search, in words after "decided" or "finished"."""
+        return f", since a simulation failed: {self.failure}" if self.failure else (
+            f" within {self.most} simulations of a train"
+        )  # fmt: skip
 
 
 class SearchLimitError(TurnoutError):

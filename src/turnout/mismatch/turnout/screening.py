@@ -7,10 +7,12 @@ is a path that all wheels follow. Effects of the whole track use derivatives of 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.observation import Whitened
 from turnout.mismatch.turnout import passage_band, receptance_observation
 from turnout.mismatch.turnout.added_links import AddedLinks
@@ -43,7 +45,8 @@ FIRST_ORDER_TYPES = ("support", "path", "channel")  # column types whose changes
 def screen_columns(case: PredictedCase, fit: Fit, observations: Sequence[Observation]) -> Columns:
     """Change of the predictions when a candidate takes one of its starts.
 
-    ``fit`` is of ``observations``, all of the case or some. In single precision; zero columns share one array.
+    ``fit`` is of ``observations``, all of the case or some. In single precision; zero columns share one array. A start
+    at which the model cannot be simulated has no column.
 
     Parameters
     ----------
@@ -81,7 +84,8 @@ def screen_columns(case: PredictedCase, fit: Fit, observations: Sequence[Observa
         for key, column in changes.items():
             columns[key][i] = column.astype(np.float32)
     for c, k in exact:
-        columns[c.key, k] = _whole_track_changes(case, fit, c, k, observations)
+        with suppress(SimulationError):
+            columns[c.key, k] = _whole_track_changes(case, fit, c, k, observations)
     return columns
 
 
