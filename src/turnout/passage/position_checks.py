@@ -94,7 +94,8 @@ def inconsistent_positions(
 
     Each sensor's level along the train is compared with the median of the others, in the first and in the second half.
     A shift that changes is a drifting clock; a constant one is an error of the clock or of the configured position.
-    Either must exceed ``MAX_POSITION_SHIFT``. Fewer than four sensors cannot show which one is wrong.
+    Either must exceed ``MAX_POSITION_SHIFT``. Fewer than four sensors cannot show which one is wrong, nor can a half of
+    them that disagrees with the other half.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def inconsistent_positions(
     mean_shift = shifts.mean(axis=1)
     is_drifting = np.abs(shifts[:, 1] - shifts[:, 0]) > MAX_POSITION_SHIFT
     suspects = np.flatnonzero((np.abs(mean_shift) > MAX_POSITION_SHIFT) | is_drifting)
-    if suspects.size == 0 or suspects.size > n // 2:
+    if suspects.size == 0 or 2 * suspects.size >= n:
         return [], keep
     findings = []
     for i in suspects.tolist():

@@ -108,11 +108,11 @@ def test_a_change_under_impacts_as_well_is_no_effect_under_load():
     assert (answer.names, answer.parameter) == (("local_pad",), "pad@1.20")
 
 
-def test_without_these_candidates_the_change_has_no_right_name():
-    """Purpose of the offsets: without them a pad that changes under trains has no name or a wrong one."""
+def test_without_these_candidates_the_change_has_no_right_size():
+    """Purpose of the offsets: without them a pad that changes under trains alone has the mean of trains and impacts."""
     ordinary = change_candidates(PARAMETERS)
     answer = answers(history(np.random.default_rng(5), 0.6 * unit("pad@1.20")), ordinary)["change"]
-    assert answer.names != ("local_pad",)
+    assert answer.names != ("local_pad",) or answer.total < 0.6 - 3.0 * answer.total_sd
 
 
 def test_intact_histories_have_no_evidence_of_a_change_under_load():
