@@ -160,9 +160,9 @@ _CANONICAL |= dict.fromkeys(("m s-2", "m s^-2", "m s⁻²", "m / s²", "m / s^2"
 _NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
 
 
-CYRILLIC = str.maketrans(dict(zip("кНмсгВГцдБ", "kNmsgVHzdB")))  # letters of units in Russian
+# Letters of units in Russian. Without г, the gram: the acceleration of gravity is written with a Latin letter.
+CYRILLIC = str.maketrans(dict(zip("кНмсВГцдБ", "kNmsVHzdB")))
 CYRILLIC_LETTER = re.compile(r"[\u0400-\u04ff]")
-GRAM = "г"  # in Russian; the acceleration of gravity is written with a Latin letter
 
 
 def in_latin(text: str) -> str:
@@ -228,7 +228,7 @@ def conversion(unit: str) -> Conversion:
     factor = 1.0
     if (match := _NUMBER.match(text)) and text not in _CANONICAL:
         factor, text = float(match[1]), match[2].strip()
-    name = _CANONICAL.get(text if text == GRAM else in_latin(text))
+    name = _CANONICAL.get(in_latin(text))
     if name is None or not math.isfinite(factor) or factor == 0:
         alike = sorted({known for spelling, known in _CANONICAL.items() if spelling.lower() == text.lower()})
         hint = f" (did you mean {' or '.join(map(repr, alike))}?)" if alike else ""

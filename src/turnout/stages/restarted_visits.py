@@ -20,6 +20,7 @@ from turnout.stages.agreeing_visits import FittedGroup, key_of
 
 if TYPE_CHECKING:
     from turnout.mismatch.calibrated.belief import Belief
+    from turnout.mismatch.calibrated.history import Step
 
 
 def restarted_visits(
@@ -52,9 +53,13 @@ def restarted_visits(
         In the order of time.
     """
     current = sorted(visits, key=lambda v: (v.time, v.visit))
+
+    def steps() -> Sequence[Step]:
+        return estimate_history(parameters, current, events, repeats_between_visits=False, accepted=None).steps
+
+    history = steps()
     for k in range(1, len(current)):
-        until = current[: k + 1]
-        step = estimate_history(parameters, until, events, repeats_between_visits=False, accepted=None).steps[-1]
+        step = history[k]
         if step.innovation.is_expected:
             continue
         key = key_of(current[k], step.predicted)
@@ -62,8 +67,10 @@ def restarted_visits(
         if information is None:
             information = _better_information(fitted_groups(step.visit), partial(fit_from, step.visit, step.predicted))
             store[key] = information
-        replaced = {g.group: g for g in information}
-        current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
+        if information:
+            replaced = {g.group: g for g in information}
+            current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
+            history = steps()  # what later visits are compared with
     return current
 
 

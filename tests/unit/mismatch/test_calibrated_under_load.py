@@ -112,7 +112,8 @@ def test_without_these_candidates_the_change_has_no_right_size():
     """Purpose of the offsets: without them a pad that changes under trains alone has the mean of trains and impacts."""
     ordinary = change_candidates(PARAMETERS)
     answer = answers(history(np.random.default_rng(5), 0.6 * unit("pad@1.20")), ordinary)["change"]
-    assert answer.names != ("local_pad",) or answer.total < 0.6 - 3.0 * answer.total_sd
+    assert (answer.names, answer.parameter) == (("local_pad",), "pad@1.20")
+    assert answer.total < 0.6 - 3.0 * answer.total_sd
 
 
 def test_intact_histories_have_no_evidence_of_a_change_under_load():

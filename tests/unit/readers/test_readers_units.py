@@ -149,3 +149,14 @@ def test_the_value_of_a_count_and_a_unit_beside_a_sensitivity_are_compared(tmp_p
         sensors = (RawChannel("force", 0, "force", unit="N"), RawChannel("rail", 1, "acceleration", unit="m/s²"))
         (error,) = read("a.csv", tmp_path, RawDescription(sensors, rate=1e3)).errors
         assert error.reason == "unit_unknown" and repr(problem) in str(error)
+
+
+@pytest.mark.parametrize(("russian", "latin"), [("кН", "kN"), ("Н", "N"), ("м/с²", "m/s²"), ("мВ", "mV")])
+def test_units_in_russian_are_those_in_latin_letters(russian, latin):
+    assert conversion(russian) == conversion(latin)
+
+
+@pytest.mark.parametrize("mass", ["г", "мг", "кг"])
+def test_a_gram_in_russian_is_no_acceleration_of_gravity(mass):
+    with pytest.raises(ValueError, match="is not known"):
+        conversion(mass)
