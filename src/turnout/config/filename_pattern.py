@@ -79,8 +79,8 @@ FIELD_PROBLEMS = {
 }
 
 
-def wrong_field(name: str, pattern: str, branch: str, sections: tuple[str, ...] = ()) -> str:
-    """The part by which alone a name misses a pattern, in words.
+def wrong_field(name: str, pattern: str, branch: str, sections: tuple[str, ...] = ()) -> tuple[str, str]:
+    """The part by which alone a name misses a pattern.
 
     Parameters
     ----------
@@ -95,18 +95,22 @@ def wrong_field(name: str, pattern: str, branch: str, sections: tuple[str, ...] 
 
     Returns
     -------
-    str
-        "" if it misses the pattern by more than one field.
+    tuple of (str, str)
+        Its field and what is wrong, in words; "" and "" if it misses the pattern by more than one field.
 
     Examples
     --------
     >>> pattern = "hammer/{campaign}/{section}_{test}.{ext}"
     >>> wrong_field("hammer/13-05-2026/A7_2.uff", pattern, "hammer", ("A7",))
-    "'13-05-2026' is no day as YYYY-MM-DD"
+    ('campaign', "'13-05-2026' is no day as YYYY-MM-DD")
+    >>> wrong_field("hammer/2026-05-13/a7_2.uff", pattern, "hammer", ("A7",))
+    ('section', "'a7' is no section of the layout, but 'A7' is")
     """
     for field, problem in FIELD_PROBLEMS.items():
         if f"{{{field}}}" in pattern:
             match = compile_pattern(pattern, branch, sections, field).fullmatch(unicodedata.normalize("NFC", name))
             if match:
-                return f"{match[field]!r} is {problem}"
-    return ""
+                text = match[field]
+                other_case = [s for s in sections if field == "section" and s.casefold() == text.casefold()]
+                return field, f"{text!r} is {problem}" + (f", but {other_case[0]!r} is" if other_case else "")
+    return "", ""

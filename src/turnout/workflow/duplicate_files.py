@@ -1,9 +1,10 @@
 """Handle copied and moved files.
 
 Files that are twice in a turnout's folder count in one unit; the other unit names the original in its quarantine row. A
-measurement whose files were moved counts in the new unit only, also in another turnout. A hammer test that was moved
-and corrected in one night has other bytes: its impacts tell that it is the same. Nothing tells at which of two turnouts
-a hammer test was made whose file is at both: it counts at both, with a remark.
+measurement whose files were moved counts in the new unit only, also in another turnout, and also if up to half of them
+were deleted. A hammer test that was moved and corrected in one night has other bytes: its impacts tell that it is the
+same. Nothing tells at which of two turnouts a hammer test was made whose file is at both: it counts at both, with a
+remark.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -27,6 +28,7 @@ COPY_PREFIX = "copy of "
 # in both once in some thousand, so three do by chance in none.
 MIN_SAME_IMPACTS = 3
 SAME_IMPACTS_SHARE = 0.5  # of the impacts of the earlier result
+MOVED_SHARE = 0.5  # of the files of a missing unit; the others were deleted. Less is a misplaced file among deleted ones
 
 
 @dataclass(frozen=True)
@@ -227,7 +229,7 @@ Units = Mapping[str, UnitState]
 
 
 def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
-    """Missing units of which all files have rows in other units of the same state.
+    """Missing units of which half of the files or more have rows in other units of the same state.
 
     Parameters
     ----------
@@ -244,9 +246,7 @@ def moved_units(units: Units, wanted: Collection[str]) -> list[str]:
     holders = _holders(
         {content for name in _missing_units(units, wanted) for content in units[name].own_contents}, [(units, wanted)]
     )
-    return [
-        name for name in _missing_units(units, wanted) if all(holders[content] for content in units[name].own_contents)
-    ]
+    return [name for name in _missing_units(units, wanted) if _has_moved(units[name], holders)]
 
 
 def withdrawal(name: str, entry: UnitState) -> UnitResult:
@@ -304,8 +304,8 @@ def withdraw_moved(
     holders = _holders(contents, [(units[state], wanted[state.stem]) for state in states])
 
     def has_moved(name: str, entry: UnitState) -> bool:
-        by = [holders[content] for content in entry.own_contents]
-        return all(by) and (_kind(name) in kinds or _turnout(name) not in set().union(*by))
+        by = set().union(*(holders[content] for content in entry.own_contents))
+        return _has_moved(entry, holders) and (_kind(name) in kinds or _turnout(name) not in by)
 
     moved = {s: {n: units[s][n] for n in missing[s] if has_moved(n, units[s][n])} for s in states}
     fresh = _fresh_hammer_tests(units, wanted, published)
@@ -370,6 +370,12 @@ def _withdraw(state: Path, moved: Units, limits: FleetSettings) -> None:
 
 def _missing_units(units: Units, wanted: Collection[str]) -> list[str]:
     return [n for n, entry in units.items() if n not in wanted and entry.status != VANISHED and entry.own_contents]
+
+
+def _has_moved(entry: UnitState, holders: Mapping[str, Collection[str]]) -> bool:
+    """Whether so many files of a missing unit count elsewhere that its measurement would count twice."""
+    n_moved = sum(bool(holders[content]) for content in entry.own_contents)
+    return n_moved >= MOVED_SHARE * len(entry.own_contents)
 
 
 def _holders(contents: Collection[str], states: Iterable[tuple[Units, Collection[str]]]) -> dict[str, set[str]]:

@@ -2,7 +2,7 @@
 
 import os
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from difflib import get_close_matches
@@ -20,8 +20,10 @@ from turnout.errors import ReadError, reason_of_access, remedy_of_access
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
 from turnout.records import Unit
 
-# Suffixes that upload programs give to unfinished files, and names of files for people; both are ignored.
+# Suffixes that upload programs give to unfinished files, the prefix of the locks of office programs, and names of files
+# for people or file managers; all are ignored.
 UNFINISHED_SUFFIXES = (".tmp", ".part", ".partial", ".crdownload", ".filepart")
+IGNORED_PREFIXES = (".", "~$")
 IGNORED_NAMES = ("README", "README.txt", "README.md", "Thumbs.db", "desktop.ini")
 FIRST_YEAR = 1990  # of a digital recording; the readers take an earlier start for an unset clock, too
 MIN_LIKENESS = 0.8  # of the name of a file to that of a table, from which it is taken for a misspelt one
@@ -33,7 +35,7 @@ _name = attrgetter("name")
 class RawFolder:
     """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries.
 
-    ``folders`` are the paths of the folders below it.
+    ``folders`` are the paths of the folders below it, ``tables`` the names of its tables of notes.
 
     Parameters
     ----------
@@ -47,6 +49,7 @@ class RawFolder:
         self.root, self.raw, self._below = os.path.realpath(raw_root), raw, f"{raw}/"
         self.files: list[tuple[str, os.DirEntry]] = []
         self.folders: list[str] = []
+        self.tables: list[str] = []
         self.problems: list[ReadError] = []
         top = os.path.join(raw_root, raw)
         self._collect(top, "", (os.path.realpath(top),))
@@ -104,10 +107,13 @@ class RawFolder:
         for entry in entries:
             name = entry.name
             if (
-                name.startswith(".")
+                name.startswith(IGNORED_PREFIXES)
                 or name.endswith(UNFINISHED_SUFFIXES)
-                or (not inside and name in (*NOTE_FILES, *IGNORED_NAMES))
+                or name in IGNORED_NAMES
             ):
+                continue
+            if not inside and name in NOTE_FILES:
+                self.tables.append(name)
                 continue
             try:
                 if name.isascii() and entry.is_file(follow_symlinks=False):
@@ -202,7 +208,7 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
         if any(expression.fullmatch(inside) for _, expression in names):
             finding = "is a folder with the name of a recording", "Put the file itself there, or rename the folder"
             result.problems.append(ReadError(f"{turnout.raw}/{inside}", "folder", *finding, "no_file"))
-    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched)]
+    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched, folder.tables)]
     return result
 
 
@@ -280,15 +286,23 @@ def _calendar_problem(text: str, form: str, quantity: str, today: date) -> str:
     return "" if day.year >= FIRST_YEAR else f"is before {FIRST_YEAR}, when no digital logger was in use"
 
 
-def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[str]) -> Iterator[ReadError]:
+def _unmatched_files(
+    turnout: TurnoutConfig, unmatched: list[str], matched: set[str], tables: Container[str]
+) -> Iterator[ReadError]:
+    """Files whose names match no pattern; ``tables`` are the tables of notes in the folder of the turnout."""
     pattern_words = " or ".join(repr(kind.files) for kind in (turnout.hammer, turnout.passages) if kind)
     for inside in unmatched:
-        remedy = f"Rename it after {pattern_words}, or add its section to the layout {turnout.layout!r}"
-        finding = "its name follows no pattern of the layout"
-        if detail := _wrong_field(inside, turnout):
-            finding += f": {detail}"
-        elif tables := get_close_matches(inside.lower(), NOTE_FILES, 1, MIN_LIKENESS):
-            finding, remedy = "no file of this name is read", f"If it is the table {tables[0]}, rename it to that"
+        field, words = _wrong_field(inside, turnout)
+        remedies = [f"Rename it after {pattern_words}"]
+        if field == "section":
+            remedies.append(f"add its section to the layout {turnout.layout!r}")
+        remedies += [f"describe its {kind} in the layout {turnout.layout!r}" for kind in _missing_kinds(turnout)]
+        remedy = f"{', or '.join(remedies)}. Remove it if it is no recording"
+        finding = "its name follows no pattern of the layout" + (f": {words}" if words else "")
+        if not field and (likest := get_close_matches(inside.lower(), NOTE_FILES, 1, MIN_LIKENESS)):
+            finding, remedy = "no file of this name is read", f"If it is the table {likest[0]}, rename it to that"
+            if likest[0] in tables:
+                remedy = f"Remove it, or copy what it adds into {likest[0]}, which is read"
         yield ReadError(f"{turnout.raw}/{inside}", "file name", finding, remedy, "name_unknown")
     if not matched:
         remedy = (
@@ -297,9 +311,14 @@ def _unmatched_files(turnout: TurnoutConfig, unmatched: list[str], matched: set[
         yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")
 
 
-def _wrong_field(inside: str, turnout: TurnoutConfig) -> str:
-    """The part by which alone a name misses a pattern of the layout; "" if it misses all by more."""
+def _missing_kinds(turnout: TurnoutConfig) -> list[str]:
+    """Kinds of recordings that the layout does not describe, as it would call them."""
+    return [kind for kind in ("hammer", "passages") if getattr(turnout, kind) is None]
+
+
+def _wrong_field(inside: str, turnout: TurnoutConfig) -> tuple[str, str]:
+    """The field by which alone a name misses a pattern of the layout, in words, too; "" if it misses all by more."""
     labels = tuple(section.label for section in turnout.sections)
     patterns = (("hammer", turnout.hammer, labels), ("passages", turnout.passages, ()))
     details = (wrong_field(inside, layout.files, branch, sections) for branch, layout, sections in patterns if layout)
-    return next(filter(None, details), "")
+    return next((detail for detail in details if detail[0]), ("", ""))

@@ -38,6 +38,24 @@ def test_a_moved_measurement_is_used_once_and_a_deleted_measurement_is_kept(flee
     assert fleet.lengths()["t0/hammer/A/2024-05-13"] == [9] and fleet.lengths()["t0/hammer/A/2024-05-31"] == []
 
 
+@pytest.mark.parametrize(("deleted", "remaining"), [(1, []), (2, [9, 1, 2])])
+def test_a_measurement_that_was_moved_without_some_of_its_files_is_used_once(fleet, deleted, remaining):
+    """The folder gets its correct day, and copies in it are deleted in the same night.
+
+    Of a measurement of which most files were deleted, one misplaced file has moved: the rows of the others are kept.
+    """
+    for n in range(deleted):
+        fleet.put(f"t0/2024-05-13/A_{n + 2}.txt", "x" * (n + 1))
+    fleet.run()
+    (fleet.raw / "t0/2024-05-31").mkdir()
+    (fleet.raw / "t0/2024-05-13/A_1.txt").rename(fleet.raw / "t0/2024-05-31/A_1.txt")
+    for n in range(deleted):
+        (fleet.raw / f"t0/2024-05-13/A_{n + 2}.txt").unlink()
+    fleet.run()
+    assert fleet.lengths()["t0/hammer/A/2024-05-31"] == [9]
+    assert fleet.lengths()["t0/hammer/A/2024-05-13"] == remaining
+
+
 def test_a_moved_measurement_is_used_once_after_the_job_was_killed_before_the_withdrawal(fleet, monkeypatch):
     fleet.run()
     (fleet.raw / "t0/2024-05-13").rename(fleet.raw / "t0/2024-05-31")

@@ -79,6 +79,10 @@ def test_files_become_units(fleet):
         ("t1/hammer/2024-05-13/.A_3.uff", False),
         ("t1/hammer/2024-05-13/A_3.uff.part", False),
         ("t1/.git/config", False),
+        ("t1/hammer/2024-05-13/Thumbs.db", False),
+        ("t1/hammer/2024-05-13/~$force.xlsx", False),
+        ("t1/hammer/2024-05-13/A_1.uff~", True),
+        ("t1/hammer/campaigns.csv", True),
     ],
 )
 def test_an_unknown_file_is_reported_unless_it_is_unfinished_or_hidden(fleet, name, reported):
@@ -86,6 +90,32 @@ def test_an_unknown_file_is_reported_unless_it_is_unfinished_or_hidden(fleet, na
     found = scan(turnout(fleet), fleet / "raw")
     assert [(e.path, e.reason) for e in found.problems] == ([(name, "name_unknown")] if reported else [])
     assert len(found.units) == 4
+
+
+def remedies(fleet, name):
+    return [e.remedy for e in scan(turnout(fleet, name), fleet / "raw").problems]
+
+
+def test_the_remedy_for_an_unknown_file_fits_what_it_may_be(fleet):
+    add(fleet, "t1/campaigns.csv.bak")  # the table is beside it: renaming the backup would replace the table
+    add(fleet, "t2/Campaigns.csv")
+    add(fleet, "t2/hammer/2024-05-13/A_1.uff~")
+    pattern_words = "Rename it after 'hammer/{campaign}/{section}_{test}.{ext}' or 'passages/{time}.{ext}'"
+    assert remedies(fleet, "t1") == ["Remove it, or copy what it adds into campaigns.csv, which is read"]
+    assert remedies(fleet, "t2") == [
+        "If it is the table campaigns.csv, rename it to that", f"{pattern_words}. Remove it if it is no recording",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "other"), [("passages", "hammer"), ("hammer", "passages")])
+def test_a_file_of_a_kind_that_the_layout_lacks_is_told_from_a_misspelt_name(fleet, kind, other):
+    layout = fleet / "config/layouts/main.yaml"
+    sections, rest = LAYOUT.split("hammer:\n", 1)
+    hammer, passages = rest.split("passages:\n", 1)
+    layout.write_text(sections + {"passages": f"hammer:\n{hammer}", "hammer": f"passages:\n{passages}"}[kind])
+    texts = remedies(fleet, "t1")
+    assert texts and all(f", or describe its {kind} in the layout 'main'. Remove it if" in text for text in texts)
+    assert not any(f"describe its {other}" in text for text in texts)
 
 
 def test_a_link_out_of_the_raw_root_is_not_followed(fleet, tmp_path):
@@ -109,7 +139,8 @@ def test_an_empty_folder_is_reported(fleet):
     ("name", "detail"),
     [
         ("t1/hammer/2024-05-13/B_1.uff", ": 'B' is no section of the layout."),
-        ("t1/hammer/2024-05-13/a_1.uff", ": 'a' is no section of the layout."),
+        ("t1/hammer/2024-05-13/B_1.uff", ", or add its section to the layout 'main'."),
+        ("t1/hammer/2024-05-13/a_1.uff", ": 'a' is no section of the layout, but 'A' is."),
         ("t1/hammer/13-05-2024/A_1.uff", ": '13-05-2024' is no day as YYYY-MM-DD."),
         ("t1/hammer/2024-05-13/A_1-2.uff", ": '1-2' is not of letters and digits alone."),
         ("t1/passages/yesterday.tdms", ": 'yesterday' is no start as YYYYMMDDTHHMMSSZ."),
