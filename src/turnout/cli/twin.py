@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 GROUP = "Simulate and diagnose"
 HELP = "show the calibrated model of a turnout, from all of its visits"
+MIN_COMPARED_VISITS = 2  # used visits between which a change may lie
 MAX_SD_RATIO = 0.95  # parameters that are hardly better known than before are counted, not listed
 
 
@@ -95,7 +96,7 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
         if not step.is_used:
             i = step.innovation
             yield (
-                f"visit {step.visit} is not used: it differs from all before, "
+                f"visit {step.visit} is not used: it differs from the track file and the used visits before, "
                 f"most at {i.parameter} ({i.deviates:+.1f} standard deviations); "
                 f"turnout diagnose --turnout {turnout_id} --visit {step.visit} examines it alone, faults of loggers too"
             )
@@ -114,7 +115,11 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
 def _answers(model: CalibratedModel) -> Iterator[str]:
     """The answers to both questions, one line each."""
     yield "differences from the track file: " + ("; ".join(_differences(model)) or "none")
-    for change in (a for a in model.answers if a.question == "change" and model.changes):
+    changes = [a for a in model.answers if a.question == "change" and model.changes]
+    if all(a.verdict == "none" for a in changes) and len(model.history.used_steps) < MIN_COMPARED_VISITS:
+        yield "changes: cannot tell from fewer than two visits that are used"
+        return
+    for change in changes:
         yield f"changes up to {change.visit}: {_change(change)}"
     yield from _strongest(model)
 
@@ -184,8 +189,6 @@ def _effect(answer: ModelAnswer) -> str:
 
 def _strongest(model: CalibratedModel) -> Iterator[str]:
     """The change with the largest evidence, where none is stated."""
-    if not model.changes:
-        yield "changes: cannot tell from fewer than two visits"
-    elif all(a.verdict == "none" for a in model.answers if a.question == "change"):
+    if model.changes and all(a.verdict == "none" for a in model.answers if a.question == "change"):
         best = model.changes[0]
         yield f"the most likely change is {best.effect.name}, with evidence of {evidence_in_words(best.gain)}"

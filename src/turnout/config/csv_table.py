@@ -124,6 +124,8 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
             for marks, mark in OTHER_SEPARATORS:
                 if mark != separator and title in map(str.strip, header.split(mark)):
                     problem, remedy = f"{marks} between the columns", _remedy_of_separator(separator)
+                    if (mark, separator) == (";", ","):
+                        remedy += f", or 'sep={mark}' in a line above the header"
             raise TableError(Place(name, first, 1), problem, remedy)
     faults = [
         TableError(Place(name, first, start), *fault)

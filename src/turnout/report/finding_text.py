@@ -281,7 +281,7 @@ def check(finding: Mapping[str, Any]) -> str:
 
 
 def unmet_requirements(finding: Mapping[str, Any]) -> list[dict]:
-    """What the recordings cannot show, why, and the measurement that could.
+    """What the recordings cannot show, why, and the measurement that could; one row for all with the same reason.
 
     Parameters
     ----------
@@ -293,7 +293,13 @@ def unmet_requirements(finding: Mapping[str, Any]) -> list[dict]:
     list of dict
         ``what``, ``lack`` and ``measurement`` in words.
     """
-    return json.loads(finding["evidence_json"] or "{}").get("not_examined", [])
+    effects: dict[tuple[str, str], list[str]] = {}
+    for u in json.loads(finding["evidence_json"] or "{}").get("not_examined", ()):
+        effects.setdefault((u["lack"], u["measurement"]), []).append(u["what"])
+    return [
+        {"what": "; ".join(what), "lack": lack, "measurement": measurement}
+        for (lack, measurement), what in effects.items()
+    ]
 
 
 def rivals(finding: Mapping[str, Any]) -> list[dict]:

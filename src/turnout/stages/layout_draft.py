@@ -52,7 +52,7 @@ def layout_draft(contents: Sequence[FileContents]) -> str:
         _check_same_channels(group)
     labels = _labels(hammer) or ["S1"]
     lines = [
-        f"# Draft from {', '.join(Path(c.path).name for c in contents[:3])}{' ...' if len(contents) > 3 else ''}.",
+        f"# Draft from {', '.join(Path(c.path).name for c in contents[:3])}{' and more' if len(contents) > 3 else ''}.",
         f"# Lines with {DECIDE[2:]} hold what the files do not state. `turnout check` lists those that are left.",
         "description: Draft  # what this layout is, for people",
         "",

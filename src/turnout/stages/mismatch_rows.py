@@ -26,6 +26,7 @@ from turnout.stages.mismatch_text import headline, requirements_in_words, surfac
 from turnout.stages.parameter_text import interval
 from turnout.stages.possible_effect import agreement_sentence, scope_of_agreement, sentence_on_possible_effect
 from turnout.stages.values_off_file import sentences_on_values
+from turnout.stages.visit_notes import texts_of_notes
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.diagnose import Diagnosis
@@ -152,7 +153,8 @@ def _first_notes(notes: Sequence[str]) -> list[str]:
 def _visit_notes(about: Mapping[str, Any], campaign: CampaignInput) -> list[str]:
     """Notes of the visit as texts, those on passages of other groups last."""
     names = {None, *(p.name for p in campaign.passages)}
-    return [str(note) for note in sorted(about["notes"], key=lambda note: note.passage not in names)]
+    own = [note for note in about["notes"] if note.passage in names]
+    return texts_of_notes(own) + texts_of_notes(note for note in about["notes"] if note.passage not in names)
 
 
 def _errors_by_candidate(fit: Fit) -> Iterator[np.ndarray]:

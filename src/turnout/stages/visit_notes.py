@@ -1,4 +1,4 @@
-"""Notes on the recordings of many visits, those with the same words in one line."""
+"""Notes on the recordings of visits, those with the same words in one line."""
 
 from __future__ import annotations
 
@@ -23,6 +23,33 @@ def notes_in_words(visit: str, notes: Iterable[Note]) -> list[tuple[str, str, bo
         Visit, words, and whether they concern one passage. The same words of two passages are two entries.
     """
     return [(visit, note.text, note.passage is not None) for note in notes]
+
+
+def texts_of_notes(notes: Iterable[Note]) -> list[str]:
+    """Notes of one visit as texts, one for all passages with the same words.
+
+    Parameters
+    ----------
+    notes : iterable of Note
+
+    Returns
+    -------
+    list of str
+        In the order of their first notes.
+
+    Examples
+    --------
+    >>> from turnout.stages.mismatch_inputs import Note
+    >>> texts_of_notes([Note("no axle found", "a.h5"), Note("no track file"), Note("no axle found", "b.h5")])
+    ['passages a.h5, b.h5: no axle found', 'no track file']
+    """
+    passages: dict[tuple[bool, str], list[str]] = {}
+    for note in notes:
+        passages.setdefault((note.passage is None, note.text), []).append(note.passage or "")
+    return [
+        text if whole_visit else f"passage{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
+        for (whole_visit, text), names in passages.items()
+    ]
 
 
 def summary_of_notes(notes: Iterable[tuple[str, str, bool]]) -> list[str]:

@@ -28,7 +28,7 @@ COPY_PREFIX = "copy of "
 # in both once in some thousand, so three do by chance in none.
 MIN_SAME_IMPACTS = 3
 SAME_IMPACTS_SHARE = 0.5  # of the impacts of the earlier result
-MOVED_SHARE = 0.5  # of the files of a missing unit; the others were deleted. Less is a misplaced file among deleted ones
+MOVED_SHARE = 0.5  # of the files of a missing unit; the others are gone. Less is a misplaced file among deleted ones
 
 
 @dataclass(frozen=True)

@@ -106,11 +106,7 @@ class RawFolder:
             return
         for entry in entries:
             name = entry.name
-            if (
-                name.startswith(IGNORED_PREFIXES)
-                or name.endswith(UNFINISHED_SUFFIXES)
-                or name in IGNORED_NAMES
-            ):
+            if name.startswith(IGNORED_PREFIXES) or name.endswith(UNFINISHED_SUFFIXES) or name in IGNORED_NAMES:
                 continue
             if not inside and name in NOTE_FILES:
                 self.tables.append(name)

@@ -240,7 +240,8 @@ WRONG = {
     "event of no kind": ({"events": "turnout,section,date,kind\nt1,,2025-01-01,taming\n"}, "Did you mean 'tamping'?"),
     "events between semicolons": (
         {"events": "turnout;section;date;kind\nt1;;2025-01-01;tamping\n"},
-        "line 1, column 1: semicolons between the columns. Put commas between the columns",
+        "line 1, column 1: semicolons between the columns. Put commas between the columns, and a point before "
+        "decimals, or 'sep=;' in a line above the header",
     ),
     "event with a comma": (
         {"events": "turnout,section,date,kind,resets,note\nt1,,2025-01-01,tamping,,by machine, twice\n"},

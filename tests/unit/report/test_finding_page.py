@@ -11,7 +11,15 @@ import pytest
 from jinja2 import Environment, PackageLoader
 
 from turnout.errors import SimulationError
-from turnout.report.finding_text import ANSWERS, accepted_parameters, answer, check, facts, parameters
+from turnout.report.finding_text import (
+    ANSWERS,
+    accepted_parameters,
+    answer,
+    check,
+    facts,
+    parameters,
+    unmet_requirements,
+)
 from turnout.report.pages.finding import finding_page
 from turnout.report.panels.finding import residual_panel
 from turnout.report.panels.position import TurnoutDrawing, marked_position
@@ -52,6 +60,17 @@ def finding(verdict="named", **more):
         "term_json": None, "evidence_json": json.dumps(EVIDENCE), "notes": None,
     }  # fmt: skip
     return row | more
+
+
+def test_effects_that_lack_the_same_measurement_are_one_row():
+    no_passage = ("no passage", "passages")
+    lacks = [("a dip", *no_passage), ("warm pads", "one temperature", "15 K"), ("a flat", *no_passage)]
+    entries = [{"effect": what, "what": what, "lack": lack, "measurement": m} for what, lack, m in lacks]
+    assert unmet_requirements({"evidence_json": json.dumps({"not_examined": entries})}) == [
+        {"what": "a dip; a flat", "lack": "no passage", "measurement": "passages"},
+        {"what": "warm pads", "lack": "one temperature", "measurement": "15 K"},
+    ]
+    assert unmet_requirements({"evidence_json": None}) == []
 
 
 def named(**more):

@@ -326,15 +326,25 @@ def test_a_turnout_without_recordings_is_an_error(turnout, capsys):
     assert main(["twin", "--turnout", "t1"]) == 2 and "nothing can be calibrated" in capsys.readouterr().err
 
 
-def test_no_answer_about_changes_is_printed_for_a_single_visit():
+@pytest.mark.parametrize("changes", [(), (SimpleNamespace(effect=SimpleNamespace(name="gain_A"), gain=0.0),)])
+def test_no_answer_about_changes_is_printed_for_a_single_visit(changes):
+    """Other visits may have been examined for changes and set aside."""
     history = SimpleNamespace(
         used_steps=[SimpleNamespace(n_recordings=2)], steps=[], parameters=[],
         belief=SimpleNamespace(mean=np.zeros(0), sd=np.zeros(0)),
     )  # fmt: skip
     answers = [SimpleNamespace(question="change", verdict="none", visit=DAYS[0])]
     model = SimpleNamespace(
-        history=history, computed=[1], held={}, notes=[], answers=answers, deviations=[], changes=(), reservation=""
+        history=history,
+        computed=[1],
+        held={},
+        notes=[],
+        answers=answers,
+        deviations=[],
+        changes=changes,
+        reservation="",
     )
     text = "\n".join(model_text("t1", model))
     assert text.startswith("t1: 2 recordings of 1 visit (1 fitted now)")
-    assert "changes: cannot tell from fewer than two visits" in text and "changes up to" not in text
+    assert "changes: cannot tell from fewer than two visits that are used" in text
+    assert "changes up to" not in text and "most likely change" not in text

@@ -110,6 +110,13 @@ def test_a_campaign_without_files_and_files_without_a_campaign_are_reported(raw,
     ]
 
 
+def test_the_line_to_add_has_the_separator_of_the_table(raw, capsys):
+    rows = "campaign;started_at_utc;rail_temperature_c\n2024-05-13;2024-05-13T09:00;12,5\n"
+    (raw / "campaigns.csv").write_text(f"sep=;\n{rows}")
+    (line,) = check_lines(capsys)[1]
+    assert line.endswith("Add a line '2024-09-02;<start in UTC>;<rail temperature in °C>'.")
+
+
 def test_a_row_that_cannot_be_used_is_reported_once(raw, capsys):
     (raw / "campaigns.csv").write_text(f"{HEADER}2024-05-13,2024-05-13T09:00,12\n2024-09-02,2024-09-02T09:00,warm\n")
     code, (lines,) = check_lines(capsys)
