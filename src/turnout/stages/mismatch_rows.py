@@ -153,8 +153,8 @@ def _first_notes(notes: Sequence[str]) -> list[str]:
 def _visit_notes(about: Mapping[str, Any], campaign: CampaignInput) -> list[str]:
     """Notes of the visit as texts, those on passages of other groups last."""
     names = {None, *(p.name for p in campaign.passages)}
-    own = [note for note in about["notes"] if note.passage in names]
-    return texts_of_notes(own) + texts_of_notes(note for note in about["notes"] if note.passage not in names)
+    first, last = ([n for n in about["notes"] if (n.passage in names) == in_group] for in_group in (True, False))
+    return texts_of_notes(first) + texts_of_notes(last)
 
 
 def _errors_by_candidate(fit: Fit) -> Iterator[np.ndarray]:

@@ -288,13 +288,13 @@ def _unmatched_files(
     """Files whose names match no pattern; ``tables`` are the tables of notes in the folder of the turnout."""
     pattern_words = " or ".join(repr(kind.files) for kind in (turnout.hammer, turnout.passages) if kind)
     for inside in unmatched:
-        field, words = _wrong_field(inside, turnout)
+        field, problem = _wrong_field(inside, turnout)
         remedies = [f"Rename it after {pattern_words}"]
         if field == "section":
             remedies.append(f"add its section to the layout {turnout.layout!r}")
-        remedies += [f"describe its {kind} in the layout {turnout.layout!r}" for kind in _missing_kinds(turnout)]
+        remedies += [f"describe its {branch} in the layout {turnout.layout!r}" for branch in _missing_branches(turnout)]
         remedy = f"{', or '.join(remedies)}. Remove it if it is no recording"
-        finding = "its name follows no pattern of the layout" + (f": {words}" if words else "")
+        finding = "its name follows no pattern of the layout" + (f": {problem}" if problem else "")
         if not field and (likest := get_close_matches(inside.lower(), NOTE_FILES, 1, MIN_LIKENESS)):
             finding, remedy = "no file of this name is read", f"If it is the table {likest[0]}, rename it to that"
             if likest[0] in tables:
@@ -307,9 +307,9 @@ def _unmatched_files(
         yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")
 
 
-def _missing_kinds(turnout: TurnoutConfig) -> list[str]:
-    """Kinds of recordings that the layout does not describe, as it would call them."""
-    return [kind for kind in ("hammer", "passages") if getattr(turnout, kind) is None]
+def _missing_branches(turnout: TurnoutConfig) -> list[str]:
+    """Recordings that the layout does not describe, by the name of their part of it."""
+    return [branch for branch in ("hammer", "passages") if getattr(turnout, branch) is None]
 
 
 def _wrong_field(inside: str, turnout: TurnoutConfig) -> tuple[str, str]:
