@@ -73,6 +73,23 @@ def test_every_view_has_a_description_of_its_rows_and_columns(call):
     assert all(r["meaning"] for r in rows)
 
 
+def test_the_page_gives_every_column_of_a_view_or_where_it_is_described():
+    """A block of the page is read back: columns of its table, and those that its sentence takes from another one."""
+    meaning = {table: {c.name: c.meaning for c in columns} for table, columns in tables().items()}
+    meaning |= {call: {r["column"]: r["meaning"] for r in rows} for call, (_, rows) in views().items()}
+    n_shared = 0
+    for call, block in zip(sorted(views()), documentation.view_tables().split("### ")[1:], strict=True):
+        read_back = dict(re.findall(r"^\| ([a-z]\w*) \| [^|]*\| [^|]*\| (.*) \|$", block, re.M))
+        read_back.pop("column", None)
+        if match := re.search(r"^Columns as in \[(\w+)\]\(#\w+\): (all but )?(.*?)\.(?: And:)?$", block, re.M):
+            base, but, names = meaning[match[1]], match[2], match[3].split(", ")
+            shared = base if names == ["all"] else [n for n in base if (n not in names) == bool(but)]
+            read_back |= {name: base[name] for name in shared}
+            n_shared += 1
+        assert read_back == meaning[call], call
+    assert n_shared >= 20
+
+
 @pytest.mark.parametrize("column", ALL, ids=lambda c: f"{c.table}.{c.name}")
 def test_a_column_is_fully_described(column):
     assert column.meaning and column.type.removesuffix("[]") in ARROW_TYPES

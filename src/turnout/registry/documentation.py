@@ -93,13 +93,37 @@ def table_tables() -> str:
     return "\n\n".join(blocks)
 
 
+MIN_SHARED_COLUMNS = 6  # of a view with another one; below it a list of all columns is as short
+MIN_SHARED_SHARE = 0.75  # of the columns of a view
+_CELLS = ("column", "type", "unit", "meaning")
+
+
 def view_tables() -> str:
-    """One table of columns per view and macro, below the meaning of a row."""
+    """One table of columns per view and macro, below the meaning of a row.
+
+    Columns that are those of a table, or of a view above, are listed by name alone.
+    """
+    described = {table: {(c.name, c.type, c.unit, c.meaning) for c in columns} for table, columns in tables().items()}
     blocks = []
     for call, (what, rows) in sorted(views().items()):
-        lines = [f"### {call}", "", what, "", "| column | type | unit | meaning |", "|---|---|---|---|"]
-        lines += [f"| {r['column']} | {r['type']} | {r['unit']} | {r['meaning']} |" for r in rows]
+        cells = [tuple(r[k] for k in _CELLS) for r in rows]
+        base = max(described, key=lambda name: sum(c in described[name] for c in cells))
+        shared = [c for c in cells if c in described[base]]
+        if len(shared) < max(MIN_SHARED_COLUMNS, MIN_SHARED_SHARE * len(cells)):
+            shared = []
+        lines = [f"### {call}", "", what]
+        if shared:
+            listed, lacking = (sorted({name for name, *_ in c}) for c in (shared, described[base] - set(shared)))
+            names = f"all but {', '.join(lacking)}" if lacking else "all"
+            if len(lacking) > len(listed):
+                names = ", ".join(listed)
+            lines += ["", f"Columns as in [{base}](#{base}): {names}." + (" And:" if len(shared) < len(cells) else "")]
+        if len(shared) < len(cells):
+            lines += ["", "| column | type | unit | meaning |", "|---|---|---|---|"]
+            lines += [f"| {' | '.join(c)} |" for c in cells if c not in shared]
         blocks.append("\n".join(lines))
+        if "(" not in call:
+            described[call] = set(cells)
     return "\n\n".join(blocks)
 
 
