@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.site import site_of
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
-from turnout.records import Recording
+from turnout.records import Impact, Recording
 from turnout.simulate.hammer import Hammer, simulate_hammer
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
     from turnout.physics.term import PhysicsTerm
     from turnout.simulate.track import Track
 
+PLANNED_PEAK = 12e3  # N, of a planned impact: about that of 5.5 kg with a plastic tip at 1.2 m/s
+PLANNED_CONTACT = 1.2e-3  # s, of a planned impact
+PLANNED_PRETRIGGER, PLANNED_DURATION = 0.01, 0.2  # s, before a planned impact and of its whole record
+HAMMER_RATE = 20e3  # Hz, of a planned impact
 NOISE_SHARE = 0.02  # standard deviation of a sensor's noise over its own rms
 PLANNED_LEAD = 0.45  # s from the start of a planned or simulated recording to the first wheel at the first sensor
 
@@ -141,13 +146,32 @@ def _planned_campaign(plan: Plan) -> CampaignInput:
     return CampaignInput(plan.turnout, plan.sensors, tests, passages)
 
 
+class PlannedPair(FrfPair):
+    """A response channel of a planned hammer test, which has no impacts yet."""
+
+    @cached_property
+    def typical_impact(self) -> Impact:
+        """A half sine. Its peak does not matter to supports that press and pull differently: they are homogeneous."""
+        rate = HAMMER_RATE
+        time = np.arange(round(PLANNED_DURATION * rate)) / rate - PLANNED_PRETRIGGER
+        in_contact = (time >= 0.0) & (time <= PLANNED_CONTACT)
+        force = np.where(in_contact, PLANNED_PEAK * np.sin(np.pi * time / PLANNED_CONTACT), 0.0)
+        onset = round(PLANNED_PRETRIGGER * rate)
+        end = onset + round(PLANNED_CONTACT * rate)
+        impulse = 2.0 / np.pi * PLANNED_PEAK * PLANNED_CONTACT
+        return Impact(
+            force, np.zeros_like(force), rate, onset, end, end, PLANNED_PEAK, PLANNED_CONTACT, impulse, 0.0, 0.0,
+            1.0 / PLANNED_CONTACT,
+        )  # fmt: skip
+
+
 def _planned_pairs(campaign: CampaignInput) -> dict[str, FrfPair]:
     """Pairs of every test and sensor, on all lines and of magnitude 1."""
-    lines, pairs = receptance_observation.LINES, {}
+    lines, pairs = receptance_observation.LINES, dict[str, FrfPair]()
     for test in campaign.hammer:
         for sensor in campaign.sensors:
-            name = f"{test.name}:{sensor.name}"
-            pairs[name] = FrfPair(name, test, sensor.name, sensor, lines, np.ones(lines.size), dict(test.conditions))
+            name, size = f"{test.name}:{sensor.name}", np.ones(lines.size)
+            pairs[name] = PlannedPair(name, test, sensor.name, sensor, lines, size, dict(test.conditions))
     return pairs
 
 
