@@ -1,4 +1,4 @@
-"""Bearers at the heel of a blade that have lost their support."""
+"""Loose or stiff fastenings at the heel of a blade."""
 
 from __future__ import annotations
 
