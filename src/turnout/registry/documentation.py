@@ -95,7 +95,6 @@ def table_tables() -> str:
 
 MIN_SHARED_COLUMNS = 6  # of a view with another one; below it a list of all columns is as short
 MIN_SHARED_SHARE = 0.75  # of the columns of a view
-_CELLS = ("column", "type", "unit", "meaning")
 
 
 def view_tables() -> str:
@@ -106,7 +105,7 @@ def view_tables() -> str:
     described = {table: {(c.name, c.type, c.unit, c.meaning) for c in columns} for table, columns in tables().items()}
     blocks = []
     for call, (what, rows) in sorted(views().items()):
-        cells = [tuple(r[k] for k in _CELLS) for r in rows]
+        cells = [(r["column"], r["type"], r["unit"], r["meaning"]) for r in rows]
         base = max(described, key=lambda name: sum(c in described[name] for c in cells))
         shared = [c for c in cells if c in described[base]]
         if len(shared) < max(MIN_SHARED_COLUMNS, MIN_SHARED_SHARE * len(cells)):
