@@ -1,5 +1,7 @@
 """The panels of one passage: recording and prediction, two wheelsets, and a spectrogram with a line per axle."""
 
+from importlib import resources
+
 import numpy as np
 import pytest
 
@@ -47,3 +49,11 @@ def test_the_page_has_whole_passage_two_wheelsets_and_spectrogram():
         assert words in page
     assert "A8: whole passage" not in page and "no model of its section was fitted" in page
     assert page.count(">measured<") >= 2 and page.count(">predicted<") >= 2
+
+
+@pytest.mark.parametrize("template", sorted((resources.files("turnout.report") / "templates").iterdir()), ids=lambda path: path.name)
+def test_a_page_with_series_has_the_script_that_draws_their_legends(template):
+    """Bars and lines of the fleet have their words in the SVG or beside it."""
+    text = template.read_text(encoding="utf-8")
+    page_has_charts = template.name in ("beams.html", "comparison.html", "finding.html", "passage.html", "turnout.html")
+    assert ("<script>{{ chart_script|safe }}</script>" in text) == page_has_charts
