@@ -51,7 +51,9 @@ def test_the_page_has_whole_passage_two_wheelsets_and_spectrogram():
     assert page.count(">measured<") >= 2 and page.count(">predicted<") >= 2
 
 
-@pytest.mark.parametrize("template", sorted((resources.files("turnout.report") / "templates").iterdir()), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "template", sorted((resources.files("turnout.report") / "templates").iterdir()), ids=lambda path: path.name
+)
 def test_a_page_with_series_has_the_script_that_draws_their_legends(template):
     """Bars and lines of the fleet have their words in the SVG or beside it."""
     text = template.read_text(encoding="utf-8")
