@@ -59,7 +59,8 @@ def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impa
     detail = (
         f"{response} has the phase of a velocity: as an acceleration beside the hammer it would feed energy into the "
         f"hammer at {100.0 * share:.0f} % of {len(lines.frequency)} frequencies, which no track can; set the "
-        "analyser to acceleration, or export the acceleration"
+        "analyser to acceleration, or export the acceleration; a response some tenths of a millisecond late or early "
+        "has such a phase, too"
     )
     rejection = Rejection("out_of_scale", share, REFUTED, detail, response)
     return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)

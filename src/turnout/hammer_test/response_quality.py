@@ -49,10 +49,11 @@ def find_track_impacts(
         A recording has no channel of that name.
     """
     impacts = find_impacts(recordings, force, response, replace(settings, best_impacts=0))
-    impacts = judge_causality(impacts, response)
+    is_track = settings.minimum_peak_force > 0.0
+    impacts = judge_causality(impacts, response, is_track)
     impacts = judge_saturation(impacts, response)
     impacts = judge_limited_impacts(impacts, response)
-    if settings.minimum_peak_force > 0.0:
+    if is_track:
         impacts = judge_response_order(impacts, response)
         impacts = judge_response_scale(impacts, response)
     return select_best(impacts, settings)  # among those that no other test has rejected
@@ -119,39 +120,59 @@ def _largest_values(impacts: Sequence[Impact], is_slope: bool) -> np.ndarray:
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.
 ONSET_SHARE = 0.1
-MAX_LEAD, MAX_LAG = 3, 5  # samples before the contact, and behind its end, that filters of two channels explain
+MAX_LEAD, MAX_LAG = 3, 5  # samples by which filters of two channels move a response forwards and backwards
+QUIET_QUANTILE = 0.25  # of the magnitudes before the force: it is noise even if a response fills up to half of that time
+NORMAL_QUANTILE = 0.31864  # magnitude below which a quarter of a normal distribution lies, in standard deviations
+MIN_QUIET_SAMPLES = 8  # before the force; with fewer the noise is that of the end of the record
+# A response that begins before the force lies in the samples from which the noise is measured.
+CONSEQUENCES_OF_A_LEAD = {"dead_channel", "noisy"}
 
 
-def judge_causality(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
+def judge_causality(impacts: Sequence[Impact], response: str, is_track: bool = False) -> tuple[Impact, ...]:
     """Reject a test whose response begins before its force or long after it, with the lag in samples.
+
+    Everywhere on a structure the response begins by the end of the contact. Beside the hammer it begins at once: the
+    acceleration of a mass follows the force, that of a rail the change of the force, which is largest at half of the
+    rise. Where a later vibration is less than five times as large, a tenth of it is reached by then.
 
     Parameters
     ----------
     impacts : sequence of Impact
-        All impacts of a test; the accepted ones are measured.
+        All impacts of a test. The accepted ones are measured, and those that only their noise rejects: a response
+        before the force is taken for noise.
     response : str
         Name of the response's channel, for the message.
+    is_track : bool
+        Whether the accelerometer is beside the hammer.
 
     Returns
     -------
     tuple of Impact
-        The impacts, with a rejection "not_simultaneous" in the accepted ones of such a test.
+        The impacts, with a rejection "not_simultaneous" in those of such a test that were measured.
     """
-    used = [i for i in impacts if i.accepted]
-    lags = [lag for i in used if (lag := response_lag(i)) is not None]
+    measured = [i for i in impacts if all(r.reason in CONSEQUENCES_OF_A_LEAD for r in i.rejections)]
+    lags = [(i, lag) for i in measured if (lag := response_lag(i)) is not None]
     if not lags:
         return tuple(impacts)
-    median_lag = float(np.median(lags))
-    latest = float(np.median([i.contact * i.rate for i in used])) + MAX_LAG
+    median_lag = float(np.median([lag for _, lag in lags]))
+    times = [0.5 * _rise(i) if is_track else i.contact * i.rate for i, _ in lags]
+    latest = float(np.median(times)) + MAX_LAG
     if -MAX_LEAD <= median_lag <= latest:
         return tuple(impacts)
     bound = -float(MAX_LEAD) if median_lag < 0.0 else latest
     word = "before" if median_lag < 0.0 else "after"
     detail = (
-        f"{response} begins {abs(median_lag):.0f} samples ({1e3 * abs(median_lag) / used[0].rate:.3g} ms) {word} the "
+        f"{response} begins {abs(median_lag):.0f} samples ({1e3 * abs(median_lag) / lags[0][0].rate:.3g} ms) {word} the "
         "force: the channels were not sampled together, or are not of one impact"
     )
-    return _with_rejection(impacts, Rejection("not_simultaneous", median_lag, bound, detail, response))
+    rejection = Rejection("not_simultaneous", median_lag, bound, detail, response)
+    ids = {id(i) for i, _ in lags} | {id(i) for i in impacts if i.accepted}
+    return tuple(replace(i, rejections=(rejection,)) if id(i) in ids else i for i in impacts)
+
+
+def _rise(impact: Impact) -> int:
+    """Samples from the onset of the force to its peak."""
+    return int(np.argmax(np.abs(impact.force[impact.onset : impact.contact_end + 1])))
 
 
 def response_lag(impact: Impact) -> int | None:
@@ -177,9 +198,17 @@ def response_lag(impact: Impact) -> int | None:
     """
     size = np.abs(impact.acceleration)
     level = ONSET_SHARE * float(size.max())
-    if not level > 4.0 * impact.noise_acceleration:
+    if not level > 4.0 * _quiet_noise(impact):
         return None
     return int(np.argmax(size >= level)) - impact.onset
+
+
+def _quiet_noise(impact: Impact) -> float:
+    """Standard deviation of the response before the force, from its quieter samples. [m/s²]"""
+    before = impact.acceleration[: impact.onset]
+    if before.size < MIN_QUIET_SAMPLES:
+        return impact.noise_acceleration
+    return float(np.quantile(np.abs(before - np.median(before)), QUIET_QUANTILE)) / NORMAL_QUANTILE
 
 
 def _with_rejection(impacts: Sequence[Impact], rejection: Rejection) -> tuple[Impact, ...]:

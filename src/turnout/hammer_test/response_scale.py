@@ -36,7 +36,8 @@ NOISE_DEVIATIONS = 3.0  # by which noise may move a mobility
 LEAD = 2  # samples before the contact, for what filters move before it; more would add noise with large weights
 ADVICE = (
     "the unit, sensitivity or gain of the response or of the force is wrong (g or m/s², lbf or N, mm or m, volts?), "
-    "or the accelerometer is more than 0.2 m beside the hammer; for another structure than a track set "
+    "or the response is late, or the accelerometer is more than 0.2 m beside the hammer; for another structure than a "
+    "track set "
     "receptance.minimum_peak_force: 0"
 )
 

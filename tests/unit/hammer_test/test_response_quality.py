@@ -80,6 +80,64 @@ def test_a_response_that_is_not_simultaneous_is_reported_with_its_lag(impact_sam
     assert "rail begins" in rejection.detail and f"{word} the force" in rejection.detail
 
 
+def impacts_on_a_mass(rate, delay, lead, n=5, rise=7.5e-4, damping=0.05):
+    """Forces of a sine squared, and the acceleration of 250 kg on a spring, 160 Hz, in closed form; ``delay`` in s.
+
+    Before the force a channel has noise of 1/500 of the peak, as good measurements have.
+    """
+    rng, recordings = np.random.default_rng(8), []
+    time = np.arange(round(0.3 * rate)) / rate - lead
+    w0 = 2.0 * np.pi * 160.0
+    fine = np.arange(round(0.35 * 4 * rate)) / (4.0 * rate)
+    oscillator = [1.0 / 250.0, 0.0, 0.0], [1.0, 2.0 * damping * w0, w0**2]
+    numerator, denominator, _ = signal.cont2discrete(oscillator, fine[1], "foh")
+    for record in range(n):
+        peak = rng.uniform(4000.0, 6000.0)
+        force = np.where(fine < 2.0 * rise, peak * np.sin(0.5 * np.pi * fine / rise) ** 2, 0.0)
+        answer = signal.lfilter(numerator.ravel(), denominator, force)
+        both = np.stack([np.interp(time - shift, fine, x, left=0.0) for x, shift in ((force, 0.0), (answer, delay))])
+        both += rng.standard_normal(both.shape) * np.abs(both).max(axis=1, keepdims=True) / 500.0
+        recordings.append(Recording(both, rate, CHANNELS, source="a", record=record))
+    return recordings
+
+
+@pytest.mark.parametrize("rate", [10e3, 20e3, 51.2e3])
+@pytest.mark.parametrize("lead_time", [1e-3, 3e-3, 10e-3, 19e-3])
+def test_a_response_before_the_force_is_not_taken_for_noise(rate, lead_time):
+    """The force begins at 30 ms: the response fills a thirtieth to nearly two thirds of the time before it."""
+    recordings = impacts_on_a_mass(rate, -lead_time, 30e-3)
+    impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
+    assert {r.reason for i in impacts for r in i.rejections} == {"not_simultaneous"}
+    value = impacts[0].rejections[0].value / rate
+    assert value == pytest.approx(-lead_time, abs=3e-4)  # a mass follows the force: a tenth of it within 0.2 of the rise
+
+
+@pytest.mark.parametrize("rate", [10e3, 20e3, 51.2e3])
+def test_beside_the_hammer_a_response_begins_while_the_force_rises(rate):
+    """The force rises for 0.75 ms; elsewhere on a structure the response may begin as late as the contact ends."""
+    late = impacts_on_a_mass(rate, 1e-3, 30e-3)
+    impacts = find_track_impacts(late, "force", "rail", ReceptanceSettings())
+    assert {r.reason for i in impacts for r in i.rejections} == {"not_simultaneous"}
+    assert "after the force" in impacts[0].rejections[0].detail
+    for recordings, settings in (
+        (impacts_on_a_mass(rate, 0.0, 30e-3), ReceptanceSettings()),
+        (late, ReceptanceSettings(minimum_peak_force=0.0)),
+    ):
+        assert all(i.accepted for i in find_track_impacts(recordings, "force", "rail", settings))
+
+
+def test_noise_before_the_force_stays_noise():
+    """Noise of 0.4 of the peak, and a dead channel: neither shows where a response begins."""
+    rng, noisy, dead = np.random.default_rng(9), [], []
+    for r in impacts_on_a_mass(RATE, 0.0, 30e-3):
+        noise = rng.standard_normal(r.n_sample) * np.abs(r.samples[1]).max()
+        noisy.append(Recording(r.samples + [np.zeros_like(noise), 0.4 * noise], RATE, CHANNELS, "a", record=r.record))
+        dead.append(Recording(np.stack([r.samples[0], noise]), RATE, CHANNELS, "a", record=r.record))
+    for recordings in (noisy, dead):
+        impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
+        assert all(i.rejections[0].reason in ("noisy", "dead_channel") for i in impacts)
+
+
 def test_a_lag_by_the_filters_of_two_channels_is_accepted(impact_samples):
     shifted = impact_samples.copy()
     shifted[:, 1] = np.roll(impact_samples[:, 1], 3, axis=1)
