@@ -37,8 +37,7 @@ LEAD = 2  # samples before the contact, for what filters move before it; more wo
 ADVICE = (
     "the unit, sensitivity or gain of the response or of the force is wrong (g or m/s², lbf or N, mm or m, volts?), "
     "or the response is late, or the accelerometer is more than 0.2 m beside the hammer; for another structure than a "
-    "track set "
-    "receptance.minimum_peak_force: 0"
+    "track set receptance.minimum_peak_force: 0"
 )
 
 

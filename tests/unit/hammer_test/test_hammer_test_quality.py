@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from turnout.hammer_test.agreement import pairwise_coherence, response_gain
+from turnout.hammer_test.agreement import following_gain, pairwise_coherence, response_gain
 from turnout.hammer_test.force_tops import top_share
 from turnout.hammer_test.impact_quality import rail_code
 from turnout.signal.filters import FAMILIES, force_pulse
@@ -218,3 +218,31 @@ def test_a_shifted_resonance_is_no_change_of_amplitude():
     acceleration = force * (1j * f) ** 2 / (own**2 - f**2 + 2j * 0.066 * own * f)
     # The area under a resonance of acceleration is proportional to the frequency: a shift of 3 % changes it by as much.
     assert response_gain(force, acceleration) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_part_of_a_response_that_follows_no_force_is_no_change_of_its_gain():
+    """A line of 50 Hz with a quarter of the power of the response raises that by 25 %, and nothing that follows."""
+    f = np.arange(20.0, 800.0, 5.0)
+    force = np.outer([5.0, 4.0, 6.0, 5.0, 5.5], np.ones(f.size)).astype(complex)
+    acceleration = force * (1j * f) ** 2 / (160.0**2 - f**2 + 0.2j * 160.0 * f)
+    quadrature = 1j * acceleration[2, f == 50.0] / np.abs(acceleration[2, f == 50.0])
+    hum, clipped = acceleration.copy(), force.copy()
+    hum[2, f == 50.0] += quadrature * 0.5 * np.linalg.norm(acceleration[2])
+    clipped[2] *= 0.8
+    assert response_gain(force, hum)[2] == pytest.approx(np.sqrt(1.25), abs=0.05)
+    usual = np.arange(5) != 2
+    assert following_gain(force, hum, usual) == pytest.approx(1.0, abs=1e-9)
+    assert following_gain(clipped, acceleration, usual)[2] == pytest.approx(1.25)
+
+
+def test_hum_in_the_hardest_impacts_is_no_overload_of_the_hammer(hammer):
+    """Hum of 2 % of the peak in two of eight impacts, the hardest; a force of 0.8 of its size is still found there."""
+    peaks, time = np.linspace(4000.0, 6000.0, 8), np.arange(4000) / RATE
+    samples = [hammer.samples(hammer.force(peak=p, contact=4e-4, start=25e-3), noise=(1e-4, 1e-3)) for p in peaks]
+    for k in (6, 7):
+        samples[k][1] += 0.02 * np.abs(samples[k][1]).max() * np.sin(2 * np.pi * 50.0 * time + k)
+    impacts = hammer.impacts([hammer.recording(x, k) for k, x in enumerate(samples)])
+    assert [findings(i) for i in impacts] == [[]] * 6 + [["odd_one_out"]] * 2 and all(i.accepted for i in impacts)
+    samples[7][0] *= 0.8
+    impacts = hammer.impacts([hammer.recording(x, k) for k, x in enumerate(samples)])
+    assert [i.accepted for i in impacts] == [True] * 7 + [False] and findings(impacts[7]) == ["overload"]
