@@ -109,23 +109,57 @@ def tops_of(impacts: Sequence[Impact], weaker: np.ndarray) -> list[Top]:
     list of Top
         One of each impact.
     """
-    n = 2 * max(i.acceleration.size for i in impacts)  # twice the length: no wrap of the convolution
+    spectra = contact_spectra(impacts)
+    tops = []
+    for k, i in enumerate(impacts):
+        predicting = weaker[weaker != k]
+        predicted = np.fft.irfft(transfer_function(spectra, predicting) * spectra[0][k])[: i.acceleration.size]
+        early = slice(max(0, i.onset - LEAD), i.onset + round(EARLY_TIME * i.rate))
+        tops.append(_top(i.acceleration[early], predicted[early]))
+    return tops
+
+
+def contact_spectra(impacts: Sequence[Impact]) -> tuple[np.ndarray, np.ndarray]:
+    """Spectra of the forces, which count during the contact only, and of the responses, over twice the longest record.
+
+    Parameters
+    ----------
+    impacts : sequence of Impact
+        Accepted impacts of one rate.
+
+    Returns
+    -------
+    force, response : (n_impact, n_frequency) array of complex
+        [N], [m/s²]; their inverse transforms have an even length, and no convolution wraps.
+    """
+    n = 2 * max(i.acceleration.size for i in impacts)
     force, rail = np.zeros((2, len(impacts), n))
     for k, i in enumerate(impacts):
         force[k, i.onset : i.contact_end + 1] = i.force[i.onset : i.contact_end + 1]
         rail[k, : i.acceleration.size] = i.acceleration
-    force_spectrum, rail_spectrum = np.fft.rfft(force), np.fft.rfft(rail)
-    weights = 1.0 / np.sum(np.abs(force_spectrum) ** 2, axis=1, keepdims=True)
-    power, cross = weights * np.abs(force_spectrum) ** 2, weights * force_spectrum.conj() * rail_spectrum
-    tops = []
-    for k, i in enumerate(impacts):
-        predicting = weaker[weaker != k]
-        total = power[predicting].sum(axis=0)
-        transfer = cross[predicting].sum(axis=0) / (total + REGULARISATION * total.max())
-        early = slice(max(0, i.onset - LEAD), i.onset + round(EARLY_TIME * i.rate))
-        predicted = np.fft.irfft(transfer * force_spectrum[k], n)[: i.acceleration.size]
-        tops.append(_top(i.acceleration[early], predicted[early]))
-    return tops
+    return np.fft.rfft(force), np.fft.rfft(rail)
+
+
+def transfer_function(spectra: tuple[np.ndarray, np.ndarray], predicting: np.ndarray) -> np.ndarray:
+    """Response per force of some impacts, each of which has the same weight; 0 at lines without force.
+
+    Parameters
+    ----------
+    spectra : (force, response)
+        Of all impacts, from ``contact_spectra``.
+    predicting : (m,) array of int
+        Indices of the impacts that are averaged.
+
+    Returns
+    -------
+    (n_frequency,) array of complex
+        [m/s²/N]
+    """
+    force, response = (x[predicting] for x in spectra)
+    power = np.abs(force) ** 2
+    weights = 1.0 / np.sum(power, axis=1, keepdims=True)
+    total = np.sum(weights * power, axis=0)
+    return np.sum(weights * force.conj() * response, axis=0) / (total + REGULARISATION * total.max())
 
 
 def _top(measured: np.ndarray, predicted: np.ndarray) -> Top:

@@ -12,7 +12,7 @@ import numpy as np
 
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
-from turnout.hammer_test.limited_response import judge_limited_impacts
+from turnout.hammer_test.limited_response import contact_spectra, judge_limited_impacts, transfer_function
 from turnout.hammer_test.response_order import judge_response_order
 from turnout.hammer_test.response_scale import judge_response_scale
 from turnout.records import Rejection
@@ -59,7 +59,7 @@ def find_track_impacts(
     return select_best(impacts, settings)  # among those that no other test has rejected
 
 
-# Least number of impacts, and least standard deviation of the logarithm of their peak forces, for a slope.
+# Least number of impacts, and least standard deviation of the logarithm of what their forces predict, for a slope.
 MIN_SLOPE_IMPACTS, MIN_FORCE_SPREAD = 5, 0.03
 MAX_SATURATED_SLOPE = 0.5  # slope of the logarithms of peaks: 1 for a linear track, 0 for a saturated channel
 
@@ -69,9 +69,11 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
 
     Behind an anti-aliasing filter an overload has no flat top. The slope b of
 
-    .. math:: \ln \max|a_i| = b \ln \max F_i + c
+    .. math:: \ln \max|a_i| = b \ln \max|\hat a_i| + c
 
-    is 1 on a linear track, and above it for a tip that hardens. A test is rejected if b lies below
+    is 1 on a linear track. The prediction is the force through the mean transfer function of the test. It contains the
+    shape of each pulse: the response to a short one follows its impulse, and samples may miss its peak. A saturated
+    test has a smaller transfer function, but a prediction that grows with the force. A test is rejected if b lies below
     ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for the steepest slope of the response, which an
     amplifier may limit.
 
@@ -88,17 +90,20 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
         The impacts, with a rejection "overload" in the accepted ones of a saturated test.
     """
     used = [i for i in impacts if i.accepted]
-    if len(used) < MIN_SLOPE_IMPACTS:
+    if len(used) < MIN_SLOPE_IMPACTS or len({i.rate for i in used}) > 1:
         return tuple(impacts)
-    x = np.log([abs(i.peak) for i in used])
-    if np.std(x) < MIN_FORCE_SPREAD:
-        return tuple(impacts)
-    deviations = x - x.mean()
+    spectra = contact_spectra(used)
+    predicted = np.fft.irfft(transfer_function(spectra, np.arange(len(used))) * spectra[0])
+    predictions = [x[: i.acceleration.size] for x, i in zip(predicted, used)]
     for name in ("peak", "steepest slope"):
         with np.errstate(divide="ignore"):
-            y = np.log(_largest_values(used, name == "steepest slope"))
-        if not np.isfinite(y).all():
+            x, y = (
+                np.log(_largest_values(used, responses, name == "steepest slope"))
+                for responses in (predictions, [i.acceleration for i in used])
+            )
+        if not np.isfinite([x, y]).all() or np.std(x) < MIN_FORCE_SPREAD:
             continue
+        deviations = x - x.mean()
         slope = float(deviations @ y / (deviations @ deviations))
         residual = y - y.mean() - slope * deviations
         error = float(np.sqrt(residual @ residual / (len(used) - 2) / (deviations @ deviations)))
@@ -112,16 +117,18 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     return tuple(impacts)
 
 
-def _largest_values(impacts: Sequence[Impact], is_slope: bool) -> np.ndarray:
-    """Largest value of each response, or of its differences."""
-    responses = (i.acceleration[i.onset :] for i in impacts)
-    return np.array([np.max(np.abs(np.diff(x) if is_slope else x), initial=0.0) for x in responses])
+def _largest_values(impacts: Sequence[Impact], responses: Sequence[np.ndarray], is_slope: bool) -> np.ndarray:
+    """Largest value of the response to each impact, or of its differences."""
+    behind = (x[i.onset :] for i, x in zip(impacts, responses))
+    return np.array([np.max(np.abs(np.diff(x) if is_slope else x), initial=0.0) for x in behind])
 
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.
 ONSET_SHARE = 0.1
 MAX_LEAD, MAX_LAG = 3, 5  # samples by which filters of two channels move a response forwards and backwards
-QUIET_QUANTILE = 0.25  # of the magnitudes before the force: it is noise even if a response fills up to half of that time
+QUIET_QUANTILE = (
+    0.25  # of the magnitudes before the force: it is noise even if a response fills up to half of that time
+)
 NORMAL_QUANTILE = 0.31864  # magnitude below which a quarter of a normal distribution lies, in standard deviations
 MIN_QUIET_SAMPLES = 8  # before the force; with fewer the noise is that of the end of the record
 # A response that begins before the force lies in the samples from which the noise is measured.
@@ -162,8 +169,8 @@ def judge_causality(impacts: Sequence[Impact], response: str, is_track: bool = F
     bound = -float(MAX_LEAD) if median_lag < 0.0 else latest
     word = "before" if median_lag < 0.0 else "after"
     detail = (
-        f"{response} begins {abs(median_lag):.0f} samples ({1e3 * abs(median_lag) / lags[0][0].rate:.3g} ms) {word} the "
-        "force: the channels were not sampled together, or are not of one impact"
+        f"{response} begins {abs(median_lag):.0f} samples ({1e3 * abs(median_lag) / lags[0][0].rate:.3g} ms) {word} "
+        "the force: the channels were not sampled together, or are not of one impact"
     )
     rejection = Rejection("not_simultaneous", median_lag, bound, detail, response)
     ids = {id(i) for i, _ in lags} | {id(i) for i in impacts if i.accepted}

@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from turnout.config.settings.receptance import ReceptanceSettings
-from turnout.hammer_test.response_quality import find_track_impacts, response_lag
+from turnout.hammer_test import find_impacts
+from turnout.hammer_test.response_quality import find_track_impacts, judge_saturation, response_lag
 from turnout.hammer_test.response_scale import RATES, equivalent_free_rails, free_rail_mobility
 from turnout.records import Channel, Recording
 
@@ -109,7 +110,9 @@ def test_a_response_before_the_force_is_not_taken_for_noise(rate, lead_time):
     impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
     assert {r.reason for i in impacts for r in i.rejections} == {"not_simultaneous"}
     value = impacts[0].rejections[0].value / rate
-    assert value == pytest.approx(-lead_time, abs=3e-4)  # a mass follows the force: a tenth of it within 0.2 of the rise
+    assert value == pytest.approx(
+        -lead_time, abs=3e-4
+    )  # a mass follows the force: a tenth of it within 0.2 of the rise
 
 
 @pytest.mark.parametrize("rate", [10e3, 20e3, 51.2e3])
@@ -131,7 +134,7 @@ def test_noise_before_the_force_stays_noise():
     rng, noisy, dead = np.random.default_rng(9), [], []
     for r in impacts_on_a_mass(RATE, 0.0, 30e-3):
         noise = rng.standard_normal(r.n_sample) * np.abs(r.samples[1]).max()
-        noisy.append(Recording(r.samples + [np.zeros_like(noise), 0.4 * noise], RATE, CHANNELS, "a", record=r.record))
+        noisy.append(Recording(r.samples + np.array([[0.0], [0.4]]) * noise, RATE, CHANNELS, "a", record=r.record))
         dead.append(Recording(np.stack([r.samples[0], noise]), RATE, CHANNELS, "a", record=r.record))
     for recordings in (noisy, dead):
         impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
@@ -154,6 +157,28 @@ def test_stronger_impacts_on_a_linear_track_are_used(impact_samples):
         assert not reasons_of(scaled)
     scaled[4, 1] *= 3.9 / 14.0  # the force channel overflowed: its response is that of a usual impact
     assert "overload" in reasons_of(scaled)
+
+
+def test_short_impacts_of_even_force_are_no_saturation():
+    """Behind a filter the response to a pulse of 3 to 5 samples follows its impulse, which here falls with its peak."""
+    low = signal.butter(1, 2000.0, fs=RATE)
+    peaks, recordings = np.linspace(4500.0, 5500.0, 8), []
+    fine = np.arange(16 * 20) / (16.0 * RATE)
+    for record, peak in enumerate(peaks):
+        width = 2e-4 * (5000.0 / peak) ** 3
+        pulse = np.where(fine < width, peak * np.sin(np.pi * fine / width) ** 2, 0.0)
+        force = np.zeros(4000)
+        force[400:420] = pulse.reshape(-1, 16).mean(axis=1)
+        time = np.arange(4000) / RATE
+        free = np.exp(-60.0 * time) * np.cos(1000.0 * time)
+        response = signal.lfilter(*low, np.convolve(force, free)[:4000])
+        samples = np.stack([force, response])
+        samples += np.random.default_rng(record).standard_normal(samples.shape) * np.abs(samples).max(1)[:, None] / 1e3
+        recordings.append(Recording(samples, RATE, CHANNELS, source="a", record=record))
+    impacts = find_impacts(recordings, "force", "rail")
+    largest = [np.abs(i.acceleration).max() for i in impacts]
+    assert all(i.accepted for i in impacts) and np.polyfit(np.log([i.peak for i in impacts]), np.log(largest), 1)[0] < 0
+    assert judge_saturation(impacts, "rail") == tuple(impacts)
 
 
 def slew_limited(x, limit):
