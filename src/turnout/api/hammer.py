@@ -43,8 +43,8 @@ def find_impacts(
 
     As in the hammer stage, single wrong samples are replaced first, and hum is subtracted. A warning of the log
     "turnout" states both (``turnout.signal.cleaning``). Any structure is allowed here. The command
-    ``turnout hammer`` and the nightly run also judge whether the response is the acceleration of a track, of the right scale,
-    not limited, and simultaneous with the force (``turnout.hammer_test.response_quality``).
+    ``turnout hammer`` and the nightly run also judge whether the response is the acceleration of a track, of the right
+    scale, not limited, and simultaneous with the force (``turnout.hammer_test.response_quality``).
 
     Parameters
     ----------
