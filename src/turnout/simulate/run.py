@@ -11,22 +11,21 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.simulate.between_nodes import element_deflection, is_between_nodes, rail_loads, step_mean
 from turnout.simulate.blade import is_on_blade
-from turnout.simulate.march import CONVERGED, LEFT_TRACK, march
+from turnout.simulate.divided_step import Course, Pulse, march_to_end, pulse_forces, raise_failure
+from turnout.simulate.march import LEFT_TRACK, march
 from turnout.simulate.port_system import locate_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
-from turnout.simulate.state import Motion, PortArrays, RunArrays, stand_in_of, vehicle_arrays
+from turnout.simulate.state import Motion, PortArrays, RunArrays, stand_in_of
 from turnout.simulate.statics import equilibrium, motion_at_rest
 from turnout.simulate.wheel_path import PathPart, Surfaces, spline_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import NoReturn
 
     from turnout.simulate.between_nodes import RailLoads
     from turnout.simulate.preparation import Prepared
     from turnout.simulate.vehicle import Vehicle
 
-Pulse = Callable[[np.ndarray], np.ndarray]  # force [N] of time [s]
 CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the others couple by iteration
 
 
@@ -136,23 +135,18 @@ def run(
     ports, order = port_arrays(prepared, contacts, fixed, path_of)
     use_stand_in = bool(vehicle) and drive.entry > 0.0
     stand_in = _stand_in(prepared, drive) if use_stand_in else (1.0, 0.0, 1.0)
-    bodies = vehicle_arrays(vehicle or _dummy_vehicle(), prepared.scheme, stand_in)
-    if vehicle is None:  # arrays of the right types for the kernels, but no block of bodies that moves
-        bodies = bodies._replace(block_start=bodies.block_start[:1])
+    labels = [f"wheel {wheel}" for _, _, wheel, *_ in contacts] + [f"port {port.label!r}" for port in fixed]
+    labels = [labels[k] for k in order]
     arrays = _run_arrays(prepared, drive, use_stand_in, paths, path_start, probes, pulses, n_step, tolerance)
-    motion = _initial_motion(prepared, vehicle, drive, ports, arrays, stand_in)
-    signals = np.zeros((len(probes), n_step))
+    motion = _initial_motion(prepared, vehicle, drive, ports, labels, arrays, stand_in)
     between_nodes = [
         (k, probe.place, probe.order)
         for k, probe in enumerate(probes)
         if not isinstance(probe.place, tuple) and is_between_nodes(prepared.matrices, probe.place)
     ]
-    port_forces = np.zeros((len(order), n_step if forces or between_nodes else 0))
-    status, step, port, value, iterations = marcher(
-        prepared.arrays, prepared.scheme, bodies, ports, arrays, motion, n_step, signals, port_forces
-    )
-    if status != CONVERGED:
-        _raise_failure(status, prepared, step, port, value, ports)
+    course = Course(vehicle, stand_in, ports, labels, arrays, pulses, marcher)
+    n_force = n_step if forces or between_nodes else 0
+    signals, port_forces, iterations = march_to_end(course, prepared, motion, n_step, n_force)
     by_port = np.zeros((len(order), port_forces.shape[1]))
     by_port[order] = port_forces
     time = (np.arange(n_step) + 0.5) * prepared.dt
@@ -165,26 +159,6 @@ def run(
             deflection = element_deflection(prepared.matrices, position, loads)
             signals[k] += step_mean(deflection, derivative, prepared.dt, loads.from_rest)
     return Outcome(time, signals, force, surface, by_port[len(contacts) :], iterations / n_step, motion)
-
-
-def _dummy_vehicle() -> Vehicle:
-    from turnout.simulate.vehicle import lone_wheels
-
-    return lone_wheels(1.0)
-
-
-def _raise_failure(status: int, prepared: Prepared, step: int, port: int, value: float, ports: PortArrays) -> NoReturn:
-    time, subject = step * prepared.dt, f"wheel {ports.wheel[port]}" if ports.wheel[port] >= 0 else f"port {port}"
-    if status == LEFT_TRACK:
-        a, b = prepared.matrices.node[[0, -1]]
-        raise SimulationError(
-            f"{subject} leaves the track at {time:.4f} s: it is at {value:.3f} m, "
-            f"the track goes from {a:.3f} m to {b:.3f} m."
-        )
-    raise SimulationError(
-        f"Newton's iteration did not converge at {time:.6f} s: residual {value:.3g} N at {subject}, "
-        f"which started at {ports.place[port]:.3f} m."
-    )
 
 
 def _stand_in(prepared: Prepared, drive: Drive) -> tuple[float, float, float]:
@@ -243,17 +217,15 @@ def _run_arrays(
     n_step: int,
     tolerance: float,
 ) -> RunArrays:
-    matrices, scheme = prepared.matrices, prepared.scheme
+    matrices = prepared.matrices
     rows, weights = np.zeros((len(probes), 4), dtype=np.int64), np.zeros((len(probes), 4))
     for k, probe in enumerate(probes):
         r, w = matrices.weights(probe.place)
         rows[k, : r.size], weights[k, : r.size] = r, w
     pulse_rows, pulse_weights = np.zeros((len(pulses), 4), dtype=np.int64), np.zeros((len(pulses), 4))
-    pulse_force = np.zeros((len(pulses), n_step if len(pulses) else 1, scheme.node.size))
-    for k, (point, pulse) in enumerate(pulses):
+    for k, (point, _) in enumerate(pulses):
         r, w = matrices.weights(point)
         pulse_rows[k, : r.size], pulse_weights[k, : r.size] = r, w
-        pulse_force[k] = pulse((np.arange(n_step)[:, None] + scheme.node) * prepared.dt)
     ramp = np.zeros(4)
     if use_stand_in:
         first, last = matrices.node[0] + drive.margin, matrices.node[-1] - drive.margin
@@ -267,7 +239,7 @@ def _run_arrays(
         paths,
         pulse_rows,
         pulse_weights,
-        pulse_force,
+        pulse_forces(pulses, prepared, n_step),
         rows,
         weights,
         np.array([probe.order for probe in probes], dtype=np.int64),
@@ -319,6 +291,7 @@ def _initial_motion(
     vehicle: Vehicle | None,
     drive: Drive,
     ports: PortArrays,
+    labels: Sequence[str],
     arrays: RunArrays,
     stand_in: tuple[float, float, float],
 ) -> Motion:
@@ -330,11 +303,11 @@ def _initial_motion(
         motion.z[:], motion.w[:] = -clearance, velocity
         motion.deformation[ports.wheel >= 0] = -clearance
         return motion
-    return equilibrium(prepared, vehicle, ports, _initial_ports(prepared, ports, arrays), stand_in[2])
+    return equilibrium(prepared, vehicle, ports, _initial_ports(prepared, ports, labels, arrays), stand_in[2])
 
 
 def _initial_ports(
-    prepared: Prepared, ports: PortArrays, arrays: RunArrays
+    prepared: Prepared, ports: PortArrays, labels: Sequence[str], arrays: RunArrays
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Rows, weights, local compliance, stand-in share and dip of every port at time 0."""
     n = ports.body.size
@@ -345,5 +318,5 @@ def _initial_ports(
         prepared.arrays, start, ports, arrays, 0, np.zeros(n, dtype=np.int64), x, rows, weights, local, share, dip
     )
     if lost_port >= 0:
-        _raise_failure(LEFT_TRACK, prepared, 0, lost_port, x[lost_port], ports)
+        raise_failure(prepared, ports, labels, LEFT_TRACK, 0.0, lost_port, x[lost_port])
     return rows, weights, local, share, dip

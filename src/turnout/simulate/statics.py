@@ -108,7 +108,7 @@ def equilibrium(
     n = n_port + wheel_z.size
     for _ in range(50):
         d = touches.T @ wheel_z - flexibility @ force - dip
-        f, slope = _law_forces(ports, d)
+        f, slope = law_forces(ports, d)
         residual = np.concatenate([force - f, stiff @ wheel_z - load + touches @ force])
         if np.max(np.abs(residual)) < TOLERANCE * max(1.0, np.max(np.abs(load), initial=0.0) / 1e5):
             return _motion(prepared, vehicle, ports, force, wheel_z, columns, share, stand_in_stiffness, d)
@@ -155,7 +155,21 @@ def _first_guess(
         return np.array([np.min((below + approach)[row > 0.0]) for row in touches])
 
 
-def _law_forces(ports: PortArrays, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def law_forces(ports: PortArrays, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of all ports at rest.
+
+    Parameters
+    ----------
+    ports : PortArrays
+        Wheel contacts and ports of terms.
+    d : (n_port,) array of float
+        Deformations. [m]
+
+    Returns
+    -------
+    ((n_port,) array, (n_port,) array)
+        Forces [N] and their derivatives by deformation [N/m].
+    """
     f, slope = np.zeros(d.size), np.zeros(d.size)
     for k in range(d.size):
         first, last = ports.table_start[k], ports.table_start[k + 1]
