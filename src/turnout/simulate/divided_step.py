@@ -85,29 +85,29 @@ def march_to_end(
     bodies = _bodies(course, prepared)
     signals = np.zeros((course.run.sensor_order.size, n_step))
     forces = np.zeros((course.ports.body.size, n_force))
-    done = total = 0
-    while done < n_step:
-        out, out_force = np.zeros_like(signals[:, done:]), np.zeros_like(forces[:, done:])
-        time = start + done * prepared.dt
-        ports, run = _later(course, prepared, time, n_step - done)
+    first = total = 0
+    while first < n_step:
+        out, out_force = np.zeros_like(signals[:, first:]), np.zeros_like(forces[:, first:])
+        time = start + first * prepared.dt
+        ports, run = _later(course, prepared, time, n_step - first)
         status, step, port, residual, iterations = course.marcher(
-            prepared.arrays, prepared.scheme, bodies, ports, run, motion, n_step - done, out, out_force
+            prepared.arrays, prepared.scheme, bodies, ports, run, motion, n_step - first, out, out_force
         )
-        signals[:, done : done + step], forces[:, done : done + step] = out[:, :step], out_force[:, :step]
-        done, total, time = done + step, total + iterations, time + step * prepared.dt
+        signals[:, first : first + step], forces[:, first : first + step] = out[:, :step], out_force[:, :step]
+        first, total, time = first + step, total + iterations, time + step * prepared.dt
         if status == CONVERGED:
             break
-        if status != NEWTON or divided == MAX_DIVISIONS or not np.isfinite(residual):
+        if status != NEWTON or divided == MAX_DIVISIONS:
             raise_failure(prepared, course.ports, course.labels, status, time, port, residual)
         motion.force[:] = np.repeat(law_forces(ports, motion.deformation)[0], prepared.scheme.node.size)
-        half = _halved(course, prepared)
-        half_motion = _padded(motion, prepared, half)
-        parts = march_to_end(course, half, half_motion, 2, 2 * (n_force > 0), time, divided + 1)
-        motion.u[:], motion.v[:] = _padded(half_motion, half, prepared)[:2]
-        signals[:, done], total = parts[0].mean(axis=1), total + parts[2]
+        half = _at_half_step(course, prepared)
+        half_motion = _with_padding_of(motion, prepared, half)
+        halves = march_to_end(course, half, half_motion, 2, 2 * (n_force > 0), time, divided + 1)
+        motion.u[:], motion.v[:] = _with_padding_of(half_motion, half, prepared)[:2]
+        signals[:, first], total = halves[0].mean(axis=1), total + halves[2]
         if n_force:
-            forces[:, done] = parts[1].mean(axis=1)
-        done += 1
+            forces[:, first] = halves[1].mean(axis=1)
+        first += 1
     return signals, forces, total
 
 
@@ -171,11 +171,19 @@ def pulse_forces(
     -------
     (n_pulse, n_step, n_stage) array of float
         Forces. [N]
+
+    Raises
+    ------
+    SimulationError
+        For a force that is not a number.
     """
     node = prepared.scheme.node
     forces = np.zeros((len(pulses), n_step if len(pulses) else 1, node.size))
     for row, (_, pulse) in zip(forces, pulses):
-        row[:] = pulse(start + (np.arange(n_step)[:, None] + node) * prepared.dt)
+        time = start + (np.arange(n_step)[:, None] + node) * prepared.dt
+        row[:] = pulse(time)
+        if not np.all(is_finite := np.isfinite(row)):
+            raise SimulationError(f"the given force is not a number at {time[~is_finite][0]:.6f} s.")
     return forces
 
 
@@ -196,7 +204,7 @@ def _later(course: Course, prepared: Prepared, time: float, n_step: int) -> tupl
     return course.ports._replace(place=course.ports.place + travelled), course.run._replace(pulse_force=forces)
 
 
-def _halved(course: Course, prepared: Prepared) -> Prepared:
+def _at_half_step(course: Course, prepared: Prepared) -> Prepared:
     """The same track for steps of half the size."""
     dt = 0.5 * prepared.dt
     if dt not in course.halved:
@@ -206,7 +214,7 @@ def _halved(course: Course, prepared: Prepared) -> Prepared:
     return course.halved[dt]
 
 
-def _padded(motion: Motion, source: Prepared, target: Prepared) -> Motion:
+def _with_padding_of(motion: Motion, source: Prepared, target: Prepared) -> Motion:
     """The motion with the padding of another size of step; all arrays but those of the track are the same ones."""
     n, pads = source.arrays.n, (source.arrays.pad, target.arrays.pad)
     u, v = (np.pad(a[pads[0] : pads[0] + n], pads[1]) for a in (motion.u, motion.v))

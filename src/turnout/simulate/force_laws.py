@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.number_checks import check_number
 
 POWER, GAP, TABLE, LINEAR, FRICTION, LIFT = range(6)
 
@@ -26,7 +27,9 @@ class PowerLaw:
     law_code = POWER
 
     def __post_init__(self) -> None:
-        if not (self.stiffness > 0.0 and self.exponent >= 1.0 and self.damping >= 0.0):
+        if not (
+            np.all(np.isfinite(self.numbers)) and self.stiffness > 0.0 and self.exponent >= 1.0 and self.damping >= 0.0
+        ):
             raise SimulationError(
                 f"power law: stiffness {self.stiffness!r}, exponent {self.exponent!r}, "
                 f"damping {self.damping!r} are not those of a contact."
@@ -95,6 +98,11 @@ class GapLaw:
     onset: float = 1e-5
     law_code = GAP
 
+    def __post_init__(self) -> None:
+        check_number("gap law: stiffness", self.stiffness, "N/m", least=0.0)
+        check_number("gap law: damping", self.damping, "N s/m", least=0.0)
+        check_number("gap law: onset", self.onset, "m", above=0.0)
+
     @property
     def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
@@ -139,6 +147,8 @@ class TableLaw:
             raise SimulationError(f"table law: deformations must rise, got {self.deformation!r}.")
         if not len(self.deformation) == len(self.elastic) == len(self.viscous):
             raise SimulationError("table law: deformation, elastic and viscous differ in length.")
+        if not all(np.all(np.isfinite(column)) for column in (self.deformation, self.elastic, self.viscous)):
+            raise SimulationError(f"table law: not all values are numbers, got {self.elastic!r} and {self.viscous!r}.")
 
     def force(self, d: float | np.ndarray, rate: float | np.ndarray = 0.0) -> np.ndarray:
         """Force interpolated in the table.
@@ -171,6 +181,10 @@ class LinearLaw:
     preload: float = 0.0
     law_code = LINEAR
 
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping", "preload"):
+            check_number(f"linear law: {name}", getattr(self, name))
+
     @property
     def numbers(self) -> tuple[float, float, float]:
         """The three numbers of the law in the order in which the compiled march takes them."""
@@ -201,6 +215,10 @@ class FrictionLaw:
     limit: float
     slip_rate: float = 1e-3
     law_code = FRICTION
+
+    def __post_init__(self) -> None:
+        check_number("friction law: limit", self.limit, "N", least=0.0)
+        check_number("friction law: slip_rate", self.slip_rate, "m/s", above=0.0)
 
     @property
     def numbers(self) -> tuple[float, float, float]:
@@ -236,6 +254,11 @@ class LiftLaw:
     damping: float
     load: float
     law_code = LIFT
+
+    def __post_init__(self) -> None:
+        check_number("lift law: stiffness", self.stiffness, "N/m", least=0.0)
+        check_number("lift law: damping", self.damping, "N s/m", least=0.0)
+        check_number("lift law: load", self.load, "N")
 
     @property
     def numbers(self) -> tuple[float, float, float]:

@@ -14,7 +14,8 @@ from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.links import terms_on_stretch
-from turnout.simulate.preparation import Prepared, prepare
+from turnout.simulate.number_checks import check_count, check_number
+from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, Pulse, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
 from turnout.simulate.track import Track
@@ -50,6 +51,12 @@ class Hammer:
     tip: PowerLaw = PLASTIC_TIP
     force: Sensor = LOAD_CELL
     name: str = "086D50"
+
+    def __post_init__(self) -> None:
+        check_number("hammer: mass", self.mass, "kg", above=0.0)
+        check_number("hammer: velocity", self.velocity, "m/s", above=0.0)
+        check_number("hammer: velocity_spread", self.velocity_spread, least=0.0)
+        check_number("hammer: position_spread", self.position_spread, "m", least=0.0)
 
 
 class ImpactTruth(NamedTuple):
@@ -159,7 +166,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     Raises
     ------
     SimulationError
-        For a position outside the track and a track prepared for another rate.
+        For a position outside the track, a track prepared for another rate, and numbers that are none of a test.
 
     Examples
     --------
@@ -173,6 +180,9 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     if n_blows is not None:
         warnings.warn("simulate_hammer(n_blows=...) is now n_impacts=...", DeprecationWarning, stacklevel=2)
         n_impacts = n_blows
+    check_count("n_impacts", n_impacts)
+    check_number("pretrigger", pretrigger, "s", least=0.0)
+    check_number("duration", duration, "s", above=pretrigger)
     hammer, impacts = hammer or Hammer(), []
     position, _ = resolve_location(track, location)
     sensors = hammer_sensors(position) if sensors is None else tuple(sensors)
@@ -248,12 +258,14 @@ def prepare_hammer(
     SimulationError
         For an unknown location, a position with less than three supports around it and a track that carries no load.
     """
+    check_number("half_length", half_length, "m", above=0.0)
+    dt = time_step_of(rate, substeps)
     position, base = resolve_location(track, location)
     stretch, terms = (
         stretch_of_track(base, position, half_length),
         terms_on_stretch(terms, supports_within(base, position, half_length)),
     )
-    return prepare(stretch, 1.0 / (rate * substeps), scheme, terms)
+    return prepare(stretch, dt, scheme, terms)
 
 
 def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tuple[float, Track]:
@@ -274,10 +286,11 @@ def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tupl
     Raises
     ------
     SimulationError
-        For a name that the turnout does not have.
+        For a name that the turnout does not have, and for a position that is not a number.
     """
     base = track.track if isinstance(track, TurnoutTrack) else track
     if not isinstance(location, str):
+        check_number("location", location, "m")
         return float(location), base
     if not isinstance(track, TurnoutTrack) or location not in track.locations:
         names = ", ".join(track.locations) if isinstance(track, TurnoutTrack) else ""

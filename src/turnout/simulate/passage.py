@@ -11,7 +11,8 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
-from turnout.simulate.preparation import Prepared, prepare
+from turnout.simulate.number_checks import check_number
+from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
 from turnout.simulate.track import Track
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from turnout.simulate.run import Outcome
 
 POSITION_TOLERANCE = 1e-6  # m; positions are rounded to this
+MAX_DISTANCE = 100e3  # m that a train may roll; the path of its wheels is stored every 5 mm
+MAX_DURATION = 3600.0  # s
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,8 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     ------
     SimulationError
         For a speed of zero, an unknown route, a sensor outside the track or where wheels are not yet on the modelled
-        track, a wheel that leaves the track, a track prepared for another rate.
+        track, a wheel that leaves the track, a track prepared for another rate, an irregularity of a wheel that the
+        train does not have, a passage of more than 100 km or an hour.
 
     Examples
     --------
@@ -159,8 +163,12 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     >>> f"{truth.force.mean() / 1e3:.1f} kN on each of {truth.force.shape[0]} wheels"
     '54.0 kN on each of 4 wheels'
     """
-    if not (np.isfinite(speed) and speed > 0.0):
-        raise SimulationError(f"speed must be above 0 m/s, got {speed!r}.")
+    check_number("speed", speed, "m/s", above=0.0)
+    check_number("lead", lead, "s")
+    check_number("tail", tail, "s")
+    check_number("entry", entry, "m", least=0.0)
+    if roughness is not None:
+        check_number("roughness", roughness, "dB")
     if direction not in ("facing", "trailing"):
         raise SimulationError(f"direction {direction!r} is neither 'facing' nor 'trailing'.")
     turnout = track if isinstance(track, TurnoutTrack) else TurnoutTrack(track, {route: ((),)})
@@ -240,7 +248,7 @@ def prepare_passage(
         If the track carries no load.
     """
     base = track.track_of(route) if isinstance(track, TurnoutTrack) else track
-    return prepare(base, 1.0 / (rate * substeps), scheme, terms)
+    return prepare(base, time_step_of(rate, substeps), scheme, terms)
 
 
 def _drive(
@@ -260,7 +268,15 @@ def _drive(
     positions = sign * np.array([sensor.place for sensor in sensors])
     length = float(vehicle.wheel_positions[-1])
     start = sign * (positions.min() - speed * lead)
-    distance = np.ptp(positions) + length + speed * (lead + tail)
+    distance = float(np.ptp(positions)) + length + speed * (lead + tail)
+    check_number(f"distance at {speed:g} m/s with lead and tail", distance, "m", above=0.0, below=MAX_DISTANCE)
+    check_number("duration with lead and tail", distance / speed, "s", below=MAX_DURATION)
+    for path_part in irregularities:
+        wheel = getattr(path_part, "wheel", None)
+        if wheel is not None and not 0 <= wheel < len(vehicle.wheels):
+            raise SimulationError(
+                f"{path_part!r} is on wheel {wheel!r}; {vehicle.name!r} has wheels 0 to {len(vehicle.wheels) - 1}."
+            )
     track = turnout.track
     for surface_parts in turnout.surfaces(route):
         check_path((*surface_parts, *irregularities), track.start, track.end)

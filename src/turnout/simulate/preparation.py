@@ -11,6 +11,7 @@ from turnout.errors import SimulationError
 from turnout.simulate.band_matrix import all_diagonals, factorise, inverse_windows, upper_rows
 from turnout.simulate.integrator import scheme as scheme_called
 from turnout.simulate.matrices import TrackMatrices, assemble
+from turnout.simulate.number_checks import check_count, check_number
 from turnout.simulate.state import SchemeArrays, TrackArrays
 from turnout.simulate.track import Track
 
@@ -79,13 +80,39 @@ class Prepared:
         Raises
         ------
         SimulationError
-            If it was prepared for another time step.
+            If it was prepared for another time step, and for a rate or number of steps that is none.
         """
+        time_step_of(rate, substeps)
         if not abs(self.dt * rate * substeps - 1.0) < 1e-9:
             raise SimulationError(
                 f"the track is prepared for steps of {self.dt:.9g} s, but {rate!r} Hz with {substeps!r} per sample "
                 f"ask for {1.0 / (rate * substeps):.9g} s: prepare it with the same rate and substeps."
             )
+
+
+def time_step_of(rate: float, substeps: int) -> float:
+    """Time step of a sampling rate.
+
+    Parameters
+    ----------
+    rate : float
+        Sampling rate, above 0. [Hz]
+    substeps : int
+        Time steps per sample, at least 1.
+
+    Returns
+    -------
+    float
+        Time step. [s]
+
+    Raises
+    ------
+    SimulationError
+        For a rate or number of steps that is none.
+    """
+    check_number("rate", rate, "Hz", above=0.0)
+    check_count("substeps", substeps)
+    return 1.0 / (rate * substeps)
 
 
 def prepare(
@@ -126,8 +153,7 @@ def prepare(
     SimulationError
         For a time step that is not above 0, and where the track carries no load.
     """
-    if not dt > 0.0:
-        raise SimulationError(f"time step must be above 0 s, got {dt!r}.")
+    check_number("time step", dt, "s", above=0.0)
     terms = tuple(terms)
     matrices = assemble(track, terms) if matrices is None else matrices
     integration_scheme = scheme_called(scheme)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.number_checks import check_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,11 +42,9 @@ class Rail:
         if self.mass_matrix not in ("consistent", "corrected"):
             raise SimulationError(f"rail: mass_matrix {self.mass_matrix!r} is neither 'consistent' nor 'corrected'.")
         for name in ("bending_stiffness", "mass", "shear_stiffness"):
-            if not getattr(self, name) > 0.0:
-                raise SimulationError(f"rail: {name} must be above 0, got {getattr(self, name)!r}.")
+            check_number(f"rail: {name}", getattr(self, name), above=0.0)
         for name in ("rotary_inertia", "damping"):
-            if not getattr(self, name) >= 0.0:
-                raise SimulationError(f"rail: {name} must not be negative, got {getattr(self, name)!r}.")
+            check_number(f"rail: {name}", getattr(self, name), least=0.0)
 
     def shear_ratio(self, length: float | np.ndarray) -> np.ndarray:
         r"""Share of shear in an element, :math:`P = 12 EI / (\kappa G A h^2)`; 0 for Euler-Bernoulli.

@@ -13,6 +13,7 @@ from turnout.simulate.between_nodes import element_deflection, is_between_nodes,
 from turnout.simulate.blade import is_on_blade
 from turnout.simulate.divided_step import Course, Pulse, march_to_end, pulse_forces, raise_failure
 from turnout.simulate.march import LEFT_TRACK, march
+from turnout.simulate.number_checks import check_number
 from turnout.simulate.port_system import locate_ports
 from turnout.simulate.ports import contact_ports, fixed_ports, port_arrays
 from turnout.simulate.state import Motion, PortArrays, RunArrays, stand_in_of
@@ -121,9 +122,8 @@ def run(
     SimulationError
         Where a wheel leaves the track or Newton's iteration fails, with time, position and value.
     """
+    check_number("duration", duration, "s", above=0.5 * prepared.dt)
     n_step = round(duration / prepared.dt)
-    if n_step < 1:
-        raise SimulationError(f"a duration of {duration!r} s is not one step of {prepared.dt!r} s.")
     if vehicle and drive is None:
         raise SimulationError("a vehicle needs a drive: where it starts, and how fast it is.")
     drive = drive or STANDING

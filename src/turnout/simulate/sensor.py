@@ -10,6 +10,7 @@ from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
 from turnout.records import Channel
+from turnout.simulate.number_checks import check_number
 from turnout.simulate.run import Probe
 
 if TYPE_CHECKING:
@@ -47,6 +48,18 @@ class Sensor:
     resolution: float | None = None
     delay: float = 0.0
     serial: str = ""
+
+    def __post_init__(self) -> None:
+        title = f"sensor {self.name!r}:"
+        for name in ("gain", "offset", "delay"):
+            check_number(f"{title} {name}", getattr(self, name))
+        check_number(f"{title} noise", self.noise, least=0.0)
+        check_number(f"{title} mount_quality", self.mount_quality, above=0.0)
+        for name in ("mount_frequency", "cutoff", "resolution"):
+            if (value := getattr(self, name)) is not None:
+                check_number(f"{title} {name}", value, least=0.0)
+        if self.limit is not None and not self.limit > 0.0:
+            raise SimulationError(f"{title} limit must be above 0, or None, got {self.limit!r}.")
 
     def channel(self) -> Channel:
         """The channel of a recording."""

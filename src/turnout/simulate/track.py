@@ -13,6 +13,7 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.simulate.blade import Blade
 from turnout.simulate.links import Link
+from turnout.simulate.number_checks import check_count, check_number
 from turnout.simulate.rail import Rail, in_series
 
 NOT_NEGATIVE = (
@@ -37,6 +38,10 @@ class RailStretch:
     start: float
     end: float
     rail: Rail
+
+    def __post_init__(self) -> None:
+        check_number("rail stretch: start", self.start, "m")
+        check_number(f"rail stretch from {self.start:g} m: end", self.end, "m", above=self.start)
 
 
 NODE_TOLERANCE = 1e-6  # m from a node within which an end is on it
@@ -93,8 +98,11 @@ class Track:
             raise SimulationError(f"{self.name}: needs at least 3 supports at rising positions, got {support!r}.")
         object.__setattr__(self, "support", support)
         self._set_support_values()
-        if self.layers not in (1, 2, 3) or self.elements_per_bay < 1:
-            raise SimulationError(f"{self.name}: {self.layers} layers, {self.elements_per_bay} elements per bay.")
+        if self.layers not in (1, 2, 3):
+            raise SimulationError(f"{self.name}: {self.layers} layers; 1, 2 or 3 are possible.")
+        check_count(f"{self.name}: elements_per_bay", self.elements_per_bay)
+        check_number(f"{self.name}: end_length", self.end_length, "m", least=0.0)
+        check_number(f"{self.name}: end_damping", self.end_damping, "1/s", least=0.0)
         required = {1: (), 2: ("sleeper_mass",), 3: ("sleeper_mass", "ballast_mass")}[self.layers]
         for name in required:
             if np.any(getattr(self, name) <= 0.0):
@@ -378,6 +386,9 @@ def uniform_track(
     >>> track.support.size, float(track.pad_stiffness[3])
     (11, 300000000.0)
     """
+    check_number("length", length, "m", above=0.0)
+    check_number("spacing", spacing, "m", above=0.0)
+    check_number("start", start, "m")
     rail = rail or Rail(6.42e6, 60.21, 0.4 * 81e9 * 76.7e-4, 7850 * 3.055e-5, damping=20.0)
     reference = {"pad_stiffness": 300e6, "pad_damping": 30e3, "sleeper_mass": 150.0}
     reference |= {"ballast_stiffness": 90e6, "ballast_damping": 80e3}

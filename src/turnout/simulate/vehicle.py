@@ -11,6 +11,7 @@ import numpy as np
 from turnout.constants import GRAVITY
 from turnout.errors import SimulationError
 from turnout.simulate.force_laws import ForceLaw, PowerLaw
+from turnout.simulate.number_checks import check_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -73,10 +74,11 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         for body in self.bodies:
-            if not body.mass > 0.0 or (body.inertia is not None and not body.inertia > 0.0):
+            if not 0.0 < body.mass < np.inf or (body.inertia is not None and not 0.0 < body.inertia < np.inf):
                 raise SimulationError(
                     f"{self.name}: body {body.name!r} has mass {body.mass!r}, inertia {body.inertia!r}."
                 )
+        check_number(f"{self.name}: gravity", self.gravity, "m/s²")
         for s in self.suspensions:
             if not (s.stiffness >= 0.0 and s.damping >= 0.0):
                 name = self.bodies[s.upper].name
@@ -92,6 +94,10 @@ class Vehicle:
                 raise SimulationError(
                     f"{self.name}: {quantity} of {len(value)} wheels, the train has {len(positions)}."
                 )
+        for wheel, force in enumerate(self.wheel_values("pressing")):
+            check_number(f"{self.name}: pressing of wheel {wheel}", force, "N")
+        for wheel, radius in enumerate(self.wheel_values("radius")):
+            check_number(f"{self.name}: radius of wheel {wheel}", radius, "m", above=0.0)
 
     @cached_property
     def row(self) -> np.ndarray:

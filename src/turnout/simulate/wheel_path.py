@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.simulate.number_checks import check_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -241,6 +242,7 @@ class Corrugation:
 
     def __post_init__(self) -> None:
         _check_length("corrugation", self.start, self.wavelength)
+        check_number(f"corrugation from {self.start:g} m: end", self.end, "m", above=self.start)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
@@ -267,6 +269,10 @@ class WheelFlat:
     length: float
     radius: float
     phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_number(f"flat of wheel {self.wheel}: length", self.length, "m", least=0.0)
+        check_number(f"flat of wheel {self.wheel}: radius", self.radius, "m", above=0.0)
 
     @property
     def depth(self) -> float:
@@ -295,6 +301,9 @@ class OutOfRound:
     order: int
     radius: float
     phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_number(f"out-of-round wheel {self.wheel}: radius", self.radius, "m", above=0.0)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         x = np.asarray(x, dtype=float)
