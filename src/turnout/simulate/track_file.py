@@ -177,6 +177,9 @@ def _track(p: ParameterSet, route: str, routes: tuple[str, ...], seed: int) -> T
     _draw_scatter(p, values, seed)
     elements = p.count("elements_per_bay", 4)
     end = p.optional_mapping_at("absorbing_end").allow_only("length", "rate")
+    for name, unit in (("length", "m"), ("rate", "1/s")) if end else ():
+        if (value := end.number(name, unit)) < 0.0:
+            raise end.error(name, f"{value:g} {unit} is below 0", "Correct it, or leave out the absorbing end")
     return p.build(
         Track,
         _rail(p.mapping_at("rail")),
@@ -250,7 +253,7 @@ def _stretches(
             problem = f"from {start:g} m to {end:g} m lies the middle of no element"
             raise entry.error(None, problem, f"Make it as long as an element, {nodes[1] - nodes[0]:g} m")
         if _route_of(entry, routes, route) == route:
-            yield RailStretch(start, end, _rail(entry.mapping_at("rail")))
+            yield entry.build(RailStretch, start, end, _rail(entry.mapping_at("rail")))
 
 
 def _rail(p: ParameterSet) -> Rail:

@@ -70,7 +70,7 @@ FAULTS = {
         TRACK,
         "length: {value: 9, unit: m",
         "length: {value: -9, unit: m",
-        "-9 m is outside 0.01 to 1000",
+        "-9 m is below 0",
     ),
     "roughness": (
         TRACK,
