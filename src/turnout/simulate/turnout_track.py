@@ -63,6 +63,22 @@ class TurnoutTrack:
         """
         return self.tracks.get(route, self.track)
 
+    def with_moved_supports(self, offset: float) -> TurnoutTrack:
+        """The turnout with all supports elsewhere; rails, surfaces and locations stay.
+
+        Parameters
+        ----------
+        offset : float
+            Distance by which the supports move along the track. [m]
+
+        Returns
+        -------
+        TurnoutTrack
+        """
+        track = replace(self.track, support=self.track.support + offset)
+        tracks = {name: replace(t, support=t.support + offset) for name, t in self.tracks.items()}
+        return replace(self, track=track, tracks=tracks)
+
     def is_divided_at(self, position: float) -> bool:
         """Whether the routes have separate supports at ``position`` [m], as behind a crossing.
 

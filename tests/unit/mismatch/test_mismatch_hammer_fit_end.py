@@ -111,4 +111,4 @@ def test_a_fit_to_all_tests_ends_in_the_deepest_minimum(x):
     case = Vibration(x)
     from_mean = fit_jointly(case, values=fit_jointly(case.with_broad_errors(), iterations=30).values, iterations=30)
     assert (abs(from_mean.values["x"] - x) < 0.01) == (x == 0.4)
-    assert case.fit_from_priors()["x"] == pytest.approx(x, abs=0.01)
+    assert case.fit_from_priors().values["x"] == pytest.approx(x, abs=0.01)

@@ -88,7 +88,7 @@ class TrackCase(PredictedCase):
         """Set all attributes. Accepted effects change the rail that hammer tests give: it is fitted again."""
         start_values = data.start_values
         if accepted.effects and any(o.name in data.frf_pairs for o in data.observations):
-            values = hammer_case(data, predictor, candidates, accepted, cache).fit_from_priors()
+            values = hammer_case(data, predictor, candidates, accepted, cache).fit_from_priors().values
             start_values, predictor = {**start_values, **values}, predictor.recentre(values)
         nuisances = data.site.nuisances(a.passage for a in data.aligned_passages.values())
         super().__init__(predictor, data.observations, nuisances, candidates, accepted, cache(predictor, False))

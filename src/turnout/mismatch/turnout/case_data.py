@@ -21,13 +21,14 @@ from turnout.mismatch.turnout.filed_tests import FiledTests
 from turnout.mismatch.turnout.impact_positions import misplaced_tests
 from turnout.mismatch.turnout.layout_fault import LayoutFault
 from turnout.mismatch.turnout.observed_passages import observe_passages
-from turnout.mismatch.turnout.observed_tests import fit_hammer_start, observe_tests
+from turnout.mismatch.turnout.observed_tests import HammerStart, fit_hammer_start, observe_tests
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit, raw_peak, saturated_channels, without_saturated
 from turnout.mismatch.turnout.site import Site, site_of
+from turnout.mismatch.turnout.support_positions import misplaced_supports
 
 
 @dataclass(frozen=True)
@@ -151,9 +152,9 @@ def case_data(
 ) -> tuple[CaseData, Predictor]:
     """Observations of a campaign, and the predictor of its recordings.
 
-    Channels and impacts that are not where the layout states, and wrong units, are corrected first. Then the rail is
-    fitted to the hammer tests. On that rail passages are simulated, to align the recorded ones and to compute their
-    errors.
+    Channels, impacts and supports that are not where the files state, and wrong units, are corrected first, if track
+    and sensors then fit the hammer tests better. On the fitted rail passages are simulated, to align the recorded ones
+    and to compute their errors.
 
     Parameters
     ----------
@@ -175,36 +176,35 @@ def case_data(
     SimulationError
         No recording can be used, or all of them are reserved.
     """
-    as_filed, is_corrected = campaign, {fault.recording_type for fault in corrected}
-    saturated = saturated_channels(campaign, settings.threshold)
-    campaign = without_saturated(campaign, saturated)
-    site = site_of(campaign)
-    tests = observe_tests(campaign, settings.pair_tolerance, saturated)
-    predictor = Predictor(site, solver).with_recordings(tests.frf_pairs, {})
-    filed = FiledTests(predictor, tests, tuple(test.place for test in campaign.hammer))
-    for fault in _faults_of_tests(filed):
+    is_corrected = {fault.recording_type for fault in corrected}
+    fitted = _fit_tests(campaign, settings, solver)
+    for fault in _faults_of_tests(fitted):
         if fault and fault.recording_type not in is_corrected:
-            return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))
-    predictor, tests, start_values = fit_hammer_start(predictor, tests, campaign.reserved)
-    predictor = predictor.recentre(start_values)
-    passages = observe_passages(campaign, settings.materiality, predictor, start_values, filed.upright_channels)
+            changed = fault.correct(campaign)
+            if _fit_tests(changed, settings, solver).is_better_than(fitted):
+                return case_data(changed, settings, solver, (*corrected, fault))
+    site, tests, start_values = fitted.filed.predictor.site, fitted.start.tests, fitted.start.values
+    predictor = fitted.start.predictor.recentre(start_values)
+    passages = observe_passages(
+        fitted.campaign, settings.materiality, predictor, start_values, fitted.filed.upright_channels
+    )
     for fault in passages.layout_faults:
         if fault and fault.recording_type not in is_corrected:
-            return case_data(fault.correct(as_filed), settings, solver, (*corrected, fault))
+            return case_data(fault.correct(campaign), settings, solver, (*corrected, fault))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:
         raise SimulationError("nothing to diagnose: " + "; ".join(notes))
     data = CaseData(
-        campaign,
+        fitted.campaign,
         settings,
         site,
         tests.frf_pairs,
         passages.aligned,
-        tuple(o for name, o in recordings if name not in campaign.reserved),
-        tuple(o for name, o in recordings if name in campaign.reserved),
+        tuple(o for name, o in recordings if name not in fitted.campaign.reserved),
+        tuple(o for name, o in recordings if name in fitted.campaign.reserved),
         {**start_values, **passages.surface_values},
-        saturated,
+        fitted.saturated,
         passages.unmatched,
         passages.disturbed,
         notes,
@@ -215,10 +215,36 @@ def case_data(
     return data, predictor.with_recordings(data.frf_pairs, data.aligned_passages)
 
 
-def _faults_of_tests(filed: FiledTests) -> Iterator[LayoutFault]:
+@dataclass(frozen=True)
+class _FittedTests:
+    """Hammer tests of a ``campaign`` without its saturated channels: compared with the file, and fitted."""
+
+    campaign: CampaignInput
+    saturated: Mapping[str, SaturationLimit]
+    filed: FiledTests
+    start: HammerStart
+
+    def is_better_than(self, other: _FittedTests) -> bool:
+        """Whether track and sensors fit these tests better; True where no test is fitted."""
+        mine, others = self.start.mean_cost, other.start.mean_cost
+        return mine is None or others is None or mine < others
+
+
+def _fit_tests(campaign: CampaignInput, settings: MismatchSettings, solver: Track1D) -> _FittedTests:
+    saturated = saturated_channels(campaign, settings.threshold)
+    campaign = without_saturated(campaign, saturated)
+    tests = observe_tests(campaign, settings.pair_tolerance, saturated)
+    predictor = Predictor(site_of(campaign), solver).with_recordings(tests.frf_pairs, {})
+    filed = FiledTests(predictor, tests, tuple(test.place for test in campaign.hammer))
+    return _FittedTests(campaign, saturated, filed, fit_hammer_start(predictor, tests, campaign.reserved))
+
+
+def _faults_of_tests(fitted: _FittedTests) -> Iterator[LayoutFault]:
     """What every check of hammer tests finds, in the order in which faults are corrected."""
+    filed = fitted.filed
     yield common_delay(filed)
     yield misplaced_tests(filed)
     yield exchanged_channels("hammer tests", filed.comparisons)
     yield wrong_scale("hammer tests", filed.comparisons)
     yield deviating_tests(list(filed.pairs_by_test), filed.comparisons)
+    yield misplaced_supports(fitted.start, fitted.campaign.reserved)

@@ -18,6 +18,7 @@ from turnout.mismatch.turnout.priors import RECEPTANCE
 
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.turnout.accepted_effects import AcceptedEffects
     from turnout.mismatch.turnout.case_data import CaseData
     from turnout.mismatch.turnout.prediction import PredictionCache, Predictor
@@ -37,8 +38,8 @@ class HammerCase(PredictedCase):
         )
         return broad
 
-    def fit_from_priors(self) -> dict[str, float]:
-        """Values of the nuisances in the deepest of several minima.
+    def fit_from_priors(self) -> Fit:
+        """Fit of the nuisances in the deepest of several minima.
 
         A fit with broad errors leads to the first, and is continued with the actual ones. The cost has further minima,
         in which neighbouring pads share out what they explain together in another way. So fits begin at draws of the
@@ -50,7 +51,7 @@ class HammerCase(PredictedCase):
         for start in self._drawn_starts():
             with suppress(SimulationError):  # it cannot be simulated there
                 fits.append(fit_jointly(self, values=start, iterations=steps))
-        return min(fits, key=lambda f: f.cost).values
+        return min(fits, key=lambda f: f.cost)
 
     def _drawn_starts(self) -> Iterator[dict[str, float]]:
         """Draws of the priors of all nuisances, within their bounds."""

@@ -120,10 +120,23 @@ def _loose_sensors(test: HammerInput, sensors: Sequence[Sensor]) -> list[Sensor]
     return list(accelerometers.values())
 
 
-def fit_hammer_start(
-    predictor: Predictor, tests: ObservedTests, reserved: Collection[str]
-) -> tuple[Predictor, ObservedTests, dict[str, float]]:
+@dataclass(frozen=True)
+class HammerStart:
     """Fit of track and sensors to the hammer tests alone, the start of all fits.
+
+    ``predictor`` has the chairs of a blade that open, and ``tests`` the errors of these chairs. ``values`` are the
+    nuisances of track and sensors by name, and ``mean_cost`` the cost for each fitted sample [nats]: both are empty
+    without a fitted test ({} and None).
+    """
+
+    predictor: Predictor
+    tests: ObservedTests
+    values: dict[str, float]
+    mean_cost: float | None
+
+
+def fit_hammer_start(predictor: Predictor, tests: ObservedTests, reserved: Collection[str]) -> HammerStart:
+    """Fit of track and sensors to the hammer tests alone.
 
     Chairs of a blade that open under impacts are simulated on the track of the file, then on that of the fit.
 
@@ -138,24 +151,19 @@ def fit_hammer_start(
 
     Returns
     -------
-    predictor : Predictor
-        With the chairs that open.
-    tests : ObservedTests
-        With the errors of these chairs.
-    values : dict
-        Nuisances of track and sensors by name; empty without a test.
+    HammerStart
     """
     nuisances = predictor.site.shared_nuisances()
     values = {n.name: n.mean for n in nuisances}
     if all(name in reserved for name, _ in tests.observations):
-        return predictor, tests, {}
+        return HammerStart(predictor, tests, {}, None)
     predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
     for last in [False, True] if predictor.lifting else [True]:
         fitted = [o for name, o in with_errors_of_chairs.observations if name not in reserved]
-        values = HammerCase(predictor, fitted, nuisances).fit_from_priors()
+        fit = HammerCase(predictor, fitted, nuisances).fit_from_priors()
         if not last:
-            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
-    return predictor, with_errors_of_chairs, values
+            predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, fit.values, reserved)
+    return HammerStart(predictor, with_errors_of_chairs, fit.values, fit.cost / sum(o.data.size for o in fitted))
 
 
 def _with_lifting_chairs(

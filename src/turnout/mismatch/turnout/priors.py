@@ -28,6 +28,7 @@ MINIMA = "decisions/minima-of-hammer-fits.md"
 GUIDE = "mismatch.md"
 SWITCH_PANELS = "decisions/switch-panels.md"
 CHANNELS = "decisions/identity-of-channels.md"
+SUPPORTS = "decisions/positions-of-supports.md"
 KNOTHE, OSCARSSON = "Knothe and Grassie 1993", "Oscarsson 2002"
 
 
@@ -342,6 +343,16 @@ class ChannelPriors:
 
 
 @dataclass(frozen=True)
+class SupportPositionPriors:
+    """Where all supports are, from the fits to the hammer tests."""
+
+    step: float = prior(0.1, "m", "from one trial position of all supports to the next", SUPPORTS)
+    min_gain: float = prior(
+        6.0, "nats", "by which hammer tests fit better with supports a step from the file's: the lead of a name",
+        SUPPORTS)
+
+
+@dataclass(frozen=True)
 class SaturationPriors:
     """Saturated channels, from peaks of impacts and of passages."""
 
@@ -398,5 +409,6 @@ PASSAGE = PassagePriors()
 SIMULATION = SimulationPriors()
 ALIGNMENT = AlignmentPriors()
 CHANNELS_CHECK = ChannelPriors()
+SUPPORT_POSITIONS = SupportPositionPriors()
 SATURATION = SaturationPriors()
 DISTURBANCE = DisturbancePriors()

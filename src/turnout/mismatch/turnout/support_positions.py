@@ -1,0 +1,136 @@
+"""Supports that are not where the track file has them, as the hammer tests show.
+
+A track file states where the first support is and how far apart they are. An error in either moves all supports among
+the sensors by the same distance, of up to half a bay. Pads, sleepers and ballast cannot explain that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from turnout.mismatch.engine.fit import Fit
+from turnout.mismatch.engine.map_fit import fit_jointly
+from turnout.mismatch.engine.thresholds import THRESHOLDS
+from turnout.mismatch.turnout.campaign import CampaignInput
+from turnout.mismatch.turnout.hammer_case import HammerCase
+from turnout.mismatch.turnout.observed_tests import HammerStart
+from turnout.mismatch.turnout.prediction import Predictor
+from turnout.mismatch.turnout.priors import SUPPORT_POSITIONS
+
+
+@dataclass(frozen=True)
+class MisplacedSupports:
+    """All supports are ``offset`` further along the track than in its file [m]; 0: where the file has them."""
+
+    offset: float
+    recording_type = "positions of the supports"
+
+    def __bool__(self) -> bool:
+        return self.offset != 0.0
+
+    def sentences(self) -> list[str]:
+        """What was found, what was done, and what to do.
+
+        Returns
+        -------
+        list of str
+            One text without its full stop.
+        """
+        direction = "further along the track" if self.offset > 0.0 else "less far along the track"
+        return [
+            f"The hammer tests agree with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than in the "
+            f"track file. The diagnosis takes them there. Measure the distance of sensors and impacts to a sleeper. If "
+            f"they are where their files have them, add {self.offset:.2f} m to `from` of `extent` in the track file"
+        ]
+
+    def correct(self, campaign: CampaignInput) -> CampaignInput:
+        """The campaign on a track whose supports are where the hammer tests agree with them.
+
+        Parameters
+        ----------
+        campaign : CampaignInput
+            As the files describe it.
+
+        Returns
+        -------
+        CampaignInput
+        """
+        return replace(campaign, turnout=campaign.turnout.with_moved_supports(self.offset))
+
+
+class _OffsetFits:
+    """Fits to hammer tests with all supports moved; all begin at the same values of the nuisances."""
+
+    def __init__(self, start: HammerStart, reserved: Collection[str]):
+        self.predictor, self.values = start.predictor, start.values
+        self.pairs = start.tests.frf_pairs
+        self.observations = [o for name, o in start.tests.observations if name not in reserved]
+        self.fits: dict[float, Fit] = {}
+
+    def fit(self, offset: float) -> Fit:
+        """Fit with the supports moved by ``offset``, rounded to 1 cm. [m]"""
+        offset = round(offset, 2)
+        if offset not in self.fits:
+            site = self.predictor.site
+            turnout = site.nominal.turnout.with_moved_supports(offset)
+            moved = replace(site, nominal=replace(site.nominal, turnout=turnout))
+            predictor = Predictor(moved, self.predictor.solver).with_recordings(self.pairs, {})
+            predictor.lifting = self.predictor.lifting
+            case = HammerCase(predictor, self.observations, moved.shared_nuisances())
+            self.fits[offset] = fit_jointly(case, values=self.values, iterations=THRESHOLDS.max_hammer_steps)
+        return self.fits[offset]
+
+    def cost(self, offset: float) -> float:
+        """Cost of ``fit``: minus twice the log probability. [nats]"""
+        return self.fit(offset).cost
+
+    def gain(self, offset: float) -> float:
+        """Evidence for this offset against none, without the channel that gains most. [nats]
+
+        Supports elsewhere show in every channel. What shows in one is a fault of that channel.
+        """
+        filed, moved = self.fit(0.0), self.fit(offset)
+        by_channel: dict[str, float] = defaultdict(float)
+        for o, before, after in zip(self.observations, filed.white, moved.white):
+            by_channel[self.pairs[o.name].channel] += float(before @ before - after @ after)
+        without_largest = sum(by_channel.values()) - max(by_channel.values())
+        return 0.5 * min(filed.cost - moved.cost, without_largest / max(filed.scale.values()) ** 2)
+
+
+def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> MisplacedSupports:
+    """Where the hammer tests have the supports, if that is clearly not where the file has them.
+
+    Fits with all supports a step to either side are compared with the one of the file. If one is clearly better, the
+    steps go on as long as they improve the fit. A parabola through three costs gives the offset.
+
+    Parameters
+    ----------
+    start : HammerStart
+        Fit with the supports of the file.
+    reserved : collection of str
+        Names of the tests that no fit uses.
+
+    Returns
+    -------
+    MisplacedSupports
+        False if the supports are where the file has them, or if nothing shows where they are.
+    """
+    if not start.values:
+        return MisplacedSupports(0.0)
+    fits, step = _OffsetFits(start, reserved), SUPPORT_POSITIONS.step
+    half_bay = 0.5 * float(np.median(np.diff(start.predictor.site.nominal.turnout.track.support)))
+    best = min((step, -step), key=fits.cost)
+    if fits.gain(best) < SUPPORT_POSITIONS.min_gain:
+        return MisplacedSupports(0.0)
+    side = math.copysign(step, best)
+    while abs(best) < half_bay and fits.cost(best + side) < fits.cost(best):
+        best += side
+    before, at, behind = (fits.cost(best + k * 0.5 * step) for k in (-1, 0, 1))
+    curvature = before - 2.0 * at + behind
+    vertex = 0.25 * step * (before - behind) / curvature if curvature > 0.0 else 0.0
+    return MisplacedSupports(round(best + float(np.clip(vertex, -0.5 * step, 0.5 * step)), 2))

@@ -1,0 +1,90 @@
+"""Supports elsewhere than in the track file: simulated tests on one track, diagnosed with the file of another."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from turnout.config.settings.mismatch import MismatchSettings
+from turnout.mismatch.turnout.case_data import case_data
+from turnout.mismatch.turnout.passage_model import Track1D
+from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
+from turnout.mismatch.turnout.support_positions import MisplacedSupports
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return measured_campaign(small_plan((15.0,), passages=False))
+
+
+def data_of(campaign):
+    return case_data(campaign, MismatchSettings(), Track1D())[0]
+
+
+def with_file_off(campaign, distance):
+    """The campaign with a track file whose supports are ``distance`` further along the track than the true ones."""
+    return replace(campaign, turnout=campaign.turnout.with_moved_supports(distance))
+
+
+def with_resonant_mounting(campaign, name, frequency, quality):
+    r"""The response of a mass on a spring and damper: (:math:`2 \zeta \omega_0 s + \omega_0^2`) over its polynomial."""
+    omega = 2.0 * np.pi * frequency
+
+    def change(recording):
+        b, a = signal.bilinear([omega / quality, omega**2], [1.0, omega / quality, omega**2], recording.rate)
+        samples = recording.samples.copy()
+        for row in recording.of_quantity("acceleration"):
+            if recording.channels[row].name == name:
+                samples[row] = signal.lfilter(b, a, samples[row])
+        return replace(recording, samples=samples)
+
+    return campaign.with_recordings("hammer tests", change)
+
+
+@pytest.mark.parametrize("distance", [0.1, 0.2, -0.15, 0.28])
+def test_the_supports_are_taken_where_they_are(campaign, distance):
+    data = data_of(with_file_off(campaign, distance))
+    (fault,) = data.layout_faults
+    # supports half a bay off are the same in either direction; 2 cm: the prior of the position of a sensor
+    errors = [abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)]
+    assert min(errors) <= 0.02
+    (sentence,) = fault.sentences()
+    assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"add {fault.offset:.2f} m" in sentence
+    moved = data.site.nominal.turnout.track.support
+    beside = (moved - campaign.turnout.track.support[0] + 0.3) % 0.6 - 0.3
+    np.testing.assert_allclose(beside, beside[0], atol=1e-9)
+    assert abs(beside[0]) <= 0.02
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.02, -0.03])
+def test_supports_at_their_place_stay_there(campaign, distance):
+    assert data_of(with_file_off(campaign, distance)).layout_faults == ()
+
+
+@pytest.mark.parametrize(("frequency", "quality"), [(180.0, 6.6), (320.0, 10.0)])
+def test_a_fault_of_one_channel_moves_no_support(campaign, frequency, quality):
+    faulty = with_resonant_mounting(campaign, campaign.sensors[0].name, frequency, quality)
+    assert MisplacedSupports not in {type(fault) for fault in data_of(faulty).layout_faults}
+
+
+@pytest.mark.parametrize(("pad", "ballast", "damping"), [(1.6, 0.6, 1.0), (1.6, 1.6, 2.5), (0.6, 1.6, 1.0)])
+def test_track_with_other_values_than_filed_is_no_fault_of_the_layout(campaign, pad, ballast, damping):
+    """Two standard deviations of the priors. Compared with the file alone, a delay and a wrong scale explain them."""
+    track = campaign.turnout.track
+    filed = replace(
+        track,
+        pad_stiffness=pad * track.pad_stiffness,
+        ballast_stiffness=ballast * track.ballast_stiffness,
+        pad_damping=damping * track.pad_damping,
+        ballast_damping=damping * track.ballast_damping,
+    )
+    assert data_of(replace(campaign, turnout=replace(campaign.turnout, track=filed))).layout_faults == ()
+
+
+def test_only_the_supports_move(campaign):
+    turnout = campaign.turnout
+    moved = turnout.with_moved_supports(0.125)
+    np.testing.assert_allclose(moved.track.support, turnout.track.support + 0.125, atol=1e-12)
+    assert moved.track.stretches == turnout.track.stretches and moved.locations == turnout.locations
+    assert moved.routes == turnout.routes
