@@ -46,15 +46,14 @@ def with_resonant_mounting(campaign, name, frequency, quality):
 def test_the_supports_are_taken_where_they_are(campaign, distance):
     data = data_of(with_file_off(campaign, distance))
     (fault,) = data.layout_faults
-    # supports half a bay off are the same in either direction; 2 cm: the prior of the position of a sensor
-    errors = [abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)]
-    assert min(errors) <= 0.02
+    # the same a bay further; the prior of a sensor's position covers what is left with one and a half deviations of 2 cm
+    assert min(abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)) <= 0.03
     (sentence,) = fault.sentences()
     assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"add {fault.offset:.2f} m" in sentence
     moved = data.site.nominal.turnout.track.support
     beside = (moved - campaign.turnout.track.support[0] + 0.3) % 0.6 - 0.3
     np.testing.assert_allclose(beside, beside[0], atol=1e-9)
-    assert abs(beside[0]) <= 0.02
+    assert abs(beside[0]) <= 0.03
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.02, -0.03])

@@ -346,10 +346,11 @@ class ChannelPriors:
 class SupportPositionPriors:
     """Where all supports are, from the fits to the hammer tests."""
 
-    step: float = prior(0.1, "m", "from one trial position of all supports to the next", SUPPORTS)
+    n_positions: int = prior(6, "positions", "of all supports in a bay that are tried", "numerical")
     min_gain: float = prior(
-        6.0, "nats", "by which hammer tests fit better with supports a step from the file's: the lead of a name",
-        SUPPORTS)
+        6.0, "nats", "by which hammer tests fit better with all supports elsewhere: the lead of a name", SUPPORTS)
+    min_explained: float = prior(
+        0.8, "-", "of the variance of this evidence along a bay, by one wave in the bay", SUPPORTS)
 
 
 @dataclass(frozen=True)

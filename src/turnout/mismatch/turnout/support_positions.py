@@ -6,7 +6,6 @@ the sensors by the same distance, of up to half a bay. Pads, sleepers and ballas
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -85,10 +84,6 @@ class _OffsetFits:
             self.fits[offset] = fit_jointly(case, values=self.values, iterations=THRESHOLDS.max_hammer_steps)
         return self.fits[offset]
 
-    def cost(self, offset: float) -> float:
-        """Cost of ``fit``: minus twice the log probability. [nats]"""
-        return self.fit(offset).cost
-
     def gain(self, offset: float) -> float:
         """Evidence for this offset against none, without the channel that gains most. [nats]
 
@@ -103,10 +98,13 @@ class _OffsetFits:
 
 
 def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> MisplacedSupports:
-    """Where the hammer tests have the supports, if that is clearly not where the file has them.
+    r"""Where the hammer tests have the supports, if that is clearly not where the file has them.
 
-    Fits with all supports a step to either side are compared with the one of the file. If one is clearly better, the
-    steps go on as long as they improve the fit. A parabola through three costs gives the offset.
+    The evidence is the same for supports that move by a whole bay, so supports elsewhere give one wave in each bay:
+
+    .. math:: E(d) \approx m + A \cos(2 \pi (d - d_0) / b)
+
+    An effect that the fit lacks can give evidence for supports elsewhere as well, but not such a wave.
 
     Parameters
     ----------
@@ -122,15 +120,16 @@ def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> Misplac
     """
     if not start.values:
         return MisplacedSupports(0.0)
-    fits, step = _OffsetFits(start, reserved), SUPPORT_POSITIONS.step
-    half_bay = 0.5 * float(np.median(np.diff(start.predictor.site.nominal.turnout.track.support)))
-    best = min((step, -step), key=fits.cost)
-    if fits.gain(best) < SUPPORT_POSITIONS.min_gain:
+    fits, n = _OffsetFits(start, reserved), SUPPORT_POSITIONS.n_positions
+    bay = float(np.median(np.diff(start.predictor.site.nominal.turnout.track.support)))
+    step = bay / n
+    if max(fits.gain(step), fits.gain(-step)) < SUPPORT_POSITIONS.min_gain:
         return MisplacedSupports(0.0)
-    side = math.copysign(step, best)
-    while abs(best) < half_bay and fits.cost(best + side) < fits.cost(best):
-        best += side
-    before, at, behind = (fits.cost(best + k * 0.5 * step) for k in (-1, 0, 1))
-    curvature = before - 2.0 * at + behind
-    vertex = 0.25 * step * (before - behind) / curvature if curvature > 0.0 else 0.0
-    return MisplacedSupports(round(best + float(np.clip(vertex, -0.5 * step, 0.5 * step)), 2))
+    turns = np.arange(n) / n
+    evidence = np.array([fits.gain(bay * (x - round(x))) for x in turns])
+    wave = 2.0 * np.mean(evidence * np.exp(2j * np.pi * turns))
+    offset = bay * float(np.angle(wave)) / (2.0 * np.pi)
+    explained = 0.5 * abs(wave) ** 2 / float(np.var(evidence))
+    if explained < SUPPORT_POSITIONS.min_explained or abs(offset) < 0.5 * step:
+        return MisplacedSupports(0.0)
+    return MisplacedSupports(round(offset, 2))
