@@ -46,7 +46,7 @@ def with_resonant_mounting(campaign, name, frequency, quality):
 def test_the_supports_are_taken_where_they_are(campaign, distance):
     data = data_of(with_file_off(campaign, distance))
     (fault,) = data.layout_faults
-    # the same a bay further; the prior of a sensor's position covers what is left with one and a half deviations of 2 cm
+    # the same a bay further; 3 cm: one and a half standard deviations of the prior of a sensor's position
     assert min(abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)) <= 0.03
     (sentence,) = fault.sentences()
     assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"add {fault.offset:.2f} m" in sentence
