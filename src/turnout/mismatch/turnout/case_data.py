@@ -224,10 +224,10 @@ class _FittedTests:
     filed: FiledTests
     start: HammerStart
 
-    def is_better_than(self, other: _FittedTests) -> bool:
+    def is_better_than(self, reference: _FittedTests) -> bool:
         """Whether track and sensors fit these tests better; True where no test is fitted."""
-        mine, others = self.start.mean_cost, other.start.mean_cost
-        return mine is None or others is None or mine < others
+        cost, reference_cost = self.start.mean_cost, reference.start.mean_cost
+        return cost is None or reference_cost is None or cost < reference_cost
 
 
 def _fit_tests(campaign: CampaignInput, settings: MismatchSettings, solver: Track1D) -> _FittedTests:
