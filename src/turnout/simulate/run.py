@@ -162,7 +162,10 @@ def run(
 
 
 def _stand_in(prepared: Prepared, drive: Drive) -> tuple[float, float, float]:
-    position, cache = float(prepared.matrices.node[0]) + drive.margin + drive.entry, prepared.stand_ins
+    """Stand-in of the track at the end where the train enters."""
+    inward, cache = drive.margin + drive.entry, prepared.stand_ins
+    first, last = float(prepared.matrices.node[0]), float(prepared.matrices.node[-1])
+    position = first + inward if drive.direction > 0 else last - inward
     if position not in cache:
         cache[position] = stand_in_of(prepared, position)
     return cache[position]
