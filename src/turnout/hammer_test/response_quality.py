@@ -126,9 +126,8 @@ def _largest_values(impacts: Sequence[Impact], responses: Sequence[np.ndarray], 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.
 ONSET_SHARE = 0.1
 MAX_LEAD, MAX_LAG = 3, 5  # samples by which filters of two channels move a response forwards and backwards
-QUIET_QUANTILE = (
-    0.25  # of the magnitudes before the force: it is noise even if a response fills up to half of that time
-)
+# Quantile of the magnitudes before the force: it is noise even if a response fills up to half of that time.
+QUIET_QUANTILE = 0.25
 NORMAL_QUANTILE = 0.31864  # magnitude below which a quarter of a normal distribution lies, in standard deviations
 MIN_QUIET_SAMPLES = 8  # before the force; with fewer the noise is that of the end of the record
 # A response that begins before the force lies in the samples from which the noise is measured.
@@ -211,11 +210,16 @@ def response_lag(impact: Impact) -> int | None:
 
 
 def _quiet_noise(impact: Impact) -> float:
-    """Standard deviation of the response before the force, from its quieter samples. [m/s²]"""
+    """Standard deviation of the response before the force, from its quieter samples. [m/s²]
+
+    It is at least that of rounding to the smallest step: of a channel that changes by single steps, most samples are
+    equal.
+    """
     before = impact.acceleration[: impact.onset]
     if before.size < MIN_QUIET_SAMPLES:
         return impact.noise_acceleration
-    return float(np.quantile(np.abs(before - np.median(before)), QUIET_QUANTILE)) / NORMAL_QUANTILE
+    rounding = float(np.min(np.diff(np.unique(before)), initial=np.ptp(before))) / np.sqrt(12.0)
+    return max(float(np.quantile(np.abs(before - np.median(before)), QUIET_QUANTILE)) / NORMAL_QUANTILE, rounding)
 
 
 def _with_rejection(impacts: Sequence[Impact], rejection: Rejection) -> tuple[Impact, ...]:
