@@ -93,6 +93,21 @@ class Blade:
             return None
         return replace(self, end=min(max(self.end, start), end))
 
+    def with_moved_end(self, offset: float) -> Blade:
+        """The blade whose model ends elsewhere, not before the heel.
+
+        Parameters
+        ----------
+        offset : float
+            Distance by which the end moves along the track. [m]
+
+        Returns
+        -------
+        Blade
+        """
+        last = max if self.direction > 0 else min
+        return replace(self, end=last(self.end + offset, self.heel))
+
     def nodes(self, track: Track) -> tuple[int, int]:
         """First and last node of the blade on ``track``, in the order of positions.
 

@@ -196,9 +196,7 @@ def _bodies(course: Course, prepared: Prepared) -> VehicleArrays:
 
 
 def _later(course: Course, prepared: Prepared, time: float, n_step: int) -> tuple[PortArrays, RunArrays]:
-    """Ports and run as seen from ``time``, which is time 0 of the march."""
-    if time == 0.0:
-        return course.ports, course.run
+    """Ports and run as seen from ``time``, which is time 0 of the march, with the given forces of steps of its size."""
     travelled = np.where(course.ports.body >= 0, course.run.speed * time, 0.0)
     forces = pulse_forces(course.pulses, prepared, n_step, time)
     return course.ports._replace(place=course.ports.place + travelled), course.run._replace(pulse_force=forces)

@@ -66,6 +66,8 @@ class TurnoutTrack:
     def with_moved_supports(self, offset: float) -> TurnoutTrack:
         """The turnout with all supports elsewhere; rails, surfaces and locations stay.
 
+        The model of a blade ends at a support, and moves its end with that; toe and heel stay.
+
         Parameters
         ----------
         offset : float
@@ -74,10 +76,19 @@ class TurnoutTrack:
         Returns
         -------
         TurnoutTrack
+
+        Raises
+        ------
+        SimulationError
+            If a blade is no longer on its track.
         """
-        track = replace(self.track, support=self.track.support + offset)
-        tracks = {name: replace(t, support=t.support + offset) for name, t in self.tracks.items()}
-        return replace(self, track=track, tracks=tracks)
+
+        def moved(track: Track) -> Track:
+            blade = track.blade and track.blade.with_moved_end(offset)
+            return replace(track, support=track.support + offset, blade=blade)
+
+        tracks = {name: moved(track) for name, track in self.tracks.items()}
+        return replace(self, track=moved(self.track), tracks=tracks)
 
     def is_divided_at(self, position: float) -> bool:
         """Whether the routes have separate supports at ``position`` [m], as behind a crossing.

@@ -7,10 +7,14 @@ import pytest
 from scipy import signal
 
 from turnout.config.settings.mismatch import MismatchSettings
+from turnout.errors import SimulationError
 from turnout.mismatch.turnout.case_data import case_data
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.support_positions import MisplacedSupports
+from turnout.mismatch.turnout.zone import zone_of
+from turnout.simulate.blade import Blade
+from turnout.simulate.turnout_track import TurnoutTrack
 
 
 @pytest.fixture(scope="module")
@@ -87,3 +91,37 @@ def test_only_the_supports_move(campaign):
     np.testing.assert_allclose(moved.track.support, turnout.track.support + 0.125, atol=1e-12)
     assert moved.track.stretches == turnout.track.stretches and moved.locations == turnout.locations
     assert moved.routes == turnout.routes
+
+
+@pytest.mark.parametrize("offset", [0.3, -0.3])
+@pytest.mark.parametrize(("toe", "heel", "end"), [(20.1, 25.2, 47.9), (27.9, 22.8, 0.2)])
+def test_a_blade_that_ends_with_the_zone_ends_with_its_moved_supports(campaign, toe, heel, end, offset):
+    """Behind the zone of a hammer test nothing is modelled: there blade and rail have one node in common."""
+    turnout, rail = campaign.turnout, campaign.turnout.track.rail
+    track = turnout.track.with_(blade=Blade(toe, heel, end, rail, 3e8, 3e4))
+    turnout = zone_of(replace(turnout, track=track, tracks={"branch": track}), campaign.positions()).turnout
+    moved = turnout.with_moved_supports(offset)
+    for changed in (moved.track, moved.track_of("branch")):
+        np.testing.assert_allclose(changed.support, turnout.track.support + offset, atol=1e-12)
+        assert (changed.blade.toe, changed.blade.heel) == (toe, heel)
+        assert changed.blade.end == pytest.approx(changed.end if end > toe else changed.start, abs=1e-9)
+
+
+def test_a_blade_never_ends_before_its_heel(campaign):
+    track = campaign.turnout.track
+    blade = Blade(20.1, 30.0, 30.0, track.rail, 3e8, 3e4)
+    moved = replace(campaign.turnout, track=track.with_(blade=blade)).with_moved_supports(-0.2)
+    assert moved.track.blade == blade
+
+
+def test_no_support_is_elsewhere_where_that_cannot_be_simulated(campaign, monkeypatch):
+    """As with the toe of a blade that would be outside its track."""
+    tried = []
+
+    def fail(turnout, offset):
+        tried.append(offset)
+        raise SimulationError("the toe is not on the track")
+
+    distant = with_file_off(campaign, 0.2)
+    monkeypatch.setattr(TurnoutTrack, "with_moved_supports", fail)
+    assert data_of(distant).layout_faults == () and tried

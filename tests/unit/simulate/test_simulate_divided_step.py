@@ -103,3 +103,13 @@ def test_a_divided_step_changes_no_other_step(forces):
         if a.size:
             scale = np.max(np.abs(b), axis=1, keepdims=True)
             assert np.max(np.abs(a - b)[:, 101:] / scale) < 2e-3
+
+
+def test_a_divided_first_step_has_the_given_force_of_its_own_times():
+    """A force that falls to 1/e within the first step gives that step and its halves the same impulse."""
+    prepared = prepare(uniform_track(6.0), 5e-5)
+    given = [(3.0, lambda t: 8e4 * np.exp(-t / 5e-5))]
+    whole, divided = (
+        run(prepared, 0.002, [Probe(3.0, 0)], pulses=given, marcher=marcher) for marcher in (march, Interrupted(0))
+    )
+    assert divided.signals[0, 10:] == pytest.approx(whole.signals[0, 10:], rel=0.01)

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.errors import SimulationError
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -42,9 +44,9 @@ class MisplacedSupports:
         """
         direction = "further along the track" if self.offset > 0.0 else "less far along the track"
         return [
-            f"The hammer tests agree with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than in the "
+            f"The hammer tests agree better with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than in the "
             f"track file. The diagnosis takes them there. Measure the distance of sensors and impacts to a sleeper. If "
-            f"they are where their files have them, add {self.offset:.2f} m to `from` of `extent` in the track file"
+            f"sensors and impacts are where their files have them, add {self.offset:.2f} m to `from` of `extent` in the track file"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
@@ -116,20 +118,27 @@ def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> Misplac
     Returns
     -------
     MisplacedSupports
-        False if the supports are where the file has them, or if nothing shows where they are.
+        False if the supports are where the file has them, or if nothing shows where they are: no test, tests of one
+        channel, or a blade that supports elsewhere do not carry.
     """
-    if not start.values:
-        return MisplacedSupports(0.0)
-    fits, n = _OffsetFits(start, reserved), SUPPORT_POSITIONS.n_positions
-    bay = float(np.median(np.diff(start.predictor.site.nominal.turnout.track.support)))
+    with suppress(SimulationError):  # the track cannot be simulated with its supports elsewhere
+        if start.values:
+            return MisplacedSupports(_offset(_OffsetFits(start, reserved)))
+    return MisplacedSupports(0.0)
+
+
+def _offset(fits: _OffsetFits) -> float:
+    """Distance by which all supports are elsewhere; 0 where that is not clear. [m]"""
+    n = SUPPORT_POSITIONS.n_positions
+    bay = float(np.median(np.diff(fits.predictor.site.nominal.turnout.track.support)))
     step = bay / n
     if max(fits.gain(step), fits.gain(-step)) < SUPPORT_POSITIONS.min_gain:
-        return MisplacedSupports(0.0)
+        return 0.0
     turns = np.arange(n) / n
     evidence = np.array([fits.gain(bay * (x - round(x))) for x in turns])
     wave = 2.0 * np.mean(evidence * np.exp(2j * np.pi * turns))
     offset = bay * float(np.angle(wave)) / (2.0 * np.pi)
     explained = 0.5 * abs(wave) ** 2 / float(np.var(evidence))
     if explained < SUPPORT_POSITIONS.min_explained or abs(offset) < 0.5 * step:
-        return MisplacedSupports(0.0)
-    return MisplacedSupports(round(offset, 2))
+        return 0.0
+    return round(offset, 2)
