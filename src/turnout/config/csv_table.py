@@ -77,10 +77,14 @@ class Cells(dict):
 
 @dataclass(frozen=True)
 class CsvTable:
-    """``rows`` are (line, cells); ``faults`` are errors of the header despite which the rows can be read."""
+    """``rows`` are (line, cells); ``faults`` are errors of the header despite which the rows can be read.
+
+    ``separator`` is the mark between its cells.
+    """
 
     rows: tuple[tuple[int, Cells], ...]
     faults: tuple[TableError, ...]
+    separator: str
 
 
 def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, allow_others: bool = False) -> CsvTable:
@@ -132,7 +136,7 @@ def read_csv(path: Path, name: str, columns: tuple[str, ...], n_required: int, a
         for (k, title), start in zip(enumerate(titles), _cell_columns(header, separator))
         if (fault := _title_problem(title, titles, k, columns, allow_others))
     ]
-    return CsvTable(tuple((n, _cells(line, titles, separator)) for n, line in lines[1:]), tuple(faults))
+    return CsvTable(tuple((n, _cells(line, titles, separator)) for n, line in lines[1:]), tuple(faults), separator)
 
 
 def row_problem(cells: Mapping) -> tuple[str, str, str] | None:

@@ -72,8 +72,7 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
             f"no row for campaign {day}, of which there are {files}: it counts as measured at noon, without a rail "
             "temperature"
         )
-        mark = next((cells.separator for _, cells in table.rows), ",")
-        remedy = f"Add a line '{mark.join((day, '<start in UTC>', '<rail temperature in °C>'))}'"
+        remedy = f"Add a line '{table.separator.join((day, '<start in UTC>', '<rail temperature in °C>'))}'"
         yield ReadError(name, "line 1", finding, remedy)
 
 

@@ -110,10 +110,11 @@ def test_a_campaign_without_files_and_files_without_a_campaign_are_reported(raw,
     ]
 
 
-def test_the_line_to_add_has_the_separator_of_the_table(raw, capsys):
-    rows = "campaign;started_at_utc;rail_temperature_c\n2024-05-13;2024-05-13T09:00;12,5\n"
-    (raw / "campaigns.csv").write_text(f"sep=;\n{rows}")
-    (line,) = check_lines(capsys)[1]
+@pytest.mark.parametrize("rows", ["2024-05-13;2024-05-13T09:00;12,5\n", ""])
+def test_the_line_to_add_has_the_separator_of_the_table(raw, capsys, rows):
+    """Also of a table that has its header alone."""
+    (raw / "campaigns.csv").write_text(f"sep=;\ncampaign;started_at_utc;rail_temperature_c\n{rows}")
+    line = check_lines(capsys)[1][-1]
     assert line.endswith("Add a line '2024-09-02;<start in UTC>;<rail temperature in °C>'.")
 
 

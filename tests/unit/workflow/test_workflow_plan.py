@@ -114,8 +114,8 @@ def test_a_file_of_a_kind_that_the_layout_lacks_is_told_from_a_misspelt_name(fle
     hammer, passages = rest.split("passages:\n", 1)
     layout.write_text(sections + {"passages": f"hammer:\n{hammer}", "hammer": f"passages:\n{passages}"}[kind])
     texts = remedies(fleet, "t1")
-    assert texts and all(f", or describe its {kind} in the layout 'main'. Remove it if" in text for text in texts)
-    assert not any(f"describe its {other}" in text for text in texts)
+    assert texts and all(f", or add the part '{kind}' to the layout 'main'. Remove it if" in text for text in texts)
+    assert not any(f"add the part '{other}'" in text for text in texts)
 
 
 def test_a_link_out_of_the_raw_root_is_not_followed(fleet, tmp_path):
