@@ -145,7 +145,7 @@ def judge_causality(impacts: Sequence[Impact], response: str, is_track: bool = F
     ----------
     impacts : sequence of Impact
         All impacts of a test. The accepted ones are measured, and those that only their noise rejects: a response
-        before the force is taken for noise.
+        before the force is taken for noise. The latter decide only where none is accepted, as it may be noise.
     response : str
         Name of the response's channel, for the message.
     is_track : bool
@@ -160,8 +160,9 @@ def judge_causality(impacts: Sequence[Impact], response: str, is_track: bool = F
     lags = [(i, lag) for i in measured if (lag := response_lag(i)) is not None]
     if not lags:
         return tuple(impacts)
-    median_lag = float(np.median([lag for _, lag in lags]))
-    times = [0.5 * _rise(i) if is_track else i.contact * i.rate for i, _ in lags]
+    deciding = [(i, lag) for i, lag in lags if i.accepted] or lags
+    median_lag = float(np.median([lag for _, lag in deciding]))
+    times = [0.5 * _rise(i) if is_track else i.contact * i.rate for i, _ in deciding]
     latest = float(np.median(times)) + MAX_LAG
     if -MAX_LEAD <= median_lag <= latest:
         return tuple(impacts)

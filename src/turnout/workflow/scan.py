@@ -292,7 +292,9 @@ def _unmatched_files(
         remedies = [f"Rename it after {pattern_words}"]
         if field == "section":
             remedies.append(f"add its section to the layout {turnout.layout!r}")
-        remedies += [f"add the part {branch!r} to the layout {turnout.layout!r}" for branch in _missing_branches(turnout)]
+        remedies += [
+            f"add the part {branch!r} to the layout {turnout.layout!r}" for branch in _missing_branches(turnout)
+        ]
         remedy = f"{', or '.join(remedies)}. Remove it if it is no recording"
         finding = "its name follows no pattern of the layout" + (f": {problem}" if problem else "")
         if not field and (likest := get_close_matches(inside.lower(), NOTE_FILES, 1, MIN_LIKENESS)):

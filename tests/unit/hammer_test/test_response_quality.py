@@ -139,6 +139,16 @@ def test_noise_before_the_force_stays_noise():
         assert all(i.rejections[0].reason in ("noisy", "dead_channel") for i in impacts)
 
 
+def test_a_knock_before_most_impacts_is_no_fault_of_the_others():
+    """15 ms before the force the rail shakes with 0.45 of the peak for 9 ms in three of five impacts."""
+    recordings = impacts_on_a_mass(RATE, 0.0, 30e-3)
+    for r in recordings[:3]:
+        start, n = round(15e-3 * RATE), round(9e-3 * RATE)
+        r.samples[1, start : start + n] += 0.45 * np.abs(r.samples[1]).max() * np.sin(np.arange(n))
+    impacts = find_track_impacts(recordings, "force", "rail", ReceptanceSettings())
+    assert [[r.reason for r in i.rejections] for i in impacts] == [["noisy"]] * 3 + [[]] * 2
+
+
 @pytest.mark.parametrize("sd", [0.3, 0.6, 1.5])
 def test_a_dead_channel_that_changes_by_single_steps_has_no_lag(sd):
     """Noise of ``sd`` steps of the converter, rounded to it: a quarter of the samples or more are exactly 0."""

@@ -44,9 +44,10 @@ class MisplacedSupports:
         """
         direction = "further along the track" if self.offset > 0.0 else "less far along the track"
         return [
-            f"The hammer tests agree better with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than in the "
-            f"track file. The diagnosis takes them there. Measure the distance of sensors and impacts to a sleeper. If "
-            f"sensors and impacts are where their files have them, add {self.offset:.2f} m to `from` of `extent` in the track file"
+            f"The hammer tests agree better with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than "
+            "in the track file. The diagnosis takes them there. Measure the distance of sensors and impacts to a "
+            f"sleeper. If sensors and impacts are where their files have them, add {self.offset:.2f} m to `from` of "
+            "`extent` in the track file"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
