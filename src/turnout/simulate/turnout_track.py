@@ -83,12 +83,12 @@ class TurnoutTrack:
             If a blade is no longer on its track.
         """
 
-        def moved(track: Track) -> Track:
+        def with_offset(track: Track) -> Track:
             blade = track.blade and track.blade.with_moved_end(offset)
             return replace(track, support=track.support + offset, blade=blade)
 
-        tracks = {name: moved(track) for name, track in self.tracks.items()}
-        return replace(self, track=moved(self.track), tracks=tracks)
+        tracks = {name: with_offset(track) for name, track in self.tracks.items()}
+        return replace(self, track=with_offset(self.track), tracks=tracks)
 
     def is_divided_at(self, position: float) -> bool:
         """Whether the routes have separate supports at ``position`` [m], as behind a crossing.
