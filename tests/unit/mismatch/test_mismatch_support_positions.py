@@ -53,7 +53,7 @@ def test_the_supports_are_taken_where_they_are(campaign, distance):
     # the same a bay further; 3 cm: one and a half standard deviations of the prior of a sensor's position
     assert min(abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)) <= 0.03
     (sentence,) = fault.sentences()
-    assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"add {fault.offset:.2f} m" in sentence
+    assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"by {fault.offset:+.2f} m" in sentence
     moved = data.site.nominal.turnout.track.support
     beside = (moved - campaign.turnout.track.support[0] + 0.3) % 0.6 - 0.3
     np.testing.assert_allclose(beside, beside[0], atol=1e-9)

@@ -26,7 +26,7 @@ from turnout.mismatch.turnout.priors import SUPPORT_POSITIONS
 
 @dataclass(frozen=True)
 class MisplacedSupports:
-    """All supports are ``offset`` further along the track than in its file [m]; 0: where the file has them."""
+    """The positions of all supports are ``offset`` greater than in the track file [m]; 0: as in the file."""
 
     offset: float
     recording_type = "positions of the supports"
@@ -42,12 +42,12 @@ class MisplacedSupports:
         list of str
             One text without its full stop.
         """
-        direction = "further along the track" if self.offset > 0.0 else "less far along the track"
+        comparison = "greater" if self.offset > 0.0 else "smaller"
         return [
-            f"The hammer tests agree better with supports that are {100.0 * abs(self.offset):.0f} cm {direction} than "
-            "in the track file. The diagnosis takes them there. Measure the distance of sensors and impacts to a "
-            f"sleeper. If sensors and impacts are where their files have them, add {self.offset:.2f} m to `from` of "
-            "`extent` in the track file"
+            f"The hammer tests agree better with supports at positions that are {100.0 * abs(self.offset):.0f} cm "
+            f"{comparison} than in the track file. The diagnosis takes them there. Measure the distance of sensors and "
+            "impacts to a sleeper. If sensors and impacts are where their files have them, change `from` of `extent` "
+            f"in the track file by {self.offset:+.2f} m"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
