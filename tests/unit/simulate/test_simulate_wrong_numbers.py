@@ -1,5 +1,7 @@
 """A number that a simulation cannot use is an error that names it; numbers at a limit are used."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,11 @@ from turnout.simulate.wheel_path import Corrugation, OutOfRound, WheelFlat
 NAN, INF = float("nan"), float("inf")
 TRACK = uniform_track(24.0)
 WHEEL = lone_wheels(700.0, gravity=0.0, pressing=5e4)
-PREPARED = prepare_passage(TRACK, rate=5e3)
+
+
+@cache
+def prepared_passage():
+    return prepare_passage(TRACK, rate=5e3)
 
 
 def passage(speed=40.0, **options):
@@ -45,7 +51,7 @@ def impact(**options):
         (lambda: passage(entry=-1.0), "entry must be at least 0 m, got -1"),
         (lambda: passage(roughness=NAN), "roughness must be a finite number in dB"),
         (lambda: passage(substeps=0), "substeps must be a whole number of at least 1, got 0"),
-        (lambda: passage(substeps=1.5, prepared=PREPARED), "substeps must be a whole number"),
+        (lambda: passage(substeps=1.5, prepared=prepared_passage()), "substeps must be a whole number"),
         (lambda: passage(irregularities=[WheelFlat(1, 0.05, 0.43)]), r"wheel 1; 'wheels' has wheels 0 to 0"),
         (lambda: passage(irregularities=[OutOfRound(-1, 1e-4, 3, 0.43)]), r"wheel -1; 'wheels' has"),
         (lambda: prepare_passage(TRACK, rate=0.0), "rate must be above 0 Hz, got 0"),
