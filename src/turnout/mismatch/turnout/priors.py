@@ -350,7 +350,7 @@ class SupportPositionPriors:
     min_gain: float = prior(
         6.0, "nats", "by which hammer tests fit better with all supports elsewhere: the lead of a name", SUPPORTS)
     min_explained: float = prior(
-        0.8, "-", "of the variance of this evidence along a bay, by one wave in the bay", SUPPORTS)
+        0.6, "-", "of the variance of this evidence along a bay, by one wave in the bay", SUPPORTS)
 
 
 @dataclass(frozen=True)
