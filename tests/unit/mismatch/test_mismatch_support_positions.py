@@ -1,6 +1,7 @@
 """Supports elsewhere than in the track file: simulated tests on one track, diagnosed with the file of another."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from turnout.errors import SimulationError
 from turnout.mismatch.turnout.case_data import case_data
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
-from turnout.mismatch.turnout.support_positions import MisplacedSupports
+from turnout.mismatch.turnout.support_positions import MisplacedSupports, _OffsetFits
 from turnout.mismatch.turnout.zone import zone_of
 from turnout.simulate.blade import Blade
 from turnout.simulate.turnout_track import TurnoutTrack
@@ -65,7 +66,20 @@ def test_supports_at_their_place_stay_there(campaign, distance):
     assert data_of(with_file_off(campaign, distance)).layout_faults == ()
 
 
-@pytest.mark.parametrize(("frequency", "quality"), [(180.0, 6.6), (320.0, 10.0)])
+def test_the_channel_that_gains_most_does_not_count():
+    """Squares of the residuals before and after: 9 and 0, 4 and 1, 1 and 0. Without the first 3 + 1 are left."""
+    observations = [("test", SimpleNamespace(name=channel)) for channel in "ABC"]
+    pairs = {channel: SimpleNamespace(channel=channel) for channel in "ABC"}
+    tests = SimpleNamespace(frf_pairs=pairs, observations=observations)
+    fits = _OffsetFits(SimpleNamespace(predictor=None, values={}, tests=tests), ())
+    white = {0.0: (3.0, 2.0, 1.0), 0.1: (0.0, 1.0, 0.0)}
+    for offset, cost in ((0.0, 20.0), (0.1, 7.0)):
+        residuals = [np.array([x]) for x in white[offset]]
+        fits.fits[offset] = SimpleNamespace(cost=cost, white=residuals, scale={"hammer": 1.0})
+    assert fits.gain(0.1) == pytest.approx(0.5 * (3.0 + 1.0))
+
+
+@pytest.mark.parametrize(("frequency", "quality"), [(150.0, 8.0), (180.0, 6.6)])
 def test_a_fault_of_one_channel_moves_no_support(campaign, frequency, quality):
     faulty = with_resonant_mounting(campaign, campaign.sensors[0].name, frequency, quality)
     assert MisplacedSupports not in {type(fault) for fault in data_of(faulty).layout_faults}

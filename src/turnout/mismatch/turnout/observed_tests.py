@@ -125,8 +125,8 @@ class HammerStart:
     """Fit of track and sensors to the hammer tests alone, the start of all fits.
 
     ``predictor`` has the chairs of a blade that open, and ``tests`` the errors of these chairs. ``values`` are the
-    nuisances of track and sensors by name, and ``mean_cost`` the cost for each fitted sample [nats]: both are empty
-    without a fitted test ({} and None).
+    nuisances of track and sensors by name, and ``mean_cost`` minus twice the log probability for each fitted sample
+    [nats]: both are empty without a fitted test ({} and None).
     """
 
     predictor: Predictor
