@@ -54,7 +54,10 @@ def test_the_supports_are_taken_where_they_are(campaign, distance):
     # the same a bay further; 3 cm: one and a half standard deviations of the prior of a sensor's position
     assert min(abs(fault.offset + distance + k * 0.6) for k in (-1, 0, 1)) <= 0.03
     (sentence,) = fault.sentences()
-    assert f"{100 * abs(fault.offset):.0f} cm" in sentence and f"by {fault.offset:+.2f} m" in sentence
+    size = 100 * abs(fault.offset)
+    # 1.96 times 2 cm to either side; three positions of impacts at one temperature
+    assert f" {size:.0f} cm ({size - 3.92:.0f} to {size + 3.92:.0f}, 95 %, 3 tests) " in sentence
+    assert f"by {fault.offset:+.2f} m" in sentence
     moved = data.site.nominal.turnout.track.support
     beside = (moved - campaign.turnout.track.support[0] + 0.3) % 0.6 - 0.3
     np.testing.assert_allclose(beside, beside[0], atol=1e-9)

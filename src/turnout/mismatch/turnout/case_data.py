@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -176,21 +176,15 @@ def case_data(
     SimulationError
         No recording can be used, or all of them are reserved.
     """
-    is_corrected = {fault.recording_type for fault in corrected}
-    fitted = _fit_tests(campaign, settings, solver)
-    for fault in _faults_of_tests(fitted):
-        if fault and fault.recording_type not in is_corrected:
-            changed = fault.correct(campaign)
-            if _fit_tests(changed, settings, solver).is_better_than(fitted):
-                return case_data(changed, settings, solver, (*corrected, fault))
+    fitted, corrected = _correct_tests(_fit_tests(campaign, settings, solver), settings, solver, corrected)
     site, tests, start_values = fitted.filed.predictor.site, fitted.start.tests, fitted.start.values
     predictor = fitted.start.predictor.recentre(start_values)
     passages = observe_passages(
         fitted.campaign, settings.materiality, predictor, start_values, fitted.filed.upright_channels
     )
     for fault in passages.layout_faults:
-        if fault and fault.recording_type not in is_corrected:
-            return case_data(fault.correct(campaign), settings, solver, (*corrected, fault))
+        if _is_new(fault, corrected):
+            return case_data(fault.correct(fitted.recorded), settings, solver, (*corrected, fault))
     recordings = [*tests.observations, *passages.observations]
     notes = (*tests.notes, *passages.notes)
     if not recordings:
@@ -217,8 +211,12 @@ def case_data(
 
 @dataclass(frozen=True)
 class _FittedTests:
-    """Hammer tests of a ``campaign`` without its saturated channels: compared with the file, and fitted."""
+    """Hammer tests of a ``campaign`` without its saturated channels: compared with the file, and fitted.
 
+    ``recorded`` is the campaign with all of its channels.
+    """
+
+    recorded: CampaignInput
     campaign: CampaignInput
     saturated: Mapping[str, SaturationLimit]
     filed: FiledTests
@@ -230,13 +228,31 @@ class _FittedTests:
         return cost is None or reference_cost is None or cost < reference_cost
 
 
-def _fit_tests(campaign: CampaignInput, settings: MismatchSettings, solver: Track1D) -> _FittedTests:
-    saturated = saturated_channels(campaign, settings.threshold)
-    campaign = without_saturated(campaign, saturated)
+def _fit_tests(recorded: CampaignInput, settings: MismatchSettings, solver: Track1D) -> _FittedTests:
+    saturated = saturated_channels(recorded, settings.threshold)
+    campaign = without_saturated(recorded, saturated)
     tests = observe_tests(campaign, settings.pair_tolerance, saturated)
     predictor = Predictor(site_of(campaign), solver).with_recordings(tests.frf_pairs, {})
     filed = FiledTests(predictor, tests, tuple(test.place for test in campaign.hammer))
-    return _FittedTests(campaign, saturated, filed, fit_hammer_start(predictor, tests, campaign.reserved))
+    start = fit_hammer_start(predictor, tests, campaign.reserved)
+    return _FittedTests(recorded, campaign, saturated, filed, start)
+
+
+def _is_new(fault: LayoutFault, corrected: Sequence[LayoutFault]) -> bool:
+    """Whether there is a fault, of a kind that has not been corrected."""
+    return bool(fault) and fault.recording_type not in {known.recording_type for known in corrected}
+
+
+def _correct_tests(
+    fitted: _FittedTests, settings: MismatchSettings, solver: Track1D, corrected: tuple[LayoutFault, ...]
+) -> tuple[_FittedTests, tuple[LayoutFault, ...]]:
+    """The tests without their faults, and all faults that have been corrected."""
+    for fault in _faults_of_tests(fitted):
+        if _is_new(fault, corrected):
+            changed = _fit_tests(fault.correct(fitted.recorded), settings, solver)
+            if changed.is_better_than(fitted):
+                return _correct_tests(changed, settings, solver, (*corrected, fault))
+    return fitted, corrected
 
 
 def _faults_of_tests(fitted: _FittedTests) -> Iterator[LayoutFault]:

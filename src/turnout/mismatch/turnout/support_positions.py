@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.counts import count_of
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.map_fit import fit_jointly
@@ -26,9 +27,13 @@ from turnout.mismatch.turnout.priors import SUPPORT_POSITIONS
 
 @dataclass(frozen=True)
 class MisplacedSupports:
-    """The positions of all supports are ``offset`` greater than in the track file [m]; 0: as in the file."""
+    """The positions of all supports are ``offset`` greater than in the track file [m]; 0: as in the file.
+
+    ``n`` hammer tests show it.
+    """
 
     offset: float
+    n: int = 0
     recording_type = "positions of the supports"
 
     def __bool__(self) -> bool:
@@ -42,12 +47,14 @@ class MisplacedSupports:
         list of str
             One text without its full stop.
         """
-        comparison = "greater" if self.offset > 0.0 else "smaller"
+        comparison, half_width = "greater" if self.offset > 0.0 else "smaller", 1.96 * SUPPORT_POSITIONS.offset_sd
+        low, high = (100.0 * (abs(self.offset) + sign * half_width) for sign in (-1.0, 1.0))
         return [
             f"The hammer tests agree better with supports at positions that are {100.0 * abs(self.offset):.0f} cm "
-            f"{comparison} than in the track file. The diagnosis takes them there. Measure the distance of sensors and "
-            "impacts to a sleeper. If sensors and impacts are where their files have them, change `from` of `extent` "
-            f"in the track file by {self.offset:+.2f} m"
+            f"({low:.0f} to {high:.0f}, 95 %, {count_of(self.n, 'test')}) {comparison} than in the track file. "
+            "The diagnosis takes them there. Measure the distance of sensors and impacts to a sleeper. If sensors and "
+            "impacts are where their files have them, change `from` of `extent` in the track file by "
+            f"{self.offset:+.2f} m"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:
@@ -124,7 +131,8 @@ def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> Misplac
     """
     with suppress(SimulationError):  # the track cannot be simulated with its supports elsewhere
         if start.values:
-            return MisplacedSupports(_offset(_OffsetFits(start, reserved)))
+            fitted = {name for name, _ in start.tests.observations} - set(reserved)
+            return MisplacedSupports(_offset(_OffsetFits(start, reserved)), len(fitted))
     return MisplacedSupports(0.0)
 
 
