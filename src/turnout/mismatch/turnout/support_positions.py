@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from turnout.constants import Z95
 from turnout.counts import count_of
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.fit import Fit
@@ -47,7 +48,7 @@ class MisplacedSupports:
         list of str
             One text without its full stop.
         """
-        comparison, half_width = "greater" if self.offset > 0.0 else "smaller", 1.96 * SUPPORT_POSITIONS.offset_sd
+        comparison, half_width = "greater" if self.offset > 0.0 else "smaller", Z95 * SUPPORT_POSITIONS.offset_sd
         low, high = (100.0 * (abs(self.offset) + sign * half_width) for sign in (-1.0, 1.0))
         return [
             f"The hammer tests agree better with supports at positions that are {100.0 * abs(self.offset):.0f} cm "
