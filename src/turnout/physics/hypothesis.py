@@ -251,6 +251,8 @@ class Hypothesis:
         Nuisance parameters from which a fit starts, of such a look.
     external_evidence : float
         Evidence from data that are not among the observations. [nats]
+    rival_axles : tuple of int
+        Other axles of the train that these data hardly distinguish from that of ``where``.
     """
 
     starts: tuple[tuple[float, ...], ...]
@@ -264,6 +266,7 @@ class Hypothesis:
     promise: float | None = None
     start_nuisances: Mapping[str, float] = field(default_factory=dict)
     external_evidence: float = 0.0
+    rival_axles: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -300,7 +300,7 @@ def describe_term(term: Any, candidate: Candidate, standard_errors: Sequence[flo
     Returns
     -------
     dict
-        ``term``, ``fixed`` and ``parameters``.
+        ``term``, ``fixed`` and ``parameters``; ``rival_axles`` where other axles may have the effect instead.
     """
     fitted = {p.name: p for p in candidate.parameters}
     errors = dict(zip(fitted, standard_errors))
@@ -314,4 +314,5 @@ def describe_term(term: Any, candidate: Candidate, standard_errors: Sequence[flo
         name: {"value": float(f"{getattr(term, name):.6g}"), "se": float(f"{errors[name]:.3g}"), "unit": p.unit}
         for name, p in fitted.items()
     }
-    return {"term": candidate.family, "fixed": fixed, "parameters": parameters}
+    rivals = {"rival_axles": list(candidate.site.rival_axles)} if candidate.site.rival_axles else {}
+    return {"term": candidate.family, "fixed": fixed, "parameters": parameters, **rivals}

@@ -53,6 +53,8 @@ def sentence(diagnosis: Diagnosis) -> str:
     sentences = []
     for term, candidate, term_verdict in zip(diagnosis.fit.terms, diagnosis.fit.candidates, diagnosis.verdicts):
         sentences.append(f"The simulation lacks an effect: {term.sentence()}{_sizes(diagnosis, candidate)}.")
+        if candidate.site.rival_axles:
+            sentences.append(f"Or wheel {' or '.join(map(str, candidate.site.rival_axles))} has it.")
         if term_verdict.answer == "a_or_b":
             sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot distinguish them.")
     return " ".join(

@@ -192,13 +192,13 @@ def _train_and_axle(finding: Mapping[str, Any]) -> tuple[str, int | None]:
     return (train.removesuffix(f", axle {axle}") if axle else train), axle
 
 
-def _wheel_text(train: str, axle: int | None) -> str:
-    """Axle of a train in words.
+def _wheel_text(train: str, axle: int | None, rivals: Sequence[int] = ()) -> str:
+    """Axle of a train in words, with those that may be the one instead.
 
-    >>> _wheel_text("IC 2000", 3), _wheel_text("a train", None)
-    ('axle 3 of IC 2000', 'an axle of a train')
+    >>> _wheel_text("IC 2000", 3), _wheel_text("IC 2000", 3, (4,)), _wheel_text("a train", None)
+    ('axle 3 of IC 2000', 'axle 3 or 4 of IC 2000', 'an axle of a train')
     """
-    return f"axle {axle} of {train}" if axle else f"an axle of {train}"
+    return f"axle {' or '.join(map(str, (axle, *rivals)))} of {train}" if axle else f"an axle of {train}"
 
 
 def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
@@ -216,8 +216,8 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     str
     """
     fixed = term["fixed"]
-    of_term = fixed.get("train") or "a train", fixed["wheel"] + 1 if "wheel" in fixed else None
-    train, axle = _train_and_axle(finding) if finding["train"] else of_term
+    axle = fixed["wheel"] + 1 if "wheel" in fixed else None
+    train = fixed.get("train") or (_train_and_axle(finding)[0] if finding["train"] else "a train")
     positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: str(value) for name, value in fixed.items()}
@@ -226,8 +226,8 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     words |= {
         "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
-        "train": finding["train"] or train,
-        "wheel": _wheel_text(train, axle),
+        "train": train,
+        "wheel": _wheel_text(train, axle, term.get("rival_axles", ())),
     }
     try:
         template = _sentence_template(term)

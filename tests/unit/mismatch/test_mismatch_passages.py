@@ -414,10 +414,13 @@ def test_a_train_that_cannot_be_compared_is_not_reported_as_different(intact, mo
     assert case.aligned_passages and case.mismatched_trains == ()
 
 
-@pytest.mark.parametrize(("behind", "offered"), [(2.9, [3, 1]), (3.1, [3])])
-def test_a_wheel_with_nearly_as_strong_impacts_is_a_candidate_as_well(intact, monkeypatch, behind, offered):
+@pytest.mark.parametrize(
+    ("behind", "offered", "rivals"),
+    [(2.9, [3, 1], {3: (1, 6), 1: (3, 6)}), (3.1, [3], {3: (1, 6)}), (5.9, [3], {3: (1, 6)}), (6.1, [3], {3: ()})],
+)
+def test_a_wheel_with_nearly_as_strong_impacts_is_a_candidate_as_well(intact, monkeypatch, behind, offered, rivals):
     """The fitted band may distinguish wheels that impacts do not: one of three rough wheels preceded the one with the
-    flat."""
+    flat. What the impacts cannot distinguish by 6 nats is stated."""
     case, _ = intact
     (made, *_), radius = case.aligned_passages.values(), 0.46
     train, phases = made.conditions["train"], ((made.name, 0.5),)
@@ -429,6 +432,8 @@ def test_a_wheel_with_nearly_as_strong_impacts_is_a_candidate_as_well(intact, mo
     )
     found = flat_candidates(case, SimpleNamespace(candidates=()))
     assert [c.where["axle"] for c in found] == offered
+    assert {c.where["axle"]: c.site.rival_axles for c in found} == rivals
+    assert found[0].in_words.startswith(f"wheel flat at wheelset {' or '.join(map(str, (3, *rivals[3])))} of ")
     heavy, flat = (SimpleNamespace(where={"train": train, **more}) for more in ({}, {"axle": 3}))
     beside = flat_candidates(case, SimpleNamespace(candidates=(heavy,)))
     assert [c.where["axle"] for c in beside] == offered  # heavy wheels do not exclude a flat on one of them

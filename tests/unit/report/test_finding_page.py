@@ -379,6 +379,28 @@ def test_the_sentence_of_a_second_effect_on_a_wheel_states_its_axle():
     assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_effects_of_two_trains_keep_their_own_trains_in_a_sentence(order):
+    """The column of the train has that of the first effect alone."""
+    length = {"length": {"value": 0.04, "se": 0.008, "unit": "m"}}
+    factor = {"factor": {"value": 1.6, "se": 0.1, "unit": "-"}}
+    flat = {"term": "wheel_flat", "fixed": {"wheel": 3, "train": "loaded"}, "parameters": length}
+    heavy = {"term": "unsprung_mass", "fixed": {"train": "railcar"}, "parameters": factor}
+    trains = [{"train": "loaded, axle 4", "axle": 4}, {"train": "railcar", "axle": None}][::order]
+    terms = [flat, heavy][::order]
+    text = headline(finding(term=terms[0]["term"], **trains[0], term_json=json.dumps(terms)))
+    assert "A wheel on axle 4 of loaded has a flat of 40 mm" in text
+    assert "The wheelsets of railcar are 1.6" in text
+
+
+def test_the_sentence_of_a_flat_states_all_wheels_that_may_have_it():
+    length = {"length": {"value": 0.04, "se": 0.008, "unit": "m"}}
+    fixed = {"wheel": 1, "train": "railcar"}
+    flat = {"term": "wheel_flat", "fixed": fixed, "rival_axles": [1], "parameters": length}
+    row = finding(term="wheel_flat", train="railcar, axle 2", axle=2, term_json=json.dumps([flat]))
+    assert headline(row).startswith("A wheel on axle 2 or 1 of railcar has a flat of 40 mm")
+
+
 def test_the_sentence_of_a_wheel_out_of_round_states_its_waves_and_their_amplitude():
     """0.032 ± 0.006 mm: the interval is 0.032 ± 1.96 * 0.006 = 0.020 to 0.044 mm, of either sign of the cosine."""
     for sign in (1.0, -1.0):

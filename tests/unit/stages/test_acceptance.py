@@ -12,6 +12,7 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.errors import SimulationError, TurnoutError
+from turnout.mismatch.engine.candidate import EffectSite
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout import TrackCase
@@ -195,13 +196,22 @@ OF_TRACK_AND_SENSORS = [t for t in physics.TERMS if t.name != "roughness_level" 
 def test_every_effect_is_read_from_the_file_as_it_was_written(config, term):
     """The file has four digits, which bounds the difference."""
     made = term.example()
-    candidate = SimpleNamespace(family=term.name, parameters=term.parameters)
+    candidate = SimpleNamespace(family=term.name, parameters=term.parameters, site=EffectSite())
     track = own_track(config)
     described = describe_term(made, candidate, [0.1 * abs(getattr(made, p.name)) for p in term.parameters], track)
     accept(finding(described), config, "t1", anyway=True)
     back = accepted_of(track_of_turnout(config).terms)[0].term(track_of_turnout(config).track)
     for name, value in vars(made).items():
         assert getattr(back, name) == (pytest.approx(value, rel=1e-3) if isinstance(value, float) else value)
+
+
+def test_a_fitted_flat_is_stored_with_the_other_axles_that_may_have_it(config):
+    flat, errors = physics.WheelFlat(1, 0.04, train="railcar"), [0.008]
+    for rivals, stored in (((1,), {"rival_axles": [1]}), ((), {})):
+        site = EffectSite(rival_axles=rivals)
+        candidate = SimpleNamespace(family=flat.name, parameters=flat.parameters, site=site)
+        described = describe_term(flat, candidate, errors, own_track(config))
+        assert {k: v for k, v in described.items() if k not in ("term", "fixed", "parameters")} == stored
 
 
 def own_track(config):

@@ -100,6 +100,8 @@ class EffectSite:
         Its value -> first parameter of the effect; None: the exponential.
     same_quantity : bool
         Whether effect and parameter change one quantity, so that recordings show their joint change alone.
+    rival_axles : tuple of int
+        Other axles of the train whose evidence is no more than ``THRESHOLDS.position_margin`` below.
     """
 
     where: Mapping[str, Any] = field(default_factory=dict)
@@ -109,6 +111,7 @@ class EffectSite:
     masking_sd: float = THRESHOLDS.masking_sd
     from_masking: Callable[[float], float] | None = None
     same_quantity: bool = False
+    rival_axles: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -303,7 +306,7 @@ class Candidate:
         if "sensor" in where:
             words.append(f"at sensor {where['sensor']}")
         if "axle" in where:
-            words.append(f"at wheelset {where['axle']}")
+            words.append(f"at wheelset {' or '.join(map(str, (where['axle'], *self.site.rival_axles)))}")
         if "train" in where:
             words.append(f"of {where['train']}")
         return " ".join(words)

@@ -7,7 +7,7 @@ mass make the fit worse, and the derivative points the wrong way.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ import numpy as np
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate, Effect, EffectSite, NamingRules, RefitStarts
+from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.turnout.priors import SATURATION
 from turnout.physics.hypothesis import (
     BaySite,
@@ -110,6 +111,7 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
             masking.sd,
             masking.size,
             masking.same_quantity,
+            hypothesis.rival_axles,
         ),
         NamingRules(
             smallest_reportable=effect.smallest_reportable if size is None else size,
@@ -122,6 +124,30 @@ def candidate_of(effect: type[physics.PhysicsTerm], hypothesis: Hypothesis) -> C
             must_not_oppose=hypothesis.must_not_oppose,
         ),
     )
+
+
+def rival_axles(evidence: Mapping[int, float], wheel: int) -> tuple[int, ...]:
+    """Axles, 1 first, of a train that may have the effect of a wheel instead: their evidence is hardly smaller.
+
+    Parameters
+    ----------
+    evidence : mapping of int to float
+        Wheel of the train, 0 first -> evidence that it has the effect. [nats]
+    wheel : int
+        The one that is tested.
+
+    Returns
+    -------
+    tuple of int
+        The likeliest first.
+
+    Examples
+    --------
+    >>> rival_axles({0: 34.3, 1: 34.6, 2: 31.0, 3: 4.0}, 1)
+    (1, 3)
+    """
+    close = [w for w, nats in evidence.items() if w != wheel and nats > evidence[wheel] - THRESHOLDS.position_margin]
+    return tuple(w + 1 for w in sorted(close, key=lambda w: -evidence[w]))
 
 
 def parameters_with(effect: type[physics.PhysicsTerm], **priors: tuple[float, float]) -> tuple[physics.Parameter, ...]:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, rival_axles
 from turnout.mismatch.turnout.defect_priors import POLYGONS
 from turnout.mismatch.turnout.surface_priors import ROUGHNESS
 from turnout.mismatch.turnout.wave_response import WaveTransfer
@@ -61,7 +61,8 @@ def polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
         return ()
     refined = wheel_evidence(case, fit, train, wavelength * FINE_FACTORS)
     _, _, _, wavelength, amplitudes = next(f for f in refined if f[2] == wheel)
-    return (_candidate(case, train, wheel, wavelength, amplitudes, nats, len(wheel_fits)),)
+    rivals = rival_axles({w: g for g, of_train, w, *_ in wheel_fits if of_train == train}, wheel)
+    return (_candidate(case, train, wheel, wavelength, amplitudes, nats, len(wheel_fits), rivals),)
 
 
 def wheel_evidence(
@@ -151,6 +152,7 @@ def _candidate(
     amplitudes: Sequence[tuple[str, float, float]],
     nats: float,
     scanned: float,
+    rivals: tuple[int, ...],
 ) -> Candidate:
     passage = next(case.aligned_passages[name].passage for name, *_ in amplitudes)
     order = max(1, round(2.0 * np.pi * passage.vehicle.wheel_values("radius")[wheel] / wavelength))
@@ -167,5 +169,6 @@ def _candidate(
         n_scanned=scanned * POLYGONS.angles_per_passage ** len(phases),
         smallest_reportable=MIN_AMPLITUDE,
         promise=float(nats - np.log(scanned)),
+        rival_axles=rivals,
     )
     return candidate_of(physics.OutOfRound, hypothesis)

@@ -11,14 +11,14 @@ evidence compares the mean of z over sensors and passages for a polygonal wheel 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from turnout import physics
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, rival_axles
 from turnout.mismatch.turnout.candidates.corrugation_levels import is_alike, shortest_covered
 from turnout.mismatch.turnout.candidates.short_corrugation import response_energy
 from turnout.mismatch.turnout.defect_priors import CORRUGATION, SHORT_POLYGONS
@@ -82,14 +82,15 @@ def short_polygon_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]
             if n_slots and is_alike(
                 [wheel_excess(half, bins, lengths)[0][w, k] for half in (spectra[::2], spectra[1::2]) if half]
             ):
-                wheel_fits.append((polygon_evidence(z[w, k], n_slots), train, int(w), int(bins[k]), spectra))
+                evidence = {wheel: polygon_evidence(level, n_slots) for wheel, level in enumerate(z[:, k])}
+                wheel_fits.append((evidence, train, int(w), int(bins[k]), spectra))
     if not wheel_fits:
         return ()
-    nats, train, wheel, chosen_bin, spectra = max(wheel_fits, key=lambda f: f[0])
+    evidence, train, wheel, chosen_bin, spectra = max(wheel_fits, key=lambda f: f[0][f[2]])
     scanned = n * max(1.0, float(np.ptp(np.log(lengths[bins]))) / SHORT_POLYGONS.resolution)
-    if nats < np.log(scanned):
+    if evidence[wheel] < np.log(scanned):
         return ()
-    return (_short_candidate(case, fit, train, wheel, lengths, chosen_bin, nats, scanned, spectra),)
+    return (_short_candidate(case, fit, train, wheel, lengths, chosen_bin, evidence, scanned, spectra),)
 
 
 def bin_wavelengths(passages: Sequence[AlignedPassage]) -> np.ndarray:
@@ -217,7 +218,7 @@ def _short_candidate(
     wheel: int,
     lengths: np.ndarray,
     k: int,
-    nats: float,
+    evidence: Mapping[int, float],
     scanned: float,
     spectra: Sequence[WheelSpectra],
 ) -> Candidate:
@@ -236,8 +237,9 @@ def _short_candidate(
         n_scanned=scanned,
         parameters=parameters,
         smallest_reportable=MIN_AMPLITUDE,
-        promise=float(nats - np.log(scanned)),
-        external_evidence=float(nats),
+        promise=float(evidence[wheel] - np.log(scanned)),
+        external_evidence=float(evidence[wheel]),
+        rival_axles=rival_axles(evidence, wheel),
     )
     return candidate_of(physics.OutOfRound, hypothesis)
 

@@ -27,7 +27,7 @@ import numpy as np
 from turnout import physics
 from turnout.constants import MAD_TO_SD
 from turnout.errors import SimulationError
-from turnout.mismatch.turnout.candidates.catalogue import candidate_of
+from turnout.mismatch.turnout.candidates.catalogue import candidate_of, rival_axles
 from turnout.mismatch.turnout.defect_priors import FLATS
 from turnout.mismatch.turnout.passage_band import limit_band
 from turnout.physics.hypothesis import Hypothesis
@@ -298,12 +298,13 @@ def flat_candidates(case: TrackCase, fit: Fit) -> tuple[Candidate, ...]:
         s for s in evidence if s.nats > FLATS.min_evidence + np.log(len(evidence)) and s.train not in explained_trains
     ]
     likely = [s for s in likely if s.nats > likely[0].nats - FLATS.max_evidence_gap]
-    return tuple(_candidate(case, fit, s, len(evidence)) for s in likely[: FLATS.max_wheels])
+    return tuple(_candidate(case, fit, s, evidence) for s in likely[: FLATS.max_wheels])
 
 
-def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, n_wheels: int) -> Candidate:
+def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, evidence: Sequence[FlatEvidence]) -> Candidate:
     length, phases, gain = _fit_flat(case, fit, flat)
-    scanned = n_wheels * (1.0 + np.ptp(PHASE_OFFSETS) / FLATS.phase_resolution) ** len(phases)
+    of_train = {s.wheel: s.nats for s in evidence if s.train == flat.train}
+    scanned = len(evidence) * (1.0 + np.ptp(PHASE_OFFSETS) / FLATS.phase_resolution) ** len(phases)
     hypothesis = Hypothesis(
         starts=((length,),),
         fixed={"wheel": flat.wheel, "radius": flat.radius, "train": flat.train, "phases": phases},
@@ -311,6 +312,7 @@ def _candidate(case: TrackCase, fit: Fit, flat: FlatEvidence, n_wheels: int) -> 
         n_scanned=scanned,
         promise=float(gain + flat.nats - np.log(scanned)),
         external_evidence=flat.nats,
+        rival_axles=rival_axles(of_train, flat.wheel),
     )
     return candidate_of(physics.WheelFlat, hypothesis)
 
