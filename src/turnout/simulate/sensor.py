@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,14 +52,14 @@ class Sensor:
 
     def __post_init__(self) -> None:
         title = f"sensor {self.name!r}:"
-        for name in ("gain", "offset", "delay"):
+        for name in ("place", "gain", "offset", "delay"):
             check_number(f"{title} {name}", getattr(self, name))
         check_number(f"{title} noise", self.noise, least=0.0)
         check_number(f"{title} mount_quality", self.mount_quality, above=0.0)
         for name in ("mount_frequency", "cutoff", "resolution"):
             if (value := getattr(self, name)) is not None:
                 check_number(f"{title} {name}", value, least=0.0)
-        if self.limit is not None and not self.limit > 0.0:
+        if self.limit is not None and not (isinstance(self.limit, Real) and self.limit > 0.0):
             raise SimulationError(f"{title} limit must be above 0, or None, got {self.limit!r}.")
 
     def channel(self) -> Channel:

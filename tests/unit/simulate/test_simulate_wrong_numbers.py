@@ -68,6 +68,8 @@ def impact(**options):
         (lambda: Hammer(velocity_spread=-0.1), "velocity_spread must be at least 0"),
         (lambda: Sensor("A", 1.0, noise=-1.0), "sensor 'A': noise must be at least 0"),
         (lambda: Sensor("A", 1.0, limit=0.0), "sensor 'A': limit must be above 0, or None"),
+        (lambda: Sensor("A", 1.0, limit="5"), "sensor 'A': limit must be above 0, or None, got '5'"),
+        (lambda: Sensor("A", "12.0"), "sensor 'A': place must be a finite number, got '12.0'"),
         (lambda: Sensor("A", 1.0, gain=NAN), "sensor 'A': gain must be a finite number"),
         (lambda: prepare(TRACK, INF), "time step must be above 0 s, got inf"),
         (lambda: run(prepare(TRACK, 1e-4), NAN), "duration must be above 5e-05 s, got nan"),
