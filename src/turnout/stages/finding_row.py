@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from turnout import physics
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
     from turnout.mismatch.engine.diagnose import Diagnosis
     from turnout.mismatch.engine.localization import Location
+    from turnout.mismatch.engine.verdict import Verdict
 
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
@@ -50,16 +51,21 @@ def sentence(diagnosis: Diagnosis) -> str:
             where = location_text(diagnosis)
             return f"Something is there {where}, and these recordings cannot name it: {verdict.reason}."
         return f"Something is missing {location_text(diagnosis)}: {verdict.reason}."
-    sentences = []
-    for term, candidate, term_verdict in zip(diagnosis.fit.terms, diagnosis.fit.candidates, diagnosis.verdicts):
-        sentences.append(f"The simulation lacks an effect: {term.sentence()}{_sizes(diagnosis, candidate)}.")
-        if candidate.site.rival_axles:
-            sentences.append(f"Or wheel {' or '.join(map(str, candidate.site.rival_axles))} has it.")
-        if term_verdict.answer == "a_or_b":
-            sentences.append(f"Or {term_verdict.names[1].replace('_', ' ')}: these recordings cannot distinguish them.")
+    fit = diagnosis.fit
+    effects = zip(fit.terms, fit.candidates, diagnosis.verdicts)
+    sentences = [sentence for effect in effects for sentence in _effect_sentences(diagnosis, *effect)]
     return " ".join(
         [*sentences, f"But {verdict.reason}."] if verdict.answer == "named" and verdict.reason else sentences
     )
+
+
+def _effect_sentences(diagnosis: Diagnosis, term: Any, candidate: Candidate, verdict: Verdict) -> Iterator[str]:
+    """What the simulation lacks, and what may be there instead."""
+    yield f"The simulation lacks an effect: {term.sentence()}{_sizes(diagnosis, candidate)}."
+    if candidate.site.rival_axles:
+        yield f"Or wheel {' or '.join(map(str, candidate.site.rival_axles))} has it."
+    if verdict.answer == "a_or_b":
+        yield f"Or {verdict.names[1].replace('_', ' ')}: these recordings cannot distinguish them."
 
 
 def _sizes(diagnosis: Diagnosis, candidate: Candidate) -> str:
