@@ -5,10 +5,12 @@ from functools import cache
 import numpy as np
 
 from benchmarks import hammer_impacts as simulated
-from benchmarks import off_axis
+from benchmarks import off_axis, random_tracks
 from benchmarks.bar import Bar, stopwatch
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test import find_impacts, receptance_of
+from turnout.hammer_test.response_quality import find_track_impacts
+from turnout.hammer_test.response_scale import equivalent_free_rails
 from turnout.records import Recording
 from turnout.signal.coherence import coherence_limits, lower_coherence_limit
 from turnout.signal.filters import force_pulse
@@ -20,6 +22,7 @@ N_TEST = 400
 def bars():
     """Definitions: second hits of 5-30 % after 4-50 ms, tips of 0.1-3 ms in four pulse families, 12-bit loggers."""
     yield from impact_quality()
+    yield from response_faults()
     yield from windows_and_gate()
     yield from best_subset()
     yield from speed()
@@ -65,6 +68,52 @@ def impact_quality():
         )[-1]
         clipped.append("overload" in {r.reason for r in last.rejections})
     yield Bar("   hard clip of the response at 50-90 % found", float(np.mean(clipped)), sense="", n="n=100")
+
+
+def reasons_on_tracks(rng, n_test, n_impact=10, **fault):
+    """Set of reasons of each impact on random tracks, and by how much its response exceeds a limit."""
+    reasons, excess = [], []
+    for _ in range(n_test):
+        recordings, of_test = random_tracks.hammer_test(rng, n_impact, **fault)
+        impacts = find_track_impacts(recordings, "hammer", "rail", ReceptanceSettings())
+        reasons += [{r.reason for r in i.rejections} for i in impacts]
+        excess += list(of_test)
+    return reasons, np.array(excess)
+
+
+def response_faults():
+    """Responses that are late, early, in a wrong unit or limited, on random tracks in closed form."""
+    rng = np.random.default_rng(8)
+    reasons, _ = reasons_on_tracks(rng, 100)
+    yield Bar("accepted impacts on random tracks that are rejected", np.mean(list(map(bool, reasons))), 0.003,
+              n=f"n={len(reasons)}")  # fmt: skip
+    for name, delays, bar in (
+        ("response early by 1 to 15 ms: right reason", (-15e-3, -8e-3, -3e-3, -1e-3), 0.99),
+        ("response late by 1 to 3 ms: right reason", (1e-3, 1.5e-3, 2e-3, 3e-3), 0.99),
+        ("   late by 0.5 ms", (5e-4,), None),
+    ):
+        found = [r for d in delays for r in reasons_on_tracks(rng, 16, 6, delay=d)[0]]
+        share = np.mean(["not_simultaneous" in r for r in found])
+        yield Bar(name, share, bar, sense=">=" if bar else "", n=f"n={len(found)}")
+    for name, factor in (("g as m/s²", 1 / 9.81), ("m/s² as g", 9.81), ("lbf as N", 4.448), ("N as lbf", 1 / 4.448)):
+        found, _ = reasons_on_tracks(rng, 24, 6, factor=factor)
+        share = np.mean(["out_of_scale" in r for r in found])
+        is_large = abs(np.log(factor)) > 2.0
+        yield Bar(f"{'' if is_large else '   '}{name}: found", share, 0.99 if is_large else None,
+                  sense=">=" if is_large else "", n=f"n={len(found)}")  # fmt: skip
+    tests = (random_tracks.hammer_test(rng, 3)[0] for _ in range(200))
+    rails = [equivalent_free_rails(find_impacts(t, "hammer", "rail")).rails for t in tests]
+    for name, share in (("least", 0.0), ("median", 0.5), ("largest", 1.0)):
+        yield Bar(f"   resistance of random tracks, {name}", np.quantile(rails, share), unit="rails 54E1", sense="",
+                  n=f"n={len(rails)}")  # fmt: skip
+    found, excess = reasons_on_tracks(rng, 100, n_limited=2)
+    is_found, is_limited = np.array(["overload" in r for r in found]), excess > 1.0
+    yield Bar("limited before the filter by more than 10 %: found", np.mean(is_found[excess > 1.1]), sense="",
+              n=f"n={np.sum(excess > 1.1)}")  # fmt: skip
+    yield Bar("   by less: found", np.mean(is_found[is_limited & (excess <= 1.1)]), sense="",
+              n=f"n={np.sum(is_limited & (excess <= 1.1))}")  # fmt: skip
+    yield Bar("   impacts of the same tests below the limit: called limited", np.mean(is_found[~is_limited]), 0.003,
+              n=f"n={np.sum(~is_limited)}")  # fmt: skip
 
 
 def windowed_receptance(settings, noise=0.0):
