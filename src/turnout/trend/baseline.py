@@ -214,6 +214,47 @@ def previous(inside: np.ndarray) -> np.ndarray:
     return np.concatenate([np.full((len(inside), 1), -1), column], axis=1)[:, :-1]
 
 
+LONE_SD = 6.0  # robust standard deviations by which a lone outlier lies outside both neighbours, as in mode_scatter.sql
+MIN_STEPS = 7  # steps from campaign to campaign that give the robust standard deviation, as in mode_scatter.sql
+
+
+def lone_outliers(values: np.ndarray) -> np.ndarray:
+    r"""Which values of a series lie far outside both of their neighbours, on the same side.
+
+    A change shows in every campaign from its onset on, so one campaign alone is an error of that campaign. Far are
+    ``LONE_SD`` robust standard deviations of a value, from the steps between neighbours,
+
+    .. math:: s = 1.4826\, \mathrm{median} |v_i - v_{i-1}| / \sqrt{2}
+
+    so that neither a change nor the outlier widens it. The first and the last value have one neighbour: they cannot be
+    told from a change.
+
+    Parameters
+    ----------
+    values : (n,) array of float
+        Values in order of time, without gaps.
+
+    Returns
+    -------
+    (n,) array of bool
+        True for a value that stands alone; none with fewer than ``MIN_STEPS`` steps.
+
+    Examples
+    --------
+    >>> np.flatnonzero(lone_outliers(np.array([0.0, 1.0, 0.0, 9.0, 1.0, 0.0, 1.0, -9.0, -8.0, -9.0])))
+    array([3])
+    """
+    alone = np.zeros(values.shape, dtype=bool)
+    steps = np.diff(values)
+    if steps.size < MIN_STEPS:
+        return alone
+    limit = LONE_SD * 1.4826 * float(np.median(np.abs(steps))) / np.sqrt(2.0)
+    above = np.minimum(steps[:-1], -steps[1:])  # how far each inner value lies above the nearer neighbour
+    below = np.minimum(-steps[:-1], steps[1:])
+    alone[1:-1] = (limit > 0.0) & (np.maximum(above, below) > limit)
+    return alone
+
+
 def usual_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Median time between neighbouring campaigns of the mask, nan where there are none.
 

@@ -44,6 +44,9 @@ class Forecast:
             return "no date: the values settle"
         if self.verdict == "no_limit":
             return "no limit in sight"
+        if self.not_before == 0.0:
+            latest = "" if not self.not_after > 0.0 else f", by {self.not_after:.1f} years if it goes on like this"
+            return f"the limit may be reached already{latest}"
         if np.isfinite(self.not_after):
             return f"not before {self.not_before:.1f} years, by {self.not_after:.1f} years if it goes on like this"
         return f"not before {self.not_before:.1f} years, no latest date"
@@ -185,7 +188,7 @@ def crossing_interval(
     freedom : int
         Degrees of freedom.
     limit : float
-        Limit L, below the level. [%]
+        Limit L. [%]
     level : float
         Probability of the interval.
 
@@ -193,7 +196,7 @@ def crossing_interval(
     -------
     (float, float)
         Earliest and latest time [a]: (nan, nan) where the line never reaches the limit, (t, nan) where there is no
-        latest time.
+        latest time, (0, 0) where the level at time 0 is below the limit by more than its error.
 
     References
     ----------
@@ -212,13 +215,13 @@ def crossing_interval(
     half = a * b - q * q * covariance[0, 1]
     constant = a * a - q * q * covariance[0, 0]
     never = (float("nan"), float("nan"))
-    if a <= 0.0 or constant <= 0.0:
-        return 0.0, never[1] if constant <= 0.0 < a else 0.0
-    if square > 0.0 and b >= 0.0:
+    if constant > 0.0 >= a:
+        return 0.0, 0.0
+    if constant > 0.0 and square > 0.0 and b >= 0.0:
         return never
     root = np.sqrt(max(half * half - square * constant, 0.0))
-    first = float(constant / (root - half))
-    return (first, float((root - half) / square)) if square > 0.0 else (first, never[1])
+    first = 0.0 if constant <= 0.0 else float(constant / (root - half))
+    return (first, float((root - half) / square)) if square > 0.0 > b else (first, never[1])
 
 
 def forecast(time: np.ndarray, values: np.ndarray, autocorrelation: float, settings: TrendSettings) -> Forecast:

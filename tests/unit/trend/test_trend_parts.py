@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import statsmodels.api as sm
 from scipy import stats
+from tests.oracles.trend_views import connect_views
 
 from turnout.trend.baseline import fit_baseline, pooled_autocorrelation, spread_and_autocorrelation
 from turnout.trend.cusum import cusum
@@ -236,8 +237,10 @@ def test_line_equals_generalised_least_squares():
     assert freedom == fit.df_resid and rss / freedom == pytest.approx(fit.scale, rel=1e-8)
 
 
-def test_the_interval_of_a_crossing_is_that_of_fieller():
-    coefficient, covariance, freedom = np.array([-1.0, -0.8]), np.array([[0.02, 0.01], [0.01, 0.03]]), 30
+@pytest.mark.parametrize("level", [-1.0, -4.9, -5.0, -5.1])
+def test_the_interval_of_a_crossing_is_that_of_fieller(level):
+    """Also where the level is within its error, 0.19 %, of the limit: it may be reached already."""
+    coefficient, covariance, freedom = np.array([level, -0.8]), np.array([[0.02, 0.01], [0.01, 0.03]]), 30
     low, high = crossing_interval(coefficient, covariance, freedom, -5.0, 0.8)
     q = stats.t.isf(0.1, freedom)
     for t in np.linspace(0, 40, 4001):
@@ -245,10 +248,16 @@ def test_the_interval_of_a_crossing_is_that_of_fieller():
         admitted = abs(coefficient[0] + coefficient[1] * t + 5.0) <= q * error
         if abs(t - low) > 0.02 and abs(t - high) > 0.02:
             assert admitted == (low <= t <= high)
+    assert (low == 0.0) == (level < -4.5) and high > 0.0
+
+
+def test_a_crossing_may_have_no_latest_time_and_no_time_at_all():
     wide = crossing_interval(np.array([0.0, -0.1]), np.array([[0.02, 0.0], [0.0, 0.04]]), 30, -5.0, 0.8)
     assert wide[0] > 0.0 and np.isnan(wide[1])  # the slope may be 0: no latest time
     assert np.isnan(crossing_interval(np.array([0.0, 0.5]), np.eye(2) * 1e-4, 30, -5.0, 0.8)).all()
     assert crossing_interval(np.array([-6.0, -0.1]), np.eye(2) * 1e-4, 30, -5.0, 0.8) == (0.0, 0.0)
+    rising = crossing_interval(np.array([-4.95, 0.5]), np.eye(2) * 1e-2, 30, -5.0, 0.8)
+    assert rising[0] == 0.0 and np.isnan(rising[1])  # it may be reached now, and not later
 
 
 def test_a_forecast_has_no_date_for_constant_and_settling_charts(settings):
@@ -270,3 +279,35 @@ def test_the_number_of_campaigns_a_year_follows_from_the_usual_interval():
     interval = np.array([365.25, 46.0, 7.0, 1.0, 0.5, 800.0, np.nan])
     counts = campaigns_a_year(SimpleNamespace(interval=interval))
     assert counts.tolist() == [1, 8, 52, 365, 366, 0, 0]
+
+
+def test_a_limit_that_the_line_may_have_passed_is_not_stated_as_a_later_date(settings):
+    """A campaign every four months, -1.3 %/a over 4.3 years: at -5.6 % now, and the mean of eight at -4.1 %."""
+    time = 120.0 * np.arange(14.0)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(time.size)
+    passed = forecast(time, -1.3 * time / 365.25 + noise, 0.0, settings)
+    assert (passed.verdict, passed.not_before, passed.not_after) == ("line", 0.0, 0.0)
+    assert passed.sentence == "the limit may be reached already"
+    doubtful = forecast(time, -1.15 * time / 365.25 + 4.0 * noise, 0.0, settings)
+    assert doubtful.verdict == "line" and doubtful.not_before == 0.0 < doubtful.not_after < 1.0
+    assert doubtful.sentence.startswith("the limit may be reached already, by 0.")
+
+
+@pytest.mark.parametrize(
+    ("not_before", "not_after", "words"),
+    [
+        ("2026-05-04", "2026-05-04", "the limit may be reached already"),
+        ("2026-05-04", None, "the limit may be reached already"),
+        ("2026-05-04", "2027-01-02", "the limit may be reached already, by 2027-01-02 if it goes on like this"),
+        ("2026-09-01", "2027-01-02", "not before 2026-09-01, by 2027-01-02 if it goes on like this"),
+        ("2026-09-01", None, "not before 2026-09-01, no latest date"),
+    ],
+)
+def test_the_words_of_a_forecast_name_no_date_that_has_passed(not_before, not_after, words):
+    row = {"turnout_id": "T", "section_id": "T/S0", "band": "railpad", "source": "hammer", "forecast": "line",
+           "last_measured_at_utc": "2026-05-04", "not_before_utc": not_before, "not_after_utc": not_after}  # fmt: skip
+    frame = pd.DataFrame([row])
+    for name in ("last_measured_at_utc", "not_before_utc", "not_after_utc"):
+        frame[name] = pd.to_datetime(frame[name])
+    with connect_views({"chart_status": frame}, "2026-05-04") as con:
+        assert con.execute("select words from time_to_threshold").fetchall() == [(words,)]

@@ -8,3 +8,8 @@ create or replace macro campaign_weight(z_value, residual, usual_sd) as (
 create or replace macro error_weight(value_se, usual_se) as (
     coalesce(2 / (1 + (value_se / nullif(usual_se, 0)) ** 2), 1)
 );
+-- Whether a campaign lies so far from the median of the campaigns beside it that it counts only if another one confirms
+-- it: the limit of the chart, in standard deviations that hold its own error (weight).
+create or replace macro is_outlier(value_pct, middle_pct, usual_sd, weight, z_limit) as (
+    coalesce(abs(value_pct - middle_pct) * sqrt(weight) > z_limit * usual_sd, false)
+);

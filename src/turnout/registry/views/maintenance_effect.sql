@@ -1,7 +1,9 @@
 -- One row per event and section's chart that it reset: did the work help, by how much, and for how long. Several events
 -- between the same two campaigns are one row, dated by the last; a turnout's median begins again at 0 and has none.
 -- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
--- campaign at which the mean of eight has lost half of a gain again; empty = it holds, until last_measured_at_utc.
+-- campaign at which the mean of eight without the lowest has lost half of a gain again; empty = it holds, until
+-- last_measured_at_utc. One campaign alone of the eight that lies beyond the outlier limit of its chart from their median
+-- does not count, as in the chart.
 -- The siblings' median is left in, for work on a whole turnout lifts them all (but not in band amplitude). The interval
 -- holds the scatter of the campaigns with their memory, and what the error of the temperature slope makes of the
 -- difference in temperature. Levels are weighted means: a campaign whose error is larger than usual counts by the inverse
@@ -11,7 +13,8 @@ create or replace view maintenance_effect as
 with own as (
     select
         c.turnout_id, c.section_id, c.band, c.source, c.measured_at_utc, c.epoch, c.rail_temperature_c,
-        b.epoch_start_utc, b.slope_se_pct_per_c, b.n_baseline, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
+        b.epoch_start_utc, b.slope_se_pct_per_c, b.n_baseline,
+        b.guard * b.outlier_limit as z_limit, b.sd_alone_pct * sqrt((1 + b.phi) / (1 - b.phi)) as sd_pct,
         campaign_weight(c.z, c.residual_pct, b.guard * b.sd_pct * sqrt((1 + b.phi) / (1 - b.phi))) as weight,
         coalesce(
             100 * (c.expected_hz / b.frequency_hz - 1) + c.residual_pct
@@ -23,35 +26,53 @@ with own as (
     join baselines b using (turnout_id, section_id, band, source, epoch)
     where c.residual_pct is not null and c.section_id <> '*' and not ends_with(c.band, '_damping')
 ),
-values_pct as (
+placed as (
     select
-        *, sum(weight * value_pct) over eight / sum(weight) over eight as mean_of_eight,
-        row_number() over epoch_order as place,
-        row_number() over (
-            partition by turnout_id, section_id, band, source, epoch order by measured_at_utc desc
-        ) as place_from_end
+        *, row_number() over (epoch_of_chart order by measured_at_utc) as place,
+        row_number() over (epoch_of_chart order by measured_at_utc desc) as place_from_end,
+        (sum(weight * value_pct) over eight - arg_min(weight, value_pct) over eight * min(value_pct) over eight)
+            / nullif(sum(weight) over eight - arg_min(weight, value_pct) over eight, 0) as mean_without_lowest
     from own
     window
-        epoch_order as (partition by turnout_id, section_id, band, source, epoch order by measured_at_utc),
+        epoch_of_chart as (partition by turnout_id, section_id, band, source, epoch),
         eight as (
             partition by turnout_id, section_id, band, source, epoch order by measured_at_utc
             rows between 7 preceding and current row
         )
 ),
+marked as (
+    select
+        *,
+        place <= 8 and is_outlier(
+            value_pct, median(value_pct) filter (place <= 8) over epoch_of_chart, sd_pct, weight, z_limit
+        ) as is_far_first,
+        place_from_end <= 8 and is_outlier(
+            value_pct, median(value_pct) filter (place_from_end <= 8) over epoch_of_chart, sd_pct, weight, z_limit
+        ) as is_far_last
+    from placed
+    window epoch_of_chart as (partition by turnout_id, section_id, band, source, epoch)
+),
+values_pct as (
+    select
+        *,
+        case when place <= 8 and not (
+            is_far_first and count(*) over epoch_of_chart > 2 and count(*) filter (is_far_first) over epoch_of_chart = 1
+        ) then weight end as weight_first,
+        case when place_from_end <= 8 and not (
+            is_far_last and count(*) over epoch_of_chart > 2 and count(*) filter (is_far_last) over epoch_of_chart = 1
+        ) then weight end as weight_last
+    from marked
+    window epoch_of_chart as (partition by turnout_id, section_id, band, source, epoch)
+),
 levels as (
     select
         turnout_id, section_id, band, source, epoch,
         any_value(epoch_start_utc) as epoch_start_utc, max(sd_pct) as sd_pct, max(measured_at_utc) as last_at,
-        sum(weight * value_pct) filter (where place <= 8) / sum(weight) filter (where place <= 8) as first_pct,
-        count(*) filter (where place <= 8) as n_first, sum(weight) filter (where place <= 8) as weight_first,
-        sum(weight * value_pct) filter (where place_from_end <= 8)
-            / sum(weight) filter (where place_from_end <= 8) as last_pct,
-        count(*) filter (where place_from_end <= 8) as n_last,
-        sum(weight) filter (where place_from_end <= 8) as weight_last,
-        sum(weight * rail_temperature_c) filter (where place <= 8)
-            / sum(weight) filter (where place <= 8) as first_c,
-        sum(weight * rail_temperature_c) filter (where place_from_end <= 8)
-            / sum(weight) filter (where place_from_end <= 8) as last_c,
+        sum(weight_first * value_pct) / sum(weight_first) as first_pct, count(weight_first) as n_first,
+        sum(weight_last * value_pct) / sum(weight_last) as last_pct, count(weight_last) as n_last,
+        sum(weight_first * rail_temperature_c) / sum(weight_first) as first_c,
+        sum(weight_last * rail_temperature_c) / sum(weight_last) as last_c,
+        sum(weight_first) as weight_first, sum(weight_last) as weight_last,
         max(slope_se_pct_per_c) as slope_se_pct_per_c, max(n_baseline) as n_baseline
     from values_pct
     group by all
@@ -75,7 +96,7 @@ lost as (
     from pairs p
     join values_pct v using (turnout_id, section_id, band, source, epoch)
     where v.place > 8 and p.after_pct - p.before_pct > p.half
-        and v.mean_of_eight < (p.before_pct + p.after_pct) / 2
+        and v.mean_without_lowest < (p.before_pct + p.after_pct) / 2
     group by all
 )
 select

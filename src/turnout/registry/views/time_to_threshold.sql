@@ -11,8 +11,15 @@ select
         when 'settling' then 'no date: the values settle'
         when 'too_short' then 'too early for a date'
         when 'no_limit' then 'no limit in sight'
-        else 'not before ' || strftime(not_before_utc, '%Y-%m-%d')
-            || coalesce(', by ' || strftime(not_after_utc, '%Y-%m-%d') || ' if it goes on like this', ', no latest date')
+        else case
+            when not_before_utc > last_measured_at_utc
+                then 'not before ' || strftime(not_before_utc, '%Y-%m-%d')
+                    || case when not_after_utc is null then ', no latest date' else '' end
+            else 'the limit may be reached already'
+        end || case
+            when not_after_utc > last_measured_at_utc
+            then ', by ' || strftime(not_after_utc, '%Y-%m-%d') || ' if it goes on like this' else ''
+        end
     end as words
 from chart_status
 where forecast is not null;

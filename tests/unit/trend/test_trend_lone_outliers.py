@@ -1,0 +1,112 @@
+"""One campaign alone far outside counts neither in the level beside work nor in a change; a change always counts."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from benchmarks.trend_fleet import Fleet, modes, step
+from tests.unit.trend.evaluated_views import evaluated_views
+
+from turnout.trend import candidates, chart_status, describe_flagged, evaluate
+from turnout.trend.baseline import lone_outliers
+
+FLEET = Fleet(turnouts=40, sections=2, weeks=260, every=8, phi=0.0, campaign=0.3)
+N_CAMPAIGN = 33
+
+
+def with_lone_campaigns(rows, percent, first, last, seed):
+    """``rows`` with one campaign of each section, between two numbers of campaigns, that lies ``percent`` off."""
+    rng = np.random.default_rng(seed)
+    rows = rows.copy()
+    campaign = rows["measured_at_utc"].rank(method="dense").astype(int) - 1
+    section = rows["section_id"].cat.codes.to_numpy()
+    lone = rng.integers(first, last, section.max() + 1)
+    sign = rng.choice([-1.0, 1.0], section.max() + 1)
+    off = campaign.to_numpy() == lone[section]
+    rows["frequency_hz"] *= 1.0 + off * sign[section] * percent / 100.0
+    return rows
+
+
+def tamping(rows, before):
+    """Tamping of every turnout just before a campaign."""
+    turnouts = sorted(rows["turnout_id"].unique())
+    at = sorted(rows["measured_at_utc"].unique())[before] - pd.Timedelta(days=3)
+    return pd.DataFrame({"event_id": turnouts, "turnout_id": turnouts, "section_id": None, "kind": "tamping",
+                         "event_at_utc": at, "resets_ballast": True, "resets_railpad": True})  # fmt: skip
+
+
+@pytest.mark.parametrize("onset", range(1, 12))
+@pytest.mark.parametrize("size", [3.0, -30.0])
+def test_no_campaign_after_a_step_is_a_lone_outlier(onset, size):
+    values = np.tile([0.0, 1.0, 0.3], 4) + size * (np.arange(12) >= onset)
+    assert not lone_outliers(values).any()
+
+
+def test_a_lone_outlier_needs_both_neighbours_a_scatter_and_seven_steps():
+    values = np.tile([0.0, 1.0, 0.3], 4)
+    values[5] = -20.0
+    assert np.flatnonzero(lone_outliers(values)).tolist() == [5]
+    assert not lone_outliers(values[:6]).any() and not lone_outliers(values[5:]).any()
+    assert not lone_outliers(values[2:9]).any()
+    assert not lone_outliers(np.array([0.0] * 9 + [0.001] + [0.0] * 9)).any()  # rounded values: no scatter is known
+    assert not lone_outliers(np.zeros(0)).any()
+
+
+def test_lone_outliers_of_independent_values_are_rare():
+    """A value beyond both neighbours by six standard deviations: P = E[Phi(min - 6)] x 2, below 1e-5."""
+    values = np.random.default_rng(8).standard_normal((400, 50))
+    assert sum(lone_outliers(row).sum() for row in values) <= 3  # of 19,200
+
+
+def test_a_lone_campaign_does_not_widen_the_interval_of_a_change(settings):
+    which = np.zeros((FLEET.turnouts, 2), bool)
+    which[:, 0] = True
+    rows = modes(FLEET, 61, step(FLEET, which, -6.0, 160))
+    widths, covered = [], []
+    for values in (rows, with_lone_campaigns(rows, 12.0, 23, 31, 3)):
+        charts = evaluate(values, None, settings)
+        status = chart_status(charts, settings)
+        status = describe_flagged(status, candidates(charts, status, settings), settings)
+        told = status[status["section_id"].str.endswith("/S0") & status["since_at_utc"].notna()]
+        assert len(told) >= 38
+        widths.append((told["change_high_pct"] - told["change_low_pct"]).median())
+        covered.append(((told["change_low_pct"] <= -6.0) & (told["change_high_pct"] >= -6.0)).mean())
+    assert widths[1] < 1.3 * widths[0]
+    assert min(covered) > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 40)
+
+
+@pytest.mark.parametrize("effect", ["maintenance_effect", "change_since_event('tamping', 450)"])
+def test_a_lone_campaign_beside_work_is_no_effect_of_it(settings, effect):
+    """Work without effect; one campaign of the eight on either side lies 9 % off in every section."""
+    rows = with_lone_campaigns(modes(FLEET, 62), 9.0, 13, 29, 5)
+    change = "verdict <> 'cannot tell'" if effect == "maintenance_effect" else "changed"
+    with evaluated_views(rows, settings, tamping(rows, 21)) as con:
+        n, share, fewest = con.execute(
+            f"select count(*), avg(({change})::int), min(least(n_before, n_after)) from {effect}"
+        ).fetchone()
+    assert n == 80 and fewest == 7  # of the eight
+    assert share < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 40)  # the sections of a turnout share their campaigns
+
+
+def test_a_change_beside_work_counts_in_full(settings):
+    """From the second campaign after the work on, every section has gained 9 %: seven of eight campaigns have it."""
+    fleet = Fleet(turnouts=10, sections=2, weeks=260, every=8, phi=0.0, campaign=0.3)
+    rows = modes(fleet, 63, step(fleet, np.ones((10, 2), bool), 9.0, 22 * 8 - 1))
+    with evaluated_views(rows, settings, tamping(rows, 20)) as con:
+        gains = con.execute("select gain_pct, n_after from maintenance_effect").df()
+    assert (gains["n_after"] == 8).all()
+    assert gains["gain_pct"].to_numpy() == pytest.approx(9.0 * 6 / 8, abs=1.5)
+
+
+def test_a_lone_campaign_does_not_end_a_gain(settings):
+    fleet = Fleet(turnouts=10, sections=2, weeks=300, every=8, phi=0.0, campaign=0.3)
+    gained = step(fleet, np.ones((10, 2), bool), 4.0, 20 * 8 - 1)
+    lost = gained + step(fleet, np.ones((10, 2), bool), -4.0, 30 * 8 - 1)
+    rows = modes(fleet, 64, gained)
+    campaign = rows["measured_at_utc"].rank(method="dense").astype(int) - 1
+    rows.loc[campaign == 31, "frequency_hz"] *= 0.75  # by itself it takes the mean of eight below half of the gain
+    work = tamping(rows, 20)
+    with evaluated_views(rows, settings, work) as con:
+        assert con.execute("select count(held_until_utc), count(*) from maintenance_effect").fetchone() == (0, 20)
+    with evaluated_views(modes(fleet, 64, lost), settings, work) as con:
+        ((first, n),) = con.execute("select min(held_until_utc), count(held_until_utc) from maintenance_effect").fetchall()
+    assert n == 20 and first > sorted(rows["measured_at_utc"].unique())[30]
