@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 
 from turnout.constants import DAYS_PER_YEAR
-from turnout.trend.baseline import lone_outliers
 from turnout.trend.change_point import Change, find_change
 from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
@@ -69,11 +68,12 @@ WITHOUT_LIMIT: dict[str, Any] = {
 class Flag:
     """What is needed to describe one chart: the values of its present epoch and its CUSUM over the threshold.
 
-    ``time`` [d] and ``values`` [%] are (n,) arrays without ``lone_outliers``. Of a chart in alarm they lack the campaigns of alarms that have
-    closed, and the change came after ``not_before`` [d], the last of those. ``autocorrelation`` is the lag-one
-    coefficient. ``temperature`` (n,) [°C] is None for a whole turnout. ``slope_weight`` is that of ``fit_onsets``.
-    ``ratio`` (CUSUM over threshold) and ``opening_campaign`` (the campaign that raised each open alarm) are by
-    direction. ``pair`` holds both resonances of the section, None where only one has a chart.
+    ``time`` [d] and ``values`` [%] are (n,) arrays without ``lone_outliers``. Of a chart in alarm they also lack the
+    campaigns of alarms that have closed, and the change came after ``not_before`` [d], the last of those.
+    ``autocorrelation`` is the lag-one coefficient. ``temperature`` (n,) [°C] is None for a whole turnout.
+    ``slope_weight`` is that of ``fit_onsets``. ``ratio`` (CUSUM over threshold) and ``opening_campaign`` (the campaign
+    that raised each open alarm) are by direction. ``pair`` holds both resonances of the section, None where only one
+    has a chart.
     """
 
     time: np.ndarray
@@ -119,8 +119,7 @@ def candidates(charts: Charts, status: pd.DataFrame, settings: TrendSettings) ->
     )
     flags, numbers = {}, chart_numbers(charts)
     for i in np.flatnonzero((status["state"].to_numpy() == "alarm") | drifting):
-        column = np.flatnonzero(np.isfinite(charts.residual[i]) & (p.epoch[i] == p.epoch[i, -1]))
-        column = column[~lone_outliers(charts.residual[i, column] / charts.sigma[i, column])]
+        column = charts.present_campaigns(int(i))
         ratio = {d: getattr(charts, d)[i, -1] / getattr(charts, f"threshold_{d}")[i] for d in ("down", "up")}
         alarms = {d: getattr(charts, f"{d}_open")[i] for d in ("down", "up")}
         opening_campaign = {d: _opening_campaign(alarm) for d, alarm in alarms.items() if alarm[-1]}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.constants import MAD_TO_SD
 from turnout.trend.epochs import by_epoch, expand_epochs
 
 if TYPE_CHECKING:
@@ -248,7 +249,7 @@ def lone_outliers(values: np.ndarray) -> np.ndarray:
     steps = np.diff(values)
     if steps.size < MIN_STEPS:
         return alone
-    limit = LONE_SD * 1.4826 * float(np.median(np.abs(steps))) / np.sqrt(2.0)
+    limit = LONE_SD * MAD_TO_SD * float(np.median(np.abs(steps))) / np.sqrt(2.0)
     above = np.minimum(steps[:-1], -steps[1:])  # how far each inner value lies above the nearer neighbour
     below = np.minimum(-steps[:-1], steps[1:])
     alone[1:-1] = (limit > 0.0) & (np.maximum(above, below) > limit)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.trend.baseline import lone_outliers
+
 if TYPE_CHECKING:
     from turnout.trend.residuals import Prepared
 
@@ -49,3 +51,20 @@ class Charts:
     down_began: np.ndarray
     up_began: np.ndarray
     deviation: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def present_campaigns(self, chart: int) -> np.ndarray:
+        """Campaigns of the present epoch of a chart with a value, without ``lone_outliers``.
+
+        Parameters
+        ----------
+        chart : int
+            Number of the chart.
+
+        Returns
+        -------
+        (n,) array of int
+            Numbers of the campaigns.
+        """
+        epoch, residual, sigma = self.prepared.epoch[chart], self.residual[chart], self.sigma[chart]
+        campaigns = np.flatnonzero(np.isfinite(residual) & (epoch == epoch[-1]))
+        return campaigns[~lone_outliers(residual[campaigns] / sigma[campaigns])]

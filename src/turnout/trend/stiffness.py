@@ -164,7 +164,8 @@ def resonance_pair(
     time, values, error = {}, {}, {}
     for band in BANDS:
         i = chart_of[band]
-        columns = np.isfinite(charts.residual[i]) & np.isfinite(charts.sigma[i]) & (p.epoch[i] == p.epoch[i, -1])
+        columns = charts.present_campaigns(i)
+        columns = columns[np.isfinite(charts.sigma[i, columns])]
         time[band], values[band] = p.time[i, columns], charts.residual[i, columns]
         error[band] = charts.sigma[i, columns] * charts.guard[i] * charts.widening[i]
     low, high = (_mean_frequency(charts, chart_of[band]) for band in BANDS)

@@ -89,10 +89,13 @@ def fleet(tmp_path_factory):
 
 
 def straight_line(days, values, errors):
-    """Slope per year and its standard error by the weighted polynomial fit of numpy."""
+    """Slope per year and its standard error by the weighted polynomial fit of numpy.
+
+    numpy gives the error that follows from those of the values, and that from the scatter about the line.
+    """
     year = np.array(days) * 86400.0 / YEAR
-    fit, covariance = np.polyfit(year, values, 1, w=1.0 / np.array(errors), cov="unscaled")
-    return fit[0], np.sqrt(covariance[0, 0])
+    fits = [np.polyfit(year, values, 1, w=1.0 / np.array(errors), cov=cov) for cov in ("unscaled", True)]
+    return fits[0][0][0], *(float(np.sqrt(covariance[0, 0])) for _, covariance in fits)
 
 
 def test_growth_is_the_weighted_straight_line(fleet):
@@ -100,15 +103,32 @@ def test_growth_is_the_weighted_straight_line(fleet):
     values, errors = zip(*GROWING)
     for turnout, days, factor in (("t1", DAYS, 1.0), ("t3", DAYS[:3], 0.5)):
         n = len(days)
-        slope, error = straight_line(days, factor * np.array(values[:n]), errors[:n])
+        slope, from_errors, from_scatter = straight_line(days, factor * np.array(values[:n]), errors[:n])
         assert frame.per_year[turnout] == pytest.approx(slope, rel=1e-8)
-        assert frame.per_year_se[turnout] == pytest.approx(error, rel=1e-8)
+        assert frame.per_year_se[turnout] == pytest.approx(max(from_errors, from_scatter), rel=1e-8)
+        assert (from_scatter > from_errors) == (turnout == "t1")
         assert frame.n_visits[turnout] == n
     assert frame.value["t1"] == 0.93e-3 and np.isnan(frame.per_year["t5"])
     alone = fleet.execute("select per_year, per_year_se from parameter_growth where n_visits = 1").fetchall()
     assert set(alone) == {(None, None)}
     assert not frame.is_open["t3"] and frame.is_open["t1"]
     assert "t4" not in frame.index  # all its visits are before the tamping
+
+
+def test_visits_that_scatter_by_more_than_their_errors_widen_the_interval_of_the_growth(tmp_path):
+    """Three visits half a year apart at 0.4, 0.7 and 0.4 mm, each +- 0.05: chi squared is (1 + 4 + 1) * 4.
+
+    It has one degree of freedom. The slope is 0, its error sqrt(24) times 0.05 mm sqrt(2) a year.
+    """
+    bench = Bench(tmp_path)
+    bench.register(*(gap("t1", d * 365.25, v, 0.05e-3) for d, v in ((0, 0.4e-3), (0.5, 0.7e-3), (1.0, 0.4e-3))))
+    with open_registry(bench.registry) as connection:
+        columns = "per_year, per_year_se, mean_value, mean_value_se"
+        (row,) = connection.execute(f"select {columns} from parameter_growth").fetchall()
+    factor = np.sqrt(24.0)
+    assert row[0] == pytest.approx(0.0, abs=1e-12)
+    of_slope, of_mean = factor * 0.05e-3 * np.sqrt(2.0), factor * 0.05e-3 / np.sqrt(3.0)
+    assert row[1:] == pytest.approx((of_slope, 0.5e-3, of_mean), rel=1e-6)
 
 
 def test_hanging_sleepers_that_grow_are_large_open_and_growing(fleet):
@@ -209,11 +229,12 @@ def line_limits(days, values, errors, size):
 
     t, weights = np.array(days) / 365.25, np.array(errors) ** -2.0
     mean = weights @ t / weights.sum()
-    slope, slope_se = straight_line(days, values, errors)
+    slope, *errors_of_slope = straight_line(days, values, errors)
+    slope_se, excess = max(errors_of_slope), max(1.0, errors_of_slope[1] / errors_of_slope[0])
     level = weights @ np.array(values) / weights.sum()
 
     def limit(year, sign):
-        half = 1.959964 * np.sqrt(1.0 / weights.sum() + (slope_se * (year - mean)) ** 2)
+        half = 1.959964 * np.sqrt(excess**2 / weights.sum() + (slope_se * (year - mean)) ** 2)
         return level + slope * (year - mean) + sign * half - size
 
     return [365.25 * brentq(limit, mean, 50.0, args=(sign,)) for sign in (1.0, -1.0)]

@@ -1,7 +1,8 @@
 -- One row per turnout, effect, position, sensor and parameter that was named or accepted: its latest value, and its growth.
--- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Visits before
--- ballast work on their sections, unless it is only planned, do not count for effects of the ballast. is_open: no newer
--- visit diagnosed its sections.
+-- A straight line through all visits, each weighted by its standard error; NULL with a single visit. Where the visits
+-- scatter about the line by more than their standard errors, those of the line are larger by the same factor (Birge 1932).
+-- Visits before ballast work on their sections, unless it is only planned, do not count for effects of the ballast.
+-- is_open: no newer visit diagnosed its sections.
 -- needs: findings_newest
 create or replace view parameter_growth as
 with undone as (
@@ -22,7 +23,10 @@ visits as (
         ) and p.finding_id in (select finding_id from undone))
 ),
 centred as (
-    select *, year - sum(weight * year) over thing / sum(weight) over thing as t from visits
+    select
+        *, year - sum(weight * year) over thing / sum(weight) over thing as t,
+        value - sum(weight * value) over thing / sum(weight) over thing as v
+    from visits
     window thing as (partition by turnout_id, term, position_m, channel, parameter, unit)
 ),
 sums as (
@@ -32,15 +36,24 @@ sums as (
         arg_max(value_se, found_at_utc) as value_se, arg_max(finding_id, found_at_utc) as finding_id,
         sum(weight * t * value) as product, sum(weight * value) / sum(weight) as mean_value,
         sum(weight) ** -0.5 as mean_value_se, sum(weight * year) / sum(weight) as mean_year,
-        case when min(found_at_utc) < max(found_at_utc) then sum(weight * t * t) end as spread
+        case when min(found_at_utc) < max(found_at_utc) then sum(weight * t * t) end as spread,
+        sum(weight * v * v) as square
     from centred group by all
+),
+scaled as (
+    select
+        *, case when n_visits > 2 then sqrt(greatest(
+            1, (square - coalesce(product ** 2 / spread, 0)) / (n_visits - 2)
+        )) else 1 end as excess
+    from sums
 )
 select
     turnout_id, term, position_m, channel, parameter, unit, n_visits, first_at_utc, found_at_utc, value, value_se,
-    product / spread as per_year, spread ** -0.5 as per_year_se, mean_value, mean_value_se,
+    product / spread as per_year, excess * spread ** -0.5 as per_year_se, mean_value,
+    excess * mean_value_se as mean_value_se,
     make_timestamp((mean_year * 31557600e6)::bigint) as mean_at_utc,
     finding_id in (select finding_id from findings_newest) as is_open, finding_id
-from sums;
+from scaled;
 
 -- columns of parameter_growth
 -- turnout_id | varchar | | turnout
