@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("id", metavar="ID", nargs="?", help="turnout, or turnout/section")
     parser.add_argument("kind", metavar="KIND", nargs="?", help="tamping, pad_exchange, sensor_change ...")
-    parser.add_argument("date", metavar="DATE", nargs="?", help="YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC")
+    when = "YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC; a day alone begins at 00:00, before the tests of that day"
+    parser.add_argument("date", metavar="DATE", nargs="?", help=when)
     parser.add_argument("--resets", default="", help="'ballast', 'railpad', 'ballast railpad' or 'none'")
     parser.add_argument("--note", default="", help="free text")
     parser.add_argument("--effect", action="store_true", help="what the entered work did, from the registry")

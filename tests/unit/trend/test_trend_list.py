@@ -68,6 +68,11 @@ def test_an_open_alarm_stays_open_without_new_measurements(settings):
             assert state == "inspect this week" and f"not measured since {then:%Y-%m-%d}" in sentence
     with evaluated_views(rows, settings) as con:
         assert "not measured since" not in con.execute(question.format("newest_measurement()")).fetchall()[0][1]
+        # the whole fleet is silent: its alarms are as old on the list of a later day as its other charts
+        later = "newest_measurement() + interval 100 day"
+        assert con.execute(f"select count(*) from chart_states_on({later}) where state = 'not measured'").fetchone()[0]
+        then = rows["measured_at_utc"].max()
+        assert f"not measured since {then:%Y-%m-%d}" in con.execute(question.format(later)).fetchall()[0][1]
 
 
 @pytest.fixture(scope="module")

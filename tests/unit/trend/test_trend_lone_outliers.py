@@ -111,3 +111,17 @@ def test_a_lone_campaign_does_not_end_a_gain(settings):
         ends = con.execute("select held_until_utc from maintenance_effect where held_until_utc is not null").df()
     first = ends["held_until_utc"].min()
     assert len(ends) == 20 and first > sorted(rows["measured_at_utc"].unique())[30]
+
+
+def test_work_before_and_after_a_campaign_without_temperature_has_one_effect(settings):
+    """Tamped twice in a week, with a test between that has no temperature: both works used to be without an effect."""
+    fleet = Fleet(turnouts=3, sections=2, weeks=260, every=8, phi=0.0, campaign=0.3)
+    rows = modes(fleet, 65, step(fleet, np.ones((3, 2), bool), 4.0, 20 * 8 - 1))
+    between = sorted(rows["measured_at_utc"].unique())[20]
+    rows.loc[rows["measured_at_utc"] == between, "rail_temperature_c"] = np.nan
+    first = tamping(rows, 20)
+    second = first.assign(event_id=first["event_id"] + "b", kind="sleeper_change")
+    second["event_at_utc"] = between + pd.Timedelta(days=3)
+    with evaluated_views(rows, settings, pd.concat([first, second], ignore_index=True)) as con:
+        effects = con.execute("select kinds, n_before, n_after, verdict from maintenance_effect").fetchall()
+    assert effects == [("sleeper_change, tamping", 8, 8, "stiffer")] * 6

@@ -1,9 +1,9 @@
 -- One row per event of a kind and chart it touches: level in the days before and after, on residuals.
 -- Raw frequencies would call every October tamping a success: the summer lies before it, the winter behind.
 -- Windows are half open: [event - days, event) and [event, event + days). Levels are weighted means: a campaign whose
--- error is larger than usual counts by the inverse of its variance. One campaign alone that lies beyond the outlier limit
--- of its chart from the median of its side does not count, as in the chart. change_se_pct holds the scatter of the campaigns with
--- their memory, and what the error of the temperature slope makes of the difference in temperature.
+-- error is larger than usual counts by the inverse of its variance. Of a side with three or more, one campaign alone that
+-- lies beyond the outlier limit of its chart from their median does not count. change_se_pct holds the scatter of the
+-- campaigns with their memory, and what the error of the temperature slope makes of the difference in temperature.
 -- Of work on a whole turnout the siblings' median is left in, for what all sections share is asked for (but not in
 -- band amplitude).
 -- needs: campaign_weight, students_t

@@ -1,9 +1,9 @@
 -- One row per event and section's chart that it reset: did the work help, by how much, and for how long. Several events
--- between the same two campaigns are one row, dated by the last; a turnout's median begins again at 0 and has none.
--- gain_pct: level of the eight campaigns after the event minus that of the eight before. held_until_utc: first
+-- between the same two campaigns with a temperature are one row, dated by the last; a turnout's median begins again at 0
+-- and has none. gain_pct: level of the eight campaigns after the event minus that of the eight before. Of the eight, one
+-- campaign alone that lies beyond the outlier limit of its chart from their median does not count. held_until_utc: first
 -- campaign at which the mean of eight without the lowest has lost half of a gain again; empty = it holds, until
--- last_measured_at_utc. One campaign alone of the eight that lies beyond the outlier limit of its chart from their median
--- does not count, as in the chart.
+-- last_measured_at_utc.
 -- The siblings' median is left in, for work on a whole turnout lifts them all (but not in band amplitude). The interval
 -- holds the scatter of the campaigns with their memory, and what the error of the temperature slope makes of the
 -- difference in temperature. Levels are weighted means: a campaign whose error is larger than usual counts by the inverse
@@ -73,9 +73,10 @@ levels as (
         sum(weight_first * rail_temperature_c) / sum(weight_first) as first_c,
         sum(weight_last * rail_temperature_c) / sum(weight_last) as last_c,
         sum(weight_first) as weight_first, sum(weight_last) as weight_last,
-        max(slope_se_pct_per_c) as slope_se_pct_per_c, max(n_baseline) as n_baseline
+        max(slope_se_pct_per_c) as slope_se_pct_per_c, max(n_baseline) as n_baseline,
+        lag(epoch) over (partition by turnout_id, section_id, band, source order by epoch) as epoch_before
     from values_pct
-    group by all
+    group by turnout_id, section_id, band, source, epoch
 ),
 pairs as (
     select
@@ -89,7 +90,7 @@ pairs as (
     from levels l
     join levels b
         on l.turnout_id = b.turnout_id and l.section_id = b.section_id and l.band = b.band and l.source = b.source
-            and b.epoch = l.epoch - 1
+            and b.epoch = l.epoch_before
 ),
 lost as (
     select p.turnout_id, p.section_id, p.band, p.source, p.epoch, min(v.measured_at_utc) as held_until_utc

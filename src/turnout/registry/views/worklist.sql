@@ -49,7 +49,7 @@ alarmed as (
         r.turnout_id, r.section_id, r.band, r.source,
         r.direction, r.raised_at_utc, r.ratio, r.acknowledged,
         case
-            when least("asof", newest_charted()) - s.last_measured_at_utc
+            when "asof" - s.last_measured_at_utc
                 > to_microseconds((86400e6 * c.stale_after_days)::bigint)
             then s.last_measured_at_utc
         end as not_since_utc,
