@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from turnout.constants import MAD_TO_SD
+from turnout.constants import DAYS_PER_YEAR, MAD_TO_SD
 from turnout.trend.epochs import by_epoch, expand_epochs
 
 if TYPE_CHECKING:
@@ -285,6 +285,39 @@ def usual_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
     step = np.sort(step, axis=1)
     count = pair.sum(axis=1)
     return np.where(count > 0, step[np.arange(len(step)), np.maximum(count - 1, 0) // 2], np.nan)
+
+
+MAX_INTERVAL = 1.5 * DAYS_PER_YEAR  # d, a longer one is a pause of the measurements
+
+
+def mean_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Mean time between neighbouring campaigns of the mask, without pauses longer than ``MAX_INTERVAL``.
+
+    Three campaigns within a week of every quarter have a usual interval of days, and a mean one of a month.
+
+    Parameters
+    ----------
+    time : (n_chart, n_campaign) array of float
+        Time of each campaign. [d]
+    inside : (n_chart, n_campaign) array of bool
+        The mask.
+
+    Returns
+    -------
+    (n_chart,) array of float
+        Mean interval [d], nan where there is none.
+
+    Examples
+    --------
+    >>> mean_interval(np.array([[0.0, 2.0, 4.0, 94.0, 96.0, 1096.0]]), np.ones((1, 6), bool))
+    array([24.])
+    """
+    before = previous(inside)
+    pair = inside & (before >= 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        step = np.where(pair, time - np.take_along_axis(time, np.maximum(before, 0), axis=1), np.nan)
+        counts = step <= MAX_INTERVAL
+        return np.sum(np.where(counts, step, 0.0), axis=1) / np.where(counts.any(axis=1), counts.sum(axis=1), np.nan)
 
 
 def pooled_autocorrelation(autocorrelation: np.ndarray, classes: np.ndarray) -> np.ndarray:

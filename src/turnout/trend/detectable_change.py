@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import DAYS_PER_YEAR
+from turnout.trend.baseline import mean_interval
 from turnout.trend.detectability import detectable_shift
 from turnout.trend.epochs import by_epoch
 from turnout.trend.residuals import first_epoch, temperature_variance
@@ -45,7 +46,7 @@ def detectable_change(charts: Charts, settings: TrendSettings) -> tuple[np.ndarr
 
 
 def campaigns_a_year(p: Prepared) -> np.ndarray:
-    """Usual number of campaigns a year of each chart.
+    """Mean number of campaigns a year of each chart, from the intervals of its baseline.
 
     Parameters
     ----------
@@ -58,7 +59,8 @@ def campaigns_a_year(p: Prepared) -> np.ndarray:
         Number, 0 to 366.
     """
     with np.errstate(invalid="ignore"):
-        return np.clip(np.nan_to_num(np.round(DAYS_PER_YEAR / p.interval)), 0, 366).astype(int)
+        rate = DAYS_PER_YEAR / mean_interval(p.time, p.baseline.inside)
+        return np.clip(np.nan_to_num(np.round(rate)), 0, 366).astype(int)
 
 
 def spread_in(charts: Charts, chart: np.ndarray, epoch: np.ndarray) -> np.ndarray:

@@ -275,10 +275,15 @@ def test_a_forecast_has_no_date_for_constant_and_settling_charts(settings):
     assert "too early" in forecast(time[:8], noise[:8], 0.0, settings).sentence
 
 
-def test_the_number_of_campaigns_a_year_follows_from_the_usual_interval():
-    interval = np.array([365.25, 46.0, 7.0, 1.0, 0.5, 800.0, np.nan])
-    counts = campaigns_a_year(SimpleNamespace(interval=interval))
-    assert counts.tolist() == [1, 8, 52, 365, 366, 0, 0]
+def test_the_number_of_campaigns_a_year_follows_from_the_mean_interval():
+    spacings = (365.25, 46.0, 7.0, 1.0, 0.5, 800.0, np.nan)
+    time = np.array([spacing * np.arange(40.0) for spacing in spacings])
+    bursts = np.sort(np.concatenate([91.3125 * np.arange(10.0) + day for day in (0.0, 2.0, 5.0, 7.0)]))
+    paused = np.concatenate([30.4375 * np.arange(20.0), 3.0 * 365.25 + 30.4375 * np.arange(20.0, 40.0)])
+    time = np.vstack([time, bursts, paused])
+    charts = SimpleNamespace(time=time, baseline=SimpleNamespace(inside=np.isfinite(time)))
+    counts = campaigns_a_year(charts)
+    assert counts.tolist() == [1, 8, 52, 365, 366, 0, 0, 17, 12]  # of 40 campaigns in 829 days: 39 intervals
 
 
 def test_a_limit_that_the_line_may_have_passed_is_not_stated_as_a_later_date(settings):

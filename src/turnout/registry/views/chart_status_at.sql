@@ -174,7 +174,7 @@ where coalesce("asof" >= newest_charted(), true);
 -- reason | varchar | | why: see docs/trends.md
 -- last_measured_at_utc | timestamp | UTC | newest campaign with a value
 -- n_campaigns | integer | | campaigns with a value
--- campaigns_per_year | integer | | usual number of campaigns a year
+-- campaigns_per_year | integer | | mean number of campaigns a year in the baseline
 -- n_baseline | integer | | campaigns of the baseline
 -- baseline_until_utc | timestamp | UTC | campaign that completed the baseline; empty = not complete
 -- n_learned | integer | | campaigns that learned the present level
