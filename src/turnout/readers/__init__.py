@@ -189,6 +189,8 @@ MAX_REPEATS = 4  # copies of a file in itself that are looked for
 
 def _reject_repeated_bytes(source: Source) -> None:
     """ReadError if the file is a smaller one two to four times in a row: it was appended to itself."""
+    if not source.head.strip():
+        return
     for n in range(2, MAX_REPEATS + 1):
         part = source.size // n
         if part * n != source.size or part < MIN_REPEATED_SIZE or not _is_beginning(source, part):

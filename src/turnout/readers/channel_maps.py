@@ -10,7 +10,7 @@ import numpy as np
 
 from turnout.counts import first_texts
 from turnout.errors import ReadError
-from turnout.readers.attached_units import names_and_units_in
+from turnout.readers.attached_units import name_and_unit, names_and_units_in
 from turnout.readers.channel_descriptions import describing_entries, exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.column_forms import counts_samples
@@ -102,7 +102,7 @@ def channel_mappings(
         and not is_rate_name(record.names[i])
         and not _needs_no_name(record, i)
     ]:
-        names = _name_list([record.names[i] for i in unknown])
+        names = _name_list([record.names[i] or str(i) for i in unknown])
         raise source.error(
             where,
             f"the file has {'channel' if len(unknown) == 1 else 'channels'} {names}, which the layout does not name",
@@ -192,9 +192,11 @@ def index_of(
         else f"{CORRECT_SOURCE}, or find out why the logger did not record the channel"
     )
     problem = f"there is no channel {wanted!r}; there are {_name_list(record.names)}"
-    stated = next((e for e in record.entries if isinstance(e.value, str) and _key_of_name(e.value) == key), None)
+    texts = [(e, text) for e in record.entries for text in (e.value, e.name) if isinstance(text, str)]
+    stated = next((e for e, text in texts if key in (_key_of_name(text), _key_of_name(name_and_unit(text)[0]))), None)
     if stated:
-        problem += f", and {wanted!r} is the value of {stated.name!r} in {stated.place}"
+        is_value = isinstance(stated.value, str) and _key_of_name(stated.value) == key
+        problem += f", and {wanted!r} {f'is the value of {stated.name!r}' if is_value else 'stands'} in {stated.place}"
         hint = "Name the channel by its number in the layout, from 0; nothing in the file gives this name to a channel"
     raise source.error(where, problem, hint, reason="channel_missing")
 

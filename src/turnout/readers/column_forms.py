@@ -3,6 +3,7 @@
 import numpy as np
 
 from turnout.readers.lazy import Column
+from turnout.readers.source import BLOCK_SIZE
 
 HEAD_SIZE = 1000  # samples from which a column is judged before all of it is read
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
@@ -100,7 +101,7 @@ def is_on_line(samples: np.ndarray) -> bool:
 
 
 def counts_samples(column: Column) -> bool:
-    """Whether a column in memory numbers its samples by ones from 0 or 1, none left out: no sensor measures this.
+    """Whether a column numbers its samples by ones from 0 or 1, none left out: no sensor measures this.
 
     Parameters
     ----------
@@ -116,6 +117,8 @@ def counts_samples(column: Column) -> bool:
     >>> counts_samples(np.arange(1.0, 33.0)), counts_samples(np.delete(np.arange(33.0), 9)), counts_samples(np.ones(32))
     (True, False, False)
     """
-    if not isinstance(column, np.ndarray) or column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE:
+    if column.dtype.kind not in "fiu" or len(column) < MIN_AXIS_SIZE or column[:1][0] not in (0, 1):
         return False
-    return column[0] in (0, 1) and bool(np.array_equal(column, column[0] + np.arange(len(column))))
+    first = column[:1][0]
+    blocks = ((a, column[a : a + BLOCK_SIZE]) for a in range(0, len(column), BLOCK_SIZE))
+    return all(np.array_equal(block, first + np.arange(a, a + len(block))) for a, block in blocks)

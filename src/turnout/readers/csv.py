@@ -21,6 +21,7 @@ A last line without line break may end in a truncated number: it is left out and
 many decimals as all others.
 """
 
+import codecs
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -32,7 +33,16 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.clock_texts import is_clock_or_date
-from turnout.readers.csv_cells import BLANK, SEPARATORS, cells_of, decode_line, first_cells, is_row
+from turnout.readers.csv_cells import (
+    BLANK,
+    BREAK_IN_CELL,
+    SEPARATORS,
+    cells_of,
+    decode_line,
+    first_cells,
+    is_row,
+    with_whole_cells,
+)
 from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns, line_number
@@ -43,7 +53,7 @@ from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAME
 from turnout.readers.number_notations import has_other_notation, with_plain_numbers
 from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
 from turnout.readers.repeated_heads import check_separate, tables_of
-from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, RawFile, RawRecord, Source
+from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_or_clock_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
@@ -72,13 +82,14 @@ def read_raw(source: Source) -> RawFile:
     encoding = wide_encoding(source.head)
     lazy = source.lazy and not encoding
     data = source.memory_map if lazy else _in_utf8(source, encoding) if encoding else source.data
-    end = len(data) - (data[-1:] == END_OF_FILE)
+    end, remarks = _end_of_content(data, source)
     if data.find(b"\n") < 0:
         data, lazy = data[:end].replace(b"\r", b"\n"), False
-    if not lazy or has_other_notation(source.head):
-        lazy, data = False, with_plain_numbers(data[:end])
+    if not lazy or has_other_notation(source.head) or BREAK_IN_CELL.search(source.head):
+        lazy, data = False, with_whole_cells(with_plain_numbers(data[:end]))
         end = len(data)
-    end, remarks = _end_of_rows(data, _end_of_text(data, end), source)
+    end, further_remarks = _end_of_rows(data, _end_of_text(data, end), source)
+    remarks += further_remarks
     if isinstance(data, bytes):
         data = data[:end]
     head = read_head(data, source)
@@ -89,7 +100,19 @@ def read_raw(source: Source) -> RawFile:
         remarks += tuple(remark for raw in raw_files for remark in raw.remarks)
         return RawFile(records, raw_files[0].expected, remarks)
     raw = _read_table(data, end, lazy, head, source)
+    if data[end - 1 : end] not in (b"\n", b"\r"):
+        remarks += _short_record_remarks(raw.records, source)
     return replace(raw, remarks=remarks + raw.remarks)
+
+
+def _short_record_remarks(records: Sequence[RawRecord | ReadError], source: Source) -> tuple[ReadError, ...]:
+    """Remark on a last record that is shorter than each of the others, in a text that ends within a line."""
+    counts = [len(record.samples[0]) for record in records if isinstance(record, RawRecord) and record.samples]
+    if len(counts) < 2 or counts[-1] >= min(counts[:-1]):
+        return ()
+    where = f"record {len(records)} of {len(records)}"
+    problem = f"has {counts[-1]} samples and each other record {min(counts[:-1])} or more, and its last line has no end"
+    return (source.error(where, problem, f"{COPY_AGAIN} if it was cut off", reason="truncated"),)
 
 
 def _read_damaged_table(table: bytes, n_table: int, source: Source) -> RawFile:
@@ -231,6 +254,19 @@ def _shape(row: bytes) -> tuple[int, int]:
     return len(cells), len(decimals[1]) if decimals else 0
 
 
+def _end_of_content(data: bytes | mmap, source: Source) -> tuple[int, tuple[ReadError, ...]]:
+    """Byte behind the content, and the remark on zero bytes below it, where a file was reserved and not written."""
+    end = len(data)
+    while end and data[end - 1] == 0:
+        block = data[max(0, end - HEAD_SIZE) : end]
+        end -= len(block) - len(block.rstrip(b"\0"))
+    n_zero = len(data) - end
+    if n_zero and data.rfind(b"\n", 0, end) >= 0:
+        problem = f"its last {n_zero} bytes are 0x00: nothing was written to them"
+        return end, (source.error(f"byte {end}", problem, COPY_AGAIN, reason="truncated"),)
+    return len(data) - (data[-1:] == END_OF_FILE), ()
+
+
 EMPTY_LINE = re.compile(rb"[;,\t| \"\r]*")
 
 
@@ -245,9 +281,14 @@ END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text
 
 
 def _in_utf8(source: Source, encoding: str) -> bytes:
-    """A file that a spreadsheet saved as "Unicode" (UTF-16), or in UTF-32, converted to UTF-8."""
+    """A file that a spreadsheet saved as "Unicode" (UTF-16), or in UTF-32, converted to UTF-8.
+
+    A replacement character stands for a last character that was cut.
+    """
+    decoder = codecs.getincrementaldecoder(encoding)()
     with source.parsed_by("Python", f"the text in {encoding[:6].upper()}"):
-        return source.data.decode(encoding).encode()
+        text = decoder.decode(source.data)
+    return f"{text}\ufffd".encode() if decoder.getstate()[0] else text.encode()
 
 
 TIME_UNIT_REMEDY = "Find out which is right; then correct the other in the header of the file"

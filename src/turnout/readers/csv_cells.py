@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from turnout.readers.clock_texts import is_clock_or_date
-from turnout.readers.source import COPY_AGAIN, Source
+from turnout.readers.source import COPY_AGAIN, HEAD_SIZE, Source
 from turnout.readers.texts import decode_text
 
 # What loggers and spreadsheets write for a missing value; these become nan.
@@ -100,15 +100,47 @@ def cells_of(line: str, separator: str) -> list[str]:
     --------
     >>> cells_of('"force [N]"; -1,5 ', ";"), cells_of("# force [N]  rail (m/s²)", " ")
     (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
+    >>> cells_of('"Kraft; Hammer [N]";-1,5', ";")
+    ['Kraft; Hammer [N]', '-1,5']
     >>> cells_of("  [s]   [N]  (m/s²)", " ")
     ['[s]', '[N]', '(m/s²)']
     """
     if separator == BLANK:
         return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
-    if separator == "," and '"' in line:  # a comma between quotation marks is a decimal mark
+    is_quoted = separator in line.partition('"')[2] if separator != "," else '"' in line
+    if is_quoted and line.count('"') % 2 == 0:  # a separator between quotation marks separates nothing
         with suppress(csv.Error):  # a byte that no text has
-            return [cell.strip() for cell in next(csv.reader([line]), [])]
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
     return [cell.strip().strip('"') for cell in line.split(separator)]
+
+
+BREAK_IN_CELL = re.compile(rb'(?:^|(?<=[;,\t|]))"[^"\n]{0,80}\n[^"]{0,80}"(?=[;,\t|\r\n])', re.MULTILINE)
+
+
+def with_whole_cells(data: bytes) -> bytes:
+    """A text with a blank in place of each line break between the quotation marks of a cell of its head.
+
+    Parameters
+    ----------
+    data : bytes
+        The text.
+
+    Returns
+    -------
+    bytes
+        As many lines: an empty one stands above a line for each that was joined to it.
+
+    Examples
+    --------
+    >>> with_whole_cells(b'"force\\n[N]";rail\\n1;2\\n')
+    b'\\n"force [N]";rail\\n1;2\\n'
+    """
+    while match := BREAK_IN_CELL.search(data, 0, HEAD_SIZE):
+        start = data.rfind(b"\n", 0, match.start()) + 1
+        cell = re.sub(rb"[\r\n]+", b" ", match[0])
+        empty_lines = b"\n" * match[0].count(b"\n")
+        data = data[:start] + empty_lines + data[start : match.start()] + cell + data[match.end() :]
+    return data
 
 
 def first_cells(data: bytes | mmap, offset: int, separator: str) -> list[str]:
@@ -211,6 +243,9 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
         if THOUSANDS.fullmatch(cell) or DECIMAL.fullmatch(cell):
             problem = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
+        elif not cell or "\0" in cell:
+            content = "zero bytes, to which nothing was written," if cell else "blanks"
+            problem, remedy = f"{content} in place of a number", COPY_AGAIN
         else:
             problem = f"{cell[:60]!r} is no number"
             remedy = PLAIN_NUMBER_REMEDY if re.search(r"\d", cell) else NO_ROW_REMEDY

@@ -47,7 +47,7 @@ def time_column(names: Sequence[str], units: Sequence[str]) -> int | None:
     >>> time_column(["T", "t", "force"], ["°C", "s", "N"]), time_column(["T", "force"], ["°C", "N"])
     (1, None)
     """
-    by_unit = [i for i, unit in enumerate(units) if unit.strip() and _plain_unit(unit) in UNITS_OF_TIME_ALONE]
+    by_unit = [i for i, unit in enumerate(units) if unit.strip() and _is_unit_of_time_alone(unit)]
     is_named = [name.strip().lower() in TIME_WORDS for name in names]
     by_name = [i for i, unit in enumerate(units) if is_named[i] and not _is_of_other_quantity(names[i], unit)]
     sure = [i for i in by_name if names[i].strip() != "T"]
@@ -93,6 +93,16 @@ def seconds_per_number(unit: str, source: Source) -> float:
         remedy = "Export the time in s, ms, µs, ns, min, h or d, or as the time of day with seconds"
         raise source.error("the time column", f"its unit {unit!r} is not known", remedy, reason="unit_unknown")
     return float(time_unit.scale)
+
+
+def _is_unit_of_time_alone(unit: str) -> bool:
+    """Whether a unit says alone that a column is the time: a symbol, or a word that is no abbreviation."""
+    plain, of_rate = _plain_unit(unit), rate_unit(unit)
+    is_word = len(plain) > MAX_ABBREVIATION_SIZE and of_rate is not None and of_rate.is_step and not of_rate.is_sampling
+    return plain in UNITS_OF_TIME_ALONE or is_word
+
+
+MAX_ABBREVIATION_SIZE = 3  # letters: "min", "h" and "d" may be a minimum, a height and a distance
 
 
 def _plain_unit(unit: str) -> str:
@@ -216,6 +226,9 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         return Columns(names, [""] * count, [], [(name,) for name in names], {})
     name_line, unit_line = names_among(lines)
     written = lines[name_line]
+    if unit_line is not None:  # a line of units may hold a name with its unit below an empty cell
+        pairs_of_cells = zip(written, lines[unit_line])
+        written = [cell or (other if other and not _is_unit(other) else "") for cell, other in pairs_of_cells]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     below = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     pairs = names_and_units_in(written)

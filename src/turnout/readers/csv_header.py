@@ -126,6 +126,7 @@ def _complete_head(
     texts = [cells_of(text, separator) for text in text_lines]
     if separator == BLANK:
         texts = [words for words in texts if len(words) == len(cells)]
+    texts += _names_between_other_separators(text_lines[-1:], texts, cells)
     texts += _commented_names(head_lines[-MAX_LINES_OF_NAMES:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
     _check_width(texts, cells, separator, len(head_lines), source)
@@ -215,6 +216,16 @@ def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
         line = decode_line(data[start:end])
         rows.append([] if ";" in line or "|" in line else cells_of(line, BLANK))
     return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and is_row(row) for row in rows)
+
+
+def _names_between_other_separators(
+    last_lines: Sequence[str], texts: Sequence[Sequence[str]], cells: Sequence[str]
+) -> list[list[str]]:
+    """Cells of the last line of words if only another separator than that of the rows gives each column a name."""
+    if any(len(text) >= len(cells) - (not cells[-1]) for text in texts):
+        return []
+    lines = [cells_of(line, separator) for line in last_lines for separator in (*SEPARATORS, ",", BLANK)]
+    return [names for names in lines if len(names) == len(cells) and are_names(names)][:1]
 
 
 def _commented_names(

@@ -11,7 +11,7 @@ from pyarrow import csv
 from turnout.readers.csv_cells import MarkStatistics
 from turnout.readers.lazy import LazyColumn
 
-N_SUMMARY_ROWS = 6  # rows at the end, among which those of the least and the largest numbers are looked for
+N_SUMMARY_ROWS = 6  # rows at an end, among which those of the least and the largest numbers are looked for
 
 
 class FilePart(io.RawIOBase):
@@ -79,9 +79,9 @@ class RowReader:
 
     def __init__(self, path: Path, offset: int, end: int, options: dict[str, Any]):
         self.path, self.offset, self.end, self.options = path, offset, end, options
-        self.n_row, self.begin = 0, 0
+        self.n_row, self.begin, self.has_blank_rows = 0, 0, False
         self.marks: list[MarkStatistics] = []
-        self.low = self.high = self.last_rows = np.empty((0, 0))
+        self.low = self.high = self.edge_rows = np.empty((0, 0))
         self.batches: list[pa.RecordBatch] = []
         self.reader: csv.CSVStreamingReader | None = None
 
@@ -101,6 +101,9 @@ class RowReader:
         values = []
         for batch in self._open():
             self.n_row += batch.num_rows
+            if batch.column(0).null_count:
+                is_null = [column.is_null().to_numpy(zero_copy_only=False) for column in batch.columns]
+                self.has_blank_rows |= bool(np.logical_and.reduce(is_null).any())
             self.marks = self.marks or [MarkStatistics() for _ in batch.columns]
             for statistics, column in zip(self.marks, batch.columns):
                 statistics.add(column.to_numpy(zero_copy_only=False))
@@ -110,17 +113,16 @@ class RowReader:
         return None if time is None else np.concatenate(values)
 
     def _add_extremes(self, rows: np.ndarray) -> None:
-        """Extend the least and largest numbers above the last rows by those of further rows."""
-        rows = np.concatenate([self.last_rows, rows]) if self.last_rows.size else rows
-        above, self.last_rows = rows[:-N_SUMMARY_ROWS], rows[-N_SUMMARY_ROWS:]
-        if len(above):
-            self.low = np.min([*self.low[-1:], above.min(axis=0)], axis=0)[None]
-            self.high = np.max([*self.high[-1:], above.max(axis=0)], axis=0)[None]
+        """Extend the least and largest numbers, and the rows at both ends, by further rows."""
+        rows = np.concatenate([self.edge_rows.reshape(-1, rows.shape[1]), rows])
+        self.low = np.min([*self.low, rows.min(axis=0)], axis=0)[None]
+        self.high = np.max([*self.high, rows.max(axis=0)], axis=0)[None]
+        self.edge_rows = np.concatenate([rows[:N_SUMMARY_ROWS], rows[N_SUMMARY_ROWS:][-N_SUMMARY_ROWS:]])
 
     @property
     def may_have_summary(self) -> bool:
-        """Whether one of the last rows holds the least, and one the largest number of each column."""
-        return all(bool((self.last_rows == extreme).all(axis=1).any()) for extreme in (self.low, self.high))
+        """Whether one of the rows at the ends holds the least, and one the largest number of each column."""
+        return all(bool((self.edge_rows == extreme).all(axis=1).any()) for extreme in (self.low, self.high))
 
     def column(self, i: int) -> LazyColumn:
         """Column number ``i``.

@@ -11,6 +11,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from turnout.readers.clock_texts import is_clock_or_date, with_dates, with_durations
+from turnout.readers.csv_blank_rows import with_empty_lines, without_blank_rows
 from turnout.readers.csv_cells import (
     MISSING_VALUES,
     cell_errors,
@@ -54,29 +55,21 @@ def columns_in_memory(
     ReadError
         If a cell is no number, a row has another width, or an empty line separates the rows.
     """
-    context = source, data, offset, separator, names
     options = _options(data, offset, separator, len(names))
+    options["parse_options"] = csv.ParseOptions(delimiter=separator, ignore_empty_lines=False)
     line = line_number(data, offset)
     end = len(data)
-    strict = options | {"parse_options": csv.ParseOptions(delimiter=separator, ignore_empty_lines=False)}
+    rows: bytes | memoryview = memoryview(data)[offset:]
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
         try:
-            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **strict)
-            if not table.column(0).null_count:  # an empty line is a row without values
-                columns = _columns_of(table, *context)
-                _check_summary(columns, line + 1, source)
-                return columns, ()
-        except pa.ArrowInvalid:
-            pass
-        try:
-            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:]), **options)
+            table = csv.read_csv(io.BytesIO(rows), **options)
         except pa.ArrowInvalid:
             end = _start_of_footer(data, offset, len(data), separator)
-            if end == len(data):
-                raise
-            table = csv.read_csv(io.BytesIO(memoryview(data)[offset:end]), **options)
-    _check_one_block(data, offset, end, source)
-    columns = _columns_of(table, *context)
+            rows = with_empty_lines(data[offset:end])
+            table = csv.read_csv(io.BytesIO(rows), **options)
+    if table.column(0).null_count:
+        table = without_blank_rows(table, bytes(rows), line + 1, names, source)
+    columns = _columns_of(table, source, data, offset, separator, names)
     _check_summary(columns, line + 1, source)
     return columns, _footer_entries(data, end, len(data), separator, names)
 
@@ -137,39 +130,27 @@ def _start_of_footer(data: bytes | mmap, offset: int, end: int, separator: str) 
 
 
 def _check_summary(columns: Sequence[Column], first_line: int, source: Source) -> None:
-    """ReadError if a row at the end holds the least, and one the largest number that each column has above it.
+    """ReadError if a row at one end holds the least, and one the largest number that each column has in other rows.
 
     No other row does, as that of a periodic signal would. The first row is in line ``first_line``.
     """
     numbers = [np.asarray(column[:]) for column in columns if column.dtype.kind == "f"]
-    first = len(columns[0]) - N_SUMMARY_ROWS if columns else 0  # of the rows at the end
-    if len(numbers) < 2 or first <= N_SUMMARY_ROWS:
+    n_row = len(columns[0]) if columns else 0
+    if len(numbers) < 2 or n_row <= 2 * N_SUMMARY_ROWS:
         return
     summaries = []
     for extreme in (np.min, np.max):
-        is_extreme = np.logical_and.reduce([column == extreme(column[:first]) for column in numbers])
-        summaries.append(np.flatnonzero(is_extreme))
-    if all(len(rows) == 1 and rows[0] >= first for rows in summaries):
-        line = first_line + int(min(rows[0] for rows in summaries))
-        problem = "from here on rows hold the least and the largest number of each column: they are a summary"
+        is_extreme = [column == extreme(column) for column in numbers]
+        rows = np.flatnonzero(np.logical_and.reduce(is_extreme))
+        if len(rows) != 1 or any(np.count_nonzero(column) < 2 for column in is_extreme):
+            return
+        summaries.append(int(rows[0]))
+    if min(summaries) >= n_row - N_SUMMARY_ROWS or max(summaries) < N_SUMMARY_ROWS:
+        is_below = min(summaries) >= n_row - N_SUMMARY_ROWS
+        line = first_line + (min(summaries) if is_below else max(summaries))
+        problem = "rows hold the least and the largest number of each column: they are a summary"
+        problem = f"{'from here on' if is_below else 'up to here'} {problem}"
         raise source.error(f"line {line}", problem, "Delete the rows that are no samples", reason="wrong_length")
-
-
-def _check_one_block(data: bytes | mmap, offset: int, end: int, source: Source) -> None:
-    """ReadError if an empty line separates rows from further ones: a summary of the columns, or another record.
-
-    The parser skips empty lines. They separate nothing where one follows each row.
-    """
-    empty = [i for mark in (b"\n\n", b"\n\r\n") if 0 <= (i := data.find(mark, offset, end))]
-    if not empty or not data[min(empty) : end].strip():
-        return
-    first = min(empty)
-    n_row = sum(1 for line in data[first:end].splitlines() if line.strip())
-    if b"\n" not in data[offset:first].strip(b"\r\n") and 2 * n_row <= data[first:end].count(b"\n") + 1:
-        return
-    problem = f"an empty line stands before its last {n_row} rows: they may be a summary or another record"
-    remedy = "Delete them if they are no samples; export each record to a file, or number them in a column 'record'"
-    raise source.error(f"line {line_number(data, first) + 2}", problem, remedy, reason="wrong_length")
 
 
 def lazy_columns(
@@ -181,7 +162,7 @@ def lazy_columns(
     names: Sequence[str],
     time: int | None,
 ) -> tuple[list[Column], tuple[Entry, ...]]:
-    """Columns that read their numbers when sliced; a time column is read at once.
+    """Columns that read their numbers when sliced; a time column is read at once, and a text with blank rows as well.
 
     Parameters
     ----------
@@ -222,7 +203,8 @@ def lazy_columns(
                 raise
             rows = RowReader(source.path, offset, end_of_numbers, options)
             times = rows.scan(time)
-    _check_one_block(data, offset, rows.end, source)
+    if rows.has_blank_rows or any(data.find(mark, offset, rows.end) >= 0 for mark in (b"\n\n", b"\n\r\n")):
+        return columns_in_memory(source, data[:end], offset, separator, names)
     columns: list[Column] = [rows.column(i) for i in range(len(names))]
     if rows.n_row > N_SUMMARY_ROWS and rows.may_have_summary:
         _check_summary(columns, line + 1, source)

@@ -535,10 +535,20 @@ def test_text_in_the_encodings_of_loggers_and_spreadsheets_is_read(encoding, end
     np.testing.assert_allclose(result.recordings[0].samples, X.T.round(4), atol=1e-12)
 
 
-def test_an_incomplete_character_of_utf16_is_an_error(tmp_path):
-    (tmp_path / "a.csv").write_bytes("force,acc\n1,2\n".encode("utf-16")[:-1])
-    with pytest.raises(ReadError, match="the text in UTF-16"):
-        read("a.csv", tmp_path, NAMED)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+@pytest.mark.parametrize("n_lost", [1, 2, 3, 5])
+def test_a_cut_text_loses_its_last_row_in_any_encoding(encoding, n_lost, tmp_path):
+    rows = "".join(f"{a:.4f},{b:.4f}\n" for a, b in X) + "0.1234,0.5678\n"
+    size = {"utf-8": 1, "utf-16": 2, "utf-32": 4}[encoding]
+    content = f"force,acc\n{rows}".encode(encoding)
+    (tmp_path / "a.csv").write_bytes(content[: -size * 2 - n_lost])
+    result = read("a.csv", tmp_path, replace(NAMED, rate=20000.0))
+    np.testing.assert_allclose(result.recordings[0].samples, X.T.round(4), atol=1e-12)
+    assert [error.reason for error in result.errors] == ["truncated"]
+    assert result.errors[0].where == f"line {len(X) + 2}"
+    (tmp_path / "b.csv").write_bytes("force,acc\n1,2\n".encode(encoding)[: -size - 1])
+    with pytest.raises(ReadError, match=r"b\.csv, line 1: no line of numbers follows"):
+        read("b.csv", tmp_path, replace(NAMED, rate=20000.0))
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
