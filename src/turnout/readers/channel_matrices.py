@@ -4,8 +4,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from turnout.readers.array_metadata import Alphabetical
-from turnout.readers.array_names import numbered_names
+from turnout.readers.array_metadata import Alphabetical, list_of_texts
+from turnout.readers.array_names import numbered_names, split_texts
 from turnout.readers.channel_descriptions import quantity_of_sensor
 from turnout.readers.metadata_names import CHANNEL_NAMES, UNIT_NAMES
 from turnout.readers.sample_variables import matrices, underscored_name, vectors
@@ -29,7 +29,7 @@ def with_records_of_channels(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     """
     blocks = matrices(variables)
     shapes = {block.shape for block in blocks.values()}
-    if len(blocks) < 2 or len(shapes) > 1 or vectors(variables) or numbered_names(blocks):
+    if len(blocks) < 2 or len(shapes) > 1 or vectors(variables):
         return variables
     shape = shapes.pop()
     if len(shape) != 2 or min(shape) < 2 or shape[0] == shape[1] or not _are_channels(blocks, variables):
@@ -41,15 +41,16 @@ def with_records_of_channels(variables: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _are_channels(blocks: Mapping[str, Any], variables: Mapping[str, Any]) -> bool:
-    """Whether the names or units of matrices differ as those of channels, and no list names the channels of a matrix.
+    """Whether a list of channels names the matrices; without a list, whether their names or units differ as theirs.
 
     "force" and "rail" do, and N and m/s²; "hammer A7" and "hammer B3" may be two tests of all channels each.
     """
     entries = {underscored_name(name.lower()): value for name, value in variables.items()}
-    if any(name in entries for name in CHANNEL_NAMES):
-        return False
+    lists = [entries[name] for name in CHANNEL_NAMES if name in entries]
+    if lists:  # any other one names the channels of one matrix
+        return any(set(split_texts(list_of_texts(names))) == set(blocks) for names in lists)
     words = {re.sub(r"\d+", "", name) for name in blocks}
     units = [value for name in UNIT_NAMES if isinstance(value := entries.get(name), Mapping)]
     are_units_different = bool(units) and len({str(units[0].get(name, "")) for name in blocks}) > 1
     are_sensors_different = len(set(map(quantity_of_sensor, blocks))) > 1
-    return len(words) == len(blocks) and (are_units_different or are_sensors_different)
+    return len(words) == len(blocks) and not numbered_names(blocks) and (are_units_different or are_sensors_different)

@@ -35,6 +35,7 @@ DECIMAL_COMMA_REMEDY = (
     f"{NO_ROW_REMEDY}; where the decimal mark is a comma, export with semicolons or tabs between columns"
 )
 
+ZERO_BYTES = "zero bytes, to which nothing was written,"
 PLAIN_NUMBER_REMEDY = "Export numbers as '-12.5' or '-1.25e1', without other signs and without units"
 
 
@@ -232,6 +233,8 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
             where = f"line {line + int(match[1])}" if match[1] else f"the numbers after line {line}"
             count = "1 cell" if match[3] == "1" else f"{match[3]} cells"
             problem = f"a row has {count} instead of {match[2]}: {match[4].strip()[:60]!r}"
+            if "\0" in match[4]:
+                raise source.error(where, f"{ZERO_BYTES} in a row of numbers", COPY_AGAIN) from error
             has_one_comma_mark = "," in match[4] and not re.search(r"[;\t|]", match[4])
             remedy = DECIMAL_COMMA_REMEDY if has_one_comma_mark else NO_ROW_REMEDY
             raise source.error(where, problem, remedy) from error
@@ -244,7 +247,7 @@ def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[Non
             problem = f"{cell!r} has marks for thousands, or another decimal mark than other numbers"
             remedy = "Export all numbers with one decimal mark and without marks for thousands"
         elif not cell or "\0" in cell:
-            content = "zero bytes, to which nothing was written," if cell else "blanks"
+            content = ZERO_BYTES if cell else "blanks"
             problem, remedy = f"{content} in place of a number", COPY_AGAIN
         else:
             problem = f"{cell[:60]!r} is no number"

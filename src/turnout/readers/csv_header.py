@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from mmap import mmap
 from typing import NamedTuple
 
+from turnout.readers.csv_blank_rows import BLANK_ROW
 from turnout.readers.csv_cells import (
     BLANK,
     DECIMAL_COMMA_REMEDY,
@@ -214,6 +215,8 @@ def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
     while len(rows) < N_ROWS_OF_WORDS and end < len(data):
         start, end = end, (data.find(b"\n", end) + 1) or len(data)
         line = decode_line(data[start:end])
+        if BLANK_ROW.fullmatch(line.encode()) or not line:
+            continue
         rows.append([] if ";" in line or "|" in line else cells_of(line, BLANK))
     return len(rows) > 1 and len(rows[0]) > 1 and all(len(row) == len(rows[0]) and is_row(row) for row in rows)
 

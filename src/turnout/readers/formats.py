@@ -9,6 +9,7 @@ from importlib import import_module
 
 from turnout.readers.condition_units import with_converted_conditions
 from turnout.readers.declared_sizes import check_declared_sizes
+from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.source import RawFile, RawRecord, Source
 from turnout.readers.split_starts import with_stated_starts
 from turnout.readers.start_columns import with_axis_start
@@ -67,6 +68,10 @@ class Format:
         return replace(raw, records=records)
 
 
+TEXT_MODULES = ("uff", "lvm", "csv")
+TEXT_REMEDY = "Give a table of text the extension .csv or .txt; copy any other file again from the logger"
+
+
 def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == HDF5_SIGNATURE for at in (0, 512, 1024, 2048))
 
@@ -105,7 +110,8 @@ def detect_format(source: Source) -> Format:
     Raises
     ------
     ReadError
-        If neither the first bytes nor the extension are those of a known format.
+        If neither the first bytes nor the extension are those of a known format, or if a text has the extension of a
+        format of binary numbers.
     """
     head = source.head
     extension = source.path.suffix.lower()
@@ -113,8 +119,14 @@ def detect_format(source: Source) -> Format:
         if entry.signature(head) and not (entry.module == "hdf5" and extension == ".rcmdx"):
             return entry
     for entry in FORMATS.values():
-        if extension in entry.extensions:
+        if extension not in entry.extensions:
+            continue
+        if entry.module in TEXT_MODULES or CONTROL_CHARACTER.search(head):
             return entry
+        problem = (
+            f"its extension {extension!r} is that of {entry.meaning}, and its first bytes are text ({head[:20]!r})"
+        )
+        raise source.error("byte 0", problem, TEXT_REMEDY)
     names = ", ".join(FORMATS)
     raise source.error(
         "byte 0",

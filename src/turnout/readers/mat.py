@@ -120,13 +120,15 @@ def _cells_of_channels(variables: dict[str, Any]) -> dict[str, Any] | None:
 
     The channels of one record are equally long, so the vectors of such a cell are no channels of one record where their
     lengths differ and those of the other channels differ alike. Cells whose names differ in numbers alone are records
-    themselves. A cell with the name of a sensor holds none: if its lengths fit no other cell, it cannot be read.
+    themselves. A cell with the name of a sensor holds none: beside a cell of as many vectors a record of other
+    lengths is damaged where half of the records fit; else the cell cannot be read.
     """
     cells = {n: v for n, v in variables.items() if isinstance(v, list) and v and all(map(_is_list_of_numbers, v))}
     is_uneven = any(len(set(map(len, vectors))) > 1 for vectors in cells.values())
     words = {re.sub(r"\d+", "", name) for name in cells}
-    vectors_by_record = zip_longest(*cells.values())
-    are_alike = all(len({len(v) for v in vectors if v is not None}) == 1 for vectors in vectors_by_record)
+    fits = [len({len(v) for v in vectors if v is not None}) == 1 for vectors in zip_longest(*cells.values())]
+    is_of_sensors = any(map(quantity_of_sensor, cells)) and len(set(map(len, cells.values()))) == 1
+    are_alike = all(fits) or (is_of_sensors and 2 * sum(fits) >= len(fits))
     if not is_uneven or not are_alike or len(cells) < 2 or len(words) < len(cells):
         is_of_sensor = is_uneven and any(map(quantity_of_sensor, cells))  # its vectors are no channels of one record
         return variables | {name: _uneven_cell(vectors) for name, vectors in cells.items()} if is_of_sensor else None

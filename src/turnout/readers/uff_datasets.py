@@ -132,8 +132,17 @@ def ascii_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndarr
     try:
         values = _numbers(body, widths)
     except ValueError as error:
-        return np.empty(0), position, f"a number cannot be read ({error})"
+        return np.empty(0), position, f"a number cannot be read ({_reason_of(error)})"
     return values, position, damage
+
+
+TEXT_IN_PLACE = re.compile(r".*(?:float|base 10): (?:np\.bytes_\()?b?'(.*?)'\)?", re.DOTALL)
+
+
+def _reason_of(error: ValueError) -> str:
+    """What a conversion of text to a number reports, without the words of Python."""
+    match = TEXT_IN_PLACE.fullmatch(str(error))
+    return str(error) if match is None else f"'{match[1].strip()}' is no number" if match[1].strip() else "it is blank"
 
 
 def _numbers(body: bytes, widths: Sequence[int]) -> np.ndarray:
@@ -309,7 +318,7 @@ def _read_dataset(data: bytes | mmap, begin: Delimiter) -> tuple[UffDataset, int
     except ValueError as error:
         closing_delimiter = find_delimiter(data, start)
         return UffDataset(
-            begin.start, dataset_type, damage=f"the header cannot be read ({error})"
+            begin.start, dataset_type, damage=f"the header cannot be read ({_reason_of(error)})"
         ), closing_delimiter.end if closing_delimiter else len(data)
     read_numbers = binary_numbers if dataset_type == "58b" else ascii_numbers
     values, position, damage = read_numbers(data, at, header)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 
@@ -134,3 +135,35 @@ def test_an_attribute_without_a_value_does_not_cost_the_file(place, dtype, tmp_p
         file["nothing"] = h5py.Empty("f8")
     result = read("a.h5", tmp_path, RawDescription(SENSORS, rate=RATE))
     assert [r.samples.tolist() for r in result.recordings] == samples_of(1).tolist() and not result.errors
+
+
+@pytest.mark.parametrize("form", ["npz", "npz, samples first", "npz, other order", "npz, like names", "mat", "hdf5"])
+def test_a_list_of_the_names_of_matrices_says_that_each_is_a_channel(form, tmp_path):
+    names, units = ["ch1", "ch2"] if "like" in form else ["force", "rail"], ["N", "m/s²"]
+    matrices = dict(zip(names, np.random.default_rng(3).normal(size=(2, 3, 200))))
+    stored = {name: matrix.T if "first" in form else matrix for name, matrix in matrices.items()}
+    lists = {"channels": names, "units": units}
+    if "other order" in form:
+        lists = {name: texts[::-1] for name, texts in lists.items()}
+    path = tmp_path / f"a.{form[:3].replace('hdf', 'h5')}"
+    if form == "mat":
+        scipy.io.savemat(path, stored | {"fs": 20000.0} | {k: np.array(v, dtype=object) for k, v in lists.items()})
+    elif form == "hdf5":
+        with h5py.File(path, "w") as file:
+            file.update(stored)
+            file.attrs.update(lists | {"fs": 20000.0})
+    else:
+        np.savez(path, **stored, **lists, fs=20000.0)
+    channels = tuple(map(RawChannel, ("force", "rail"), names, ("force", "acceleration")))
+    result = read(path.name, tmp_path, RawDescription(channels))
+    assert result.errors == ()
+    expected = np.stack([matrices[name] for name in names], axis=1)
+    np.testing.assert_allclose([r.samples for r in result.recordings], expected, atol=1e-12)
+
+
+def test_a_list_of_other_names_is_that_of_one_matrix(tmp_path):
+    matrices = np.random.default_rng(3).normal(size=(2, 2, 200))
+    np.savez(tmp_path / "a.npz", force=matrices[0], rail=matrices[1], channels=["left", "right"], fs=20000.0)
+    channels = (RawChannel("left", "left", "acceleration", unit="m/s²"),)
+    with pytest.raises(ReadError, match="several arrays could be the samples: 'force', 'rail'"):
+        read("a.npz", tmp_path, RawDescription(channels))

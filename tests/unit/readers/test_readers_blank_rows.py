@@ -128,9 +128,10 @@ def test_zero_bytes_are_reported_as_not_written(tmp_path):
     np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
     (error,) = result.errors
     assert error.reason == "truncated" and error.where == f"byte {len(text)}" and "5000 bytes are 0x00" in error.problem
-    (tmp_path / "a.csv").write_bytes(text[:300] + b"\0" * 512 + text[300:])
-    with pytest.raises(ReadError, match=r"a\.csv, line \d+, column 'force': zero bytes, to which nothing was written"):
-        read("a.csv", tmp_path, LAYOUT)
+    for hole in (b"\0" * 512 + text[300:], b"\0" * 20 + text[320:]):
+        (tmp_path / "a.csv").write_bytes(text[:300] + hole)
+        with pytest.raises(ReadError, match=r"a\.csv, line \d+.*: zero bytes, to which nothing was written"):
+            read("a.csv", tmp_path, LAYOUT)
 
 
 def test_a_text_of_blanks_is_not_reported_as_appended_to_itself(tmp_path):
@@ -189,3 +190,19 @@ def test_a_count_of_the_samples_needs_no_name_in_a_long_text(first, tmp_path):
     for lines, is_read in ((rows, True), ([*rows[:30], *rows[31:]], False)):
         result = result_of(tmp_path, ["Sample;force;rail", *lines], **IN_FILE)
         assert len(result.long_recordings) == is_read and bool(result.errors) != is_read
+
+
+@pytest.mark.parametrize("blank", ["", " ", "\t\t", ";"])
+@pytest.mark.parametrize("n_above", [1, 2, 4])
+def test_a_blank_line_among_the_first_rows_between_blanks_does_not_hide_those_above_it(blank, n_above, tmp_path):
+    rows = [row.replace(";", "   ") for row in rows_of(FIRST)]
+    with pytest.raises(ReadError, match=rf"line {n_above + 2}: .* stands before its last {N - n_above} rows"):
+        result_of(tmp_path, ["force rail", *rows[:n_above], blank, *rows[n_above:]])
+
+
+@pytest.mark.parametrize("true_rate", [RATE, 25600.0])
+def test_a_label_of_the_line_of_names_is_not_the_name_of_the_time(true_rate, tmp_path):
+    rows = [f"{1e3 * k / true_rate:.9g};{row}" for k, row in enumerate(rows_of(FIRST))]
+    result = result_of(tmp_path, ["Channel;force;rail", "t [ms];N;m/s²", *rows])
+    assert [error.reason for error in result.errors] == ["wrong_rate"] * (true_rate != RATE)
+    assert len(result.recordings) == (true_rate == RATE)

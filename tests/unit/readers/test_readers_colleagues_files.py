@@ -191,18 +191,21 @@ def test_matrices_with_the_same_unit_are_an_error(tmp_path):
 
 
 @pytest.mark.parametrize("layout", [BY_NAME, BY_NUMBER])
-@pytest.mark.parametrize(
-    "variables",
-    [
-        {"force": cell(FORCE[0], FORCE[1], FORCE[2][:30]), "rail": cell(*RAIL)},
-        {"force": cell(FORCE[0], FORCE[1], FORCE[2][:30])},
-    ],
-)
-def test_a_cell_of_a_sensor_with_vectors_of_different_lengths_is_an_error(variables, layout, tmp_path):
+def test_a_cell_of_a_sensor_with_vectors_of_different_lengths_is_an_error(layout, tmp_path):
     """Formerly, the short vector was left out, and two impacts of the force were read as force and response."""
-    scipy.io.savemat(tmp_path / "a.mat", {**variables, "fs": RATE})
+    scipy.io.savemat(tmp_path / "a.mat", {"force": cell(FORCE[0], FORCE[1], FORCE[2][:30]), "fs": RATE})
     records, (error,) = outcome("a.mat", tmp_path, layout)
     assert records == [] and "cell with vectors of 400, 400, 30 samples" in error.problem
+
+
+@pytest.mark.parametrize("layout", [BY_NAME, BY_NUMBER])
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_a_short_vector_in_the_cell_of_a_sensor_costs_its_record_alone(lost, layout, tmp_path):
+    force = [vector[:30] if k == lost else vector for k, vector in enumerate(FORCE[:3])]
+    scipy.io.savemat(tmp_path / "a.mat", {"force": cell(*force), "rail": cell(*RAIL[:3]), "fs": RATE})
+    records, (error,) = outcome("a.mat", tmp_path, layout)
+    np.testing.assert_allclose(records, [(FORCE[k], RAIL[k]) for k in range(3) if k != lost], atol=1e-12)
+    assert error.reason in ("truncated", "channel_missing") and error.where == f"record {lost + 1} of 3"
 
 
 def test_a_list_of_names_is_used_under_every_notation_of_its_name(tmp_path):

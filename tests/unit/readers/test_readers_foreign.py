@@ -437,3 +437,10 @@ def test_the_error_of_a_file_without_samples_states_its_content(tmp_path):
         with pytest.raises(ReadError) as caught:
             read(name, tmp_path, layout)
         assert words in str(caught.value) and "Copy the file again" not in str(caught.value)
+
+
+@pytest.mark.parametrize("extension", [".tdms", ".mat", ".h5", ".npz", ".parquet", ".wav", ".rcmdx"])
+def test_a_text_with_the_extension_of_binary_numbers_is_reported_as_text(extension, tmp_path):
+    (tmp_path / f"a{extension}").write_text("force [N];rail [m/s²]\n" + "1.5;2.5\n3.5;-4.5\n" * 9, encoding="utf-8")
+    with pytest.raises(ReadError, match=r"first bytes are text \(b'force .*\.csv or \.txt"):
+        read(f"a{extension}", tmp_path, RawDescription(()))

@@ -544,3 +544,25 @@ def test_text_after_the_last_set_is_accepted(tail, tmp_path):
     result = read("a.uff", tmp_path, description)
     assert len(result.recordings) == 2 and len(result.errors) <= 1
     assert all("delete what follows the last set" in error.remedy for error in result.errors)
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "words"),
+    [
+        (20, "1.2x456e+00", "'1.2x456e+00' is no number"),
+        (20, "", "it is blank"),
+        (9, "4.5", "'4.5' is no number"),
+        (9, "", "it is blank"),
+    ],
+)
+def test_a_text_in_place_of_a_number_is_quoted_without_words_of_python(line, text, words, hammer_test, in_si, tmp_path):
+    path = write(hammer_test[:1], tmp_path / "a.uff", "uff58")
+    lines = path.read_bytes().split(b"\n")
+    width = 20 if line == 20 else 10
+    lines[line - 1] = text.encode().rjust(width) + lines[line - 1][width:]
+    path.write_bytes(b"\n".join(lines))
+    try:
+        message = "; ".join(map(str, read(path.name, tmp_path, in_si).errors))
+    except ReadError as error:
+        message = str(error)
+    assert f"cannot be read ({words})" in message
