@@ -228,7 +228,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     written = lines[name_line]
     if unit_line is not None:  # it may hold a name with its unit below an empty cell or the label of the line of names
         pairs_of_cells = zip(written, lines[unit_line])
-        written = [other if _is_name_below(cell, other) else cell for cell, other in pairs_of_cells]
+        written = [lower if _is_name_below(upper, lower) else upper for upper, lower in pairs_of_cells]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     below = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
     pairs = names_and_units_in(written)
@@ -243,12 +243,12 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     return Columns(names, units, further, [*zip(written, *others)], conflicts)
 
 
-def _is_name_below(cell: str, other: str) -> bool:
+def _is_name_below(upper: str, lower: str) -> bool:
     """Whether a cell of the line of units holds the name of its column: below an empty cell, or with a unit of time."""
-    if not other or _is_unit(other):
+    if not lower or _is_unit(lower):
         return False
-    unit = name_and_unit(other)[1]
-    return not cell or (bool(unit) and _is_unit_of_time_alone(unit))
+    unit = name_and_unit(lower)[1]
+    return not upper or (bool(unit) and _is_unit_of_time_alone(unit))
 
 
 def _contradicting_unit(cell: str, unit: str) -> str:
