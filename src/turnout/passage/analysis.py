@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 MAX_SHORT_SPAN, SHORT_SPAN_ERROR = 10.0, 0.3  # m: span of a short row of sensors; position error of each in it
 MIN_DURATION = 0.1  # s, least duration of a recording: two blocks of the quiet level
+MAX_MOTION_PASSES = 4  # of the times at the sensors and the motion in turn
 MIN_CONTRAST = 1.5  # least ratio of accepted to rejected peaks of an unknown train
 MIN_NAMED_CONTRAST = 1.0  # the same of a train with a template: no peak that it leaves is higher than its weakest axle
 
@@ -131,7 +132,13 @@ def _analyse_train(
     patterns: Sequence[Pattern],
     settings: PassageSettings,
 ) -> Passage:
-    """Passage of the train that ``sensors`` record."""
+    """Passage of the train that ``sensors`` record.
+
+    The motion is sought relative to the middle of the sensors. Relative to a distant origin, an error of the
+    acceleration would change the times of the axles against each other.
+    """
+    origin = float(np.mean(envelopes.positions))
+    envelopes = envelopes.relative_to(origin)
     is_multi_sensor, direction, all_envelopes = bool(np.ptp(envelopes.positions) > 0.05), "unknown", envelopes
     if is_multi_sensor:
         envelopes, sensors, direction, count = _count_by_several_sensors(
@@ -147,7 +154,8 @@ def _analyse_train(
     findings += _axle_count_doubts(passage, axles, all_envelopes, is_multi_sensor, settings)
     findings += _out_of_search(passage, settings)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
-    return replace(passage, status=_status(findings, "accepted"), findings=tuple(findings))
+    motion = replace(passage.train_motion, origin=origin)
+    return replace(passage, motion=motion, status=_status(findings, "accepted"), findings=tuple(findings))
 
 
 def _count_by_several_sensors(
@@ -292,7 +300,7 @@ def _estimate_motion(
     # a short row of sensors and no template: the position error of each sensor decides
     unaided = is_multi_sensor and train_type.type == UNKNOWN and np.ptp(envelopes.positions) < MAX_SHORT_SPAN
     position_error = SHORT_SPAN_ERROR if unaided else settings.place_error
-    for _ in range(2):
+    for _ in range(MAX_MOTION_PASSES):
         times = sensor_times(envelopes, motion, offsets) if is_multi_sensor else motion.time(offsets)[None]
         from_sensors = (
             _sensor_speed(times, envelopes, motion.direction, position_error, settings) if is_multi_sensor else None

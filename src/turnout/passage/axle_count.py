@@ -17,7 +17,7 @@ import scipy
 
 from turnout.constants import KMH
 from turnout.passage.axles import AxleFinding, fit_axle_positions
-from turnout.passage.comb import CORRELATION_LENGTH, evidence, explained_share, fit_shape, profiles_at
+from turnout.passage.comb import CORRELATION_LENGTH, centred_start, evidence, explained_share, fit_shape, profiles_at
 from turnout.passage.comb_search import (
     SPEED_STEP,
     FittedRow,
@@ -96,6 +96,7 @@ def match_template(
     )
     if gain > MAX_SHAPE_GAIN * likeliest.evidence:
         return None
+    likeliest = replace(likeliest, start=centred_start(profiles, likeliest.comb, likeliest.start))
     speed, speed_se, acceleration, acceleration_se, fitted = estimate_speed(envelopes, likeliest, settings)
     offsets = fitted.comb.offsets
     half_duration = 0.5 * offsets[-1] / speed
@@ -116,10 +117,11 @@ def match_template(
         speed,
         speed_se,
     )
-    origin = float(profiles_at(envelopes, [fitted.motion]).origin[0])
+    profiles = profiles_at(envelopes, [fitted.motion])
+    start = float(profiles.origin[0]) + centred_start(profiles, fitted.comb, fitted.start)
     weakest, further = wheels.extremes(offsets, settings.axle_spacing_minimum)
     axles = AxleFinding(
-        origin + fitted.start + offsets,
+        start + offsets,
         np.ones(offsets.size),
         1.0 / (1.0 - likeliest.share),
         "comb",

@@ -244,6 +244,13 @@ def fit_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets: np.n
         Fitted offsets; the first estimates where the fitted ones are not in order. [m]
     """
     offsets = np.asarray(offsets, dtype=float)
+    new_offsets = _near_axle_positions(envelopes, motion, offsets)
+    new_offsets = np.where(np.isfinite(new_offsets), new_offsets, offsets)
+    return new_offsets if np.all(np.diff(new_offsets) > 0.5) else offsets
+
+
+def _near_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> np.ndarray:
+    """(n_axle,) fitted offsets [m], nan for an axle that would move more than ``MAX_SHIFT``."""
     start, stop = offsets[0] - FIT_REACH, offsets[-1] + FIT_REACH
     values, positions = envelopes.levels.values, envelopes.positions
     level = along_train(values, envelopes.levels.step, positions, motion, start, stop).mean(axis=0)
@@ -254,8 +261,8 @@ def fit_axle_positions(envelopes: SensorEnvelopes, motion: Motion, offsets: np.n
         inside = slice(*np.searchsorted(grid, [offsets[group[0]] - FIT_REACH, offsets[group[-1]] + FIT_REACH]))
         initial = np.concatenate([offsets[group], height[group], [0.0]])
         candidates = _fit_positions(grid[inside], level[inside], initial, group.size)
-        new_offsets[group] = np.where(np.abs(candidates - offsets[group]) <= MAX_SHIFT, candidates, offsets[group])
-    return new_offsets if np.all(np.diff(new_offsets) > 0.5) else offsets
+        new_offsets[group] = np.where(np.abs(candidates - offsets[group]) <= MAX_SHIFT, candidates, np.nan)
+    return new_offsets
 
 
 def _fit_positions(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int) -> np.ndarray:
@@ -295,6 +302,8 @@ def _level_misfit(grid: np.ndarray, level: np.ndarray, x: np.ndarray, n: int) ->
 def sensor_times(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray) -> np.ndarray:
     """(n_sensor, n_axle) passing times [s]; nan where a sensor's axle position deviates much from the common one.
 
+    A sensor whose record has no axle near the common position has no time there: the common one is no measurement.
+
     Parameters
     ----------
     envelopes : SensorEnvelopes
@@ -311,7 +320,8 @@ def sensor_times(envelopes: SensorEnvelopes, motion: Motion, offsets: np.ndarray
     """
     rows = []
     for i, x in enumerate(envelopes.positions):
-        axle_positions = fit_axle_positions(envelopes.select([i]), motion, offsets)
-        deviation = np.abs(axle_positions - offsets - np.median(axle_positions - offsets))
+        axle_positions = _near_axle_positions(envelopes.select([i]), motion, offsets)
+        shift = axle_positions - offsets
+        deviation = np.abs(shift - np.median(shift[np.isfinite(shift)])) if np.isfinite(shift).any() else shift
         rows.append(np.where(deviation < 0.7 * MAX_SHIFT, motion.passing(axle_positions, x), np.nan))
     return np.array(rows)

@@ -25,17 +25,19 @@ REFINED_WIDTH = 0.03  # of the slowness, to either side in a fine scan
 
 @dataclass(frozen=True)
 class Motion:
-    r"""Position of the first axle: :math:`u(t) = v (t - t_0) + \tfrac12 a (t - t_0)^2` from the turnout's origin.
+    r"""Travel of the first axle: :math:`u(t) = v (t - t_0) + \tfrac12 a (t - t_0)^2` from the origin.
 
-    ``speed`` [m/s] above 0 and ``acceleration`` [m/s²] at ``start`` [s], when the first axle passes the origin;
-    ``direction`` is +1 where the train runs towards larger positions (facing: from the switch to the crossing),
-    -1 against them. An axle ``d`` metres behind the first passes the position ``x`` when u = d + direction * x.
+    ``speed`` [m/s] above 0 and ``acceleration`` [m/s²] at ``start`` [s], when the first axle passes the ``origin``, a
+    position [m]. ``direction`` is +1 where the train runs towards larger positions (facing: from the switch to the
+    crossing), -1 against them. An axle ``d`` metres behind the first passes the position ``x`` when
+    u = d + direction * (x - origin).
     """
 
     speed: float
     start: float = 0.0
     acceleration: float = 0.0
     direction: int = 1
+    origin: float = 0.0
 
     def time(self, distance: float | np.ndarray) -> np.ndarray:
         """Time at which the first axle is ``distance`` [m] past the origin; negative ``distance`` before it. [s]
@@ -88,7 +90,7 @@ class Motion:
         (...) array of float
             Of the shape of ``offsets``. [s]
         """
-        return self.time(np.asarray(offsets, dtype=float) + self.direction * position)
+        return self.time(np.asarray(offsets, dtype=float) + self.direction * (position - self.origin))
 
     def speed_at(self, time: float | np.ndarray) -> np.ndarray:
         """Speed at ``time`` [s]. [m/s]
@@ -147,11 +149,11 @@ def passing_times(motions: Sequence[Motion], offsets: np.ndarray, position: floa
     (n_motion, n) array of float
         Times at which these axles pass the position. [s]
     """
-    speed, start, acceleration, direction = (
+    speed, start, acceleration, direction, origin = (
         np.array([[value] for value in values])
-        for values in zip(*((m.speed, m.start, m.acceleration, m.direction) for m in motions))
+        for values in zip(*((m.speed, m.start, m.acceleration, m.direction, m.origin) for m in motions))
     )
-    return _time_at(speed, start, acceleration, offsets + direction * position)
+    return _time_at(speed, start, acceleration, offsets + direction * (position - origin))
 
 
 @dataclass(frozen=True)

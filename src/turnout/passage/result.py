@@ -29,7 +29,9 @@ class PassageSensor:
 
 @dataclass(frozen=True, repr=False)
 class SpeedFinding:
-    """``speed`` [m/s] with ``se`` at ``time`` [s], halfway through the passage; ``acceleration`` [m/s²] with its error.
+    """``speed`` [m/s] with ``se``, and ``acceleration`` [m/s²] with its error.
+
+    ``time`` [s] is when the middle of the train passes the middle of the sensors: the speed is that moment's.
 
     ``source`` is "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's bogies).
     ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.
@@ -67,6 +69,7 @@ class Passage:
     """One train found in a recording.
 
     ``offsets`` (n_axle,) [m] behind the first axle, ``times`` (n_axle,) [s] when they pass the turnout's origin.
+    The origin of ``motion`` is in the middle of the sensors.
     ``at_sensor`` maps a channel to (n_axle,) [s], for channels that recorded the train; ``audible_sensors`` names them.
     ``status`` is "accepted", "partly" or "rejected" with ``findings``; ``contrast`` of the axle count.
     """
@@ -114,7 +117,7 @@ class Passage:
     @property
     def times(self) -> np.ndarray:
         """(n_axle,) times at which the axles pass the turnout's origin; empty without a motion. [s]"""
-        return self.motion.time(self.offsets) if self.motion else np.zeros(0)
+        return self.motion.passing(self.offsets, 0.0) if self.motion else np.zeros(0)
 
     @property
     def audible_sensors(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -180,3 +180,18 @@ class SensorEnvelopes:
             levels.values[rows], levels.step, levels.scatter[rows], levels.loud_power[rows], levels.amplitude[rows]
         )
         return SensorEnvelopes(selected, self.slow[rows], self.positions[rows], self.begin, self.end)
+
+    def relative_to(self, position: float) -> SensorEnvelopes:
+        """The same envelopes, with the sensors' positions relative to a given one.
+
+        Parameters
+        ----------
+        position : float
+            The new origin. [m]
+
+        Returns
+        -------
+        SensorEnvelopes
+            At ``positions`` less ``position``.
+        """
+        return replace(self, positions=self.positions - position)

@@ -292,25 +292,46 @@ def _candidate(
     """Motion, residual and evidence of one row of vehicles."""
     _, vehicles, choices = row
     positions = offsets(vehicles)
-    limit = settings.acceleration_limit
-    (v, a), covariance = axle_times_to_motion(times, positions, sigma / np.sqrt(2), limit)
-    if not settings.speed_minimum / KMH <= v <= settings.speed_maximum / KMH or abs(a) > limit:
+    motion, covariance, residual = _row_motion(times, positions, settings, sigma)
+    v, a = motion
+    if not settings.speed_minimum / KMH <= v <= settings.speed_maximum / KMH or abs(a) > settings.acceleration_limit:
         return None
-    elapsed = times - times[0]
-    residual = np.diff(v * elapsed + 0.5 * a * elapsed**2) - np.diff(positions)
-    chi_squared = float(np.sum((residual / sigma) ** 2))
-    freedom = max(len(residual) - 2, 1)
+    chi_squared, freedom = float(np.sum((residual / sigma) ** 2)), _freedom(residual)
     if speed is not None and speed_se:
         chi_squared += float((v - speed) ** 2 / (speed_se**2 + covariance[0, 0]))
         freedom += 1
     evidence = -0.5 * chi_squared - len(residual) * np.log(sigma * np.sqrt(2 * np.pi)) - choices
-    rms = float(np.sqrt(np.mean(residual**2)))
-    # the error of the motion follows the observed scatter, as far as a few axles determine it
-    covariance = covariance * min(1.0, max((rms / sigma) ** 2 * len(times) / freedom, 0.1))
-    # errors of neighbours are correlated, most in a heavy vehicle: fewer of them are independent
-    covariance = covariance * _variance_inflation(v * elapsed + 0.5 * a * elapsed**2 - positions)
     p_value = float(scipy.stats.chi2.sf(chi_squared, freedom))
-    return _Candidate(type_, evidence, p_value, vehicles, positions, rms, ((v, a), covariance))
+    return _Candidate(type_, evidence, p_value, vehicles, positions, _rms(residual), (motion, covariance))
+
+
+def _row_motion(
+    times: np.ndarray, positions: np.ndarray, settings: PassageSettings, sigma: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Motion of a row of axles, its covariance, and the residuals (n_axle - 1,) of the axle spacings [m].
+
+    A second fit has the error that the residuals of the first show. It is not a factor on the covariance: the prior of
+    the acceleration is as wide as before.
+    """
+    position_error, limit = sigma / np.sqrt(2), settings.acceleration_limit
+    motion, _ = axle_times_to_motion(times, positions, position_error, limit)
+    elapsed = times - times[0]
+    fitted_positions = motion[0] * elapsed + 0.5 * motion[1] * elapsed**2
+    residual = np.diff(fitted_positions) - np.diff(positions)
+    # the error of an axle follows the observed scatter, as far as a few axles determine it
+    ratio = (_rms(residual) / sigma) ** 2 * len(times) / _freedom(residual)
+    # errors of neighbours are correlated, most in a heavy vehicle: fewer of them are independent
+    factor = min(1.0, max(ratio, 0.1)) * _variance_inflation(fitted_positions - positions)
+    return *axle_times_to_motion(times, positions, position_error * np.sqrt(factor), limit), residual
+
+
+def _rms(residual: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(residual**2)))
+
+
+def _freedom(residual: np.ndarray) -> int:
+    """Degrees of freedom of the residuals of axle spacings after a fit of speed and acceleration."""
+    return max(len(residual) - 2, 1)
 
 
 def _variance_inflation(residual: np.ndarray) -> float:

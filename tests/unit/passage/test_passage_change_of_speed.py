@@ -1,5 +1,6 @@
 """Trains that brake or accelerate while sensors over fifty metres record them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,13 +16,13 @@ FREIGHT = np.concatenate([14.0 * k + np.array(WAGONS[k % 3]) for k in range(22)]
 
 
 def passage_and_speed(settings, offsets, speed, acceleration, direction):
-    """The passage, and its true speed halfway between the first and the last axle at the origin. [m/s]"""
+    """The passage, and the true speed when the middle of the train passes the middle of the sensors. [m/s]"""
     random = np.random.default_rng(3)
     recording = rolling_noise(random, offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     first = min(PLACES) if direction > 0 else max(PLACES)
-    at_origin = passing_times(offsets, (first, 0.0), speed, acceleration, direction, 3.0)[1]
-    return passage, speed + acceleration * (0.5 * (at_origin[0] + at_origin[-1]) - 3.0)
+    at_middle = passing_times(offsets, (first, np.mean(PLACES)), speed, acceleration, direction, 3.0)[1]
+    return passage, speed + acceleration * (0.5 * (at_middle[0] + at_middle[-1]) - 3.0)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -55,3 +56,32 @@ def test_exact_times_of_a_train_that_changes_its_speed_give_speed_and_accelerati
     speed, se, found, _, at = _sensor_speed(times, sensors, 1, settings.place_error, settings)
     assert speed == pytest.approx(9.0 + acceleration * (at - 3.0), rel=1e-4) and se < 2e-3 * speed
     assert found == pytest.approx(acceleration, rel=5e-3)  # the prior reduces the estimate slightly
+
+
+@pytest.mark.parametrize("n_sensor", [2, 3, 6])
+def test_the_origin_of_the_positions_changes_nothing(n_sensor, settings):
+    """A train that brakes, at sensors near the origin of the turnout and 100 m from it."""
+    recording = rolling_noise(np.random.default_rng(5), IC3, 20.0, PLACES[-n_sensor:], acceleration=-0.7)
+    near, far = (
+        analyse(recording, [replace(s, position=s.position + x) for s in sensors_for(recording)], PATTERNS, settings)
+        for x in (0.0, 100.0)
+    )
+    assert (near.n_axle, near.type.type) == (far.n_axle, far.type.type) and near.n_axle == 8
+    assert far.speed.speed == pytest.approx(near.speed.speed, rel=1e-9)
+    assert far.speed.acceleration == pytest.approx(near.speed.acceleration, abs=1e-9)
+    for name, times in near.at_sensor.items():
+        assert far.at_sensor[name] == pytest.approx(times, abs=1e-9)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("positions", [(24.6,), (13.8, 24.6), (13.8, 24.6, 26.4), PLACES])
+@pytest.mark.parametrize("acceleration", [0.0, -0.6])
+def test_the_axles_of_a_train_pass_each_sensor_at_their_times(acceleration, positions, direction, settings):
+    """Within a quarter of a metre: the wheel is in the middle of what it causes, also where a comb finds the train."""
+    recording = rolling_noise(np.random.default_rng(8), IC3, 20.0, positions, direction, acceleration=acceleration)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    assert passage.n_axle == 8
+    times = passing_times(IC3, positions, 20.0, acceleration, direction, 1.0)
+    for name, expected in zip(passage.at_sensor, times):
+        at_axles = 20.0 + acceleration * (expected - 1.0)
+        assert np.max(np.abs(passage.at_sensor[name] - expected) * at_axles) < 0.25

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
-from benchmarks.passage_truth import IC3, PATTERNS
+from benchmarks.passage_truth import IC3, PATTERNS, passing_times, rolling_noise
 
+from turnout.passage.axles import sensor_times
+from turnout.passage.kinematics import Motion
 from turnout.passage.speed import slowness_from_sensors
+from turnout.passage.train_detection import sensor_envelopes
 from turnout.passage.train_type import axle_times_to_motion, find_type
+from turnout.stages.passage_context import known_patterns
 
 N_DRAWS = 300  # its scatter is known to 4 %
 SPEED = 40.0
@@ -74,3 +78,24 @@ def test_the_acceleration_of_few_axles_has_the_error_of_their_positions(places, 
         estimates.append(-change / q**2)
     assert inside >= 180
     assert np.median(errors) < 2.0 * np.std(estimates) + 0.3 * (len(axles) == 2)  # m/s²; the prior is 0 ± 0.3
+
+
+def test_axles_that_fit_by_chance_do_not_determine_the_acceleration(settings):
+    """Four axles within 0.6 s: 0.5 m/s² moves them by 2 cm, so the prior's standard deviation is that of the result."""
+    axles = np.array([0.0, 3.0, 9.5, 12.5])
+    finding = find_type(axles / 21.0, known_patterns("config/vehicles/axle_patterns.yaml"), settings, 21.0, 0.2, 0.05)
+    assert finding.type == "locomotive" and finding.residual < 1e-3
+    prior = np.sqrt(0.8 * 0.02**2 + 0.2 * (0.25 * settings.acceleration_limit) ** 2)
+    assert finding.acceleration_se == pytest.approx(prior, rel=0.1)
+
+
+def test_a_sensor_that_records_no_axle_at_the_common_position_has_no_time(settings):
+    """Its position is 5 m wrong; the others record the axles where they are."""
+    recording = rolling_noise(np.random.default_rng(21), IC3, 40.0, (0.0, 4.0, 9.0, 16.5, 22.0))
+    positions = np.array([0.0, 4.0, 9.0, 21.5, 22.0])
+    envelopes = sensor_envelopes(recording.samples, recording.rate, positions, settings.envelope_step)
+    times = sensor_times(envelopes, Motion(40.0, 1.0), IC3)
+    assert np.isnan(times[3]).sum() >= 6  # two lie on the slope of another axle
+    expected = passing_times(IC3, positions, 40.0, 0.0, 1, 1.0)
+    right = [0, 1, 2, 4]
+    assert np.nanmax(np.abs(times - expected)[right]) * 40.0 < 0.3 and np.isfinite(times[right]).mean() > 0.9
