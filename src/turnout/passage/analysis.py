@@ -305,21 +305,22 @@ def _estimate_motion(
         from_sensors = (
             _sensor_speed(times, envelopes, motion.direction, position_error, settings) if is_multi_sensor else None
         )
-        from_type = None
+        from_type, is_guess = None, False
         centre = motion.time(offsets)
         middle = 0.5 * float(centre[0] + centre[-1])
         if train_type.type != UNKNOWN:
             from_type = (*train_type.middle_motion, middle)
         if from_sensors is None and from_type is None:
-            # an unknown train at one sensor: its bogies give the speed to one sixth
-            from_type = (motion.speed, 0.16 * motion.speed, 0.0, 0.3, middle)
+            # an unknown train whose sensors give no speed: its bogies give it to one sixth
+            middle_speed, is_guess = float(motion.speed_at(middle)), True
+            from_type = (middle_speed, 0.16 * middle_speed, motion.acceleration, 0.3, middle)
         speed = combine_speeds(from_sensors, from_type, middle)
         converged = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
         motion = motion_of(speed, float(centre[0]), motion.direction)
         offsets = motion.distance(centre)
         if converged:
             break
-    if train_type.type == UNKNOWN and not is_multi_sensor:
+    if is_guess:
         speed = replace(speed, source="bogie")
     at_sensor = {s.name: motion.passing(offsets, x) for s, x in zip(sensors, envelopes.positions)}
     return Passage(
@@ -330,7 +331,11 @@ def _estimate_motion(
 def _sensor_speed(
     times: np.ndarray, envelopes: SensorEnvelopes, direction: int, position_error: float, settings: PassageSettings
 ) -> tuple[float, float, float, float, float] | None:
-    """(v, se, a, a_se, time) from delays between sensors; None where fewer than two axles have times at two sensors."""
+    """(v, se, a, a_se, time) from delays between sensors.
+
+    None where fewer than two axles have times at two sensors, or where no train can move like that: it would reverse,
+    or its acceleration exceeds the limit.
+    """
     is_timed = np.isfinite(times)
     axles = is_timed.sum(axis=0) >= 2
     if axles.sum() < 2:
@@ -340,7 +345,11 @@ def _sensor_speed(
     )
     if not q > 0:
         return None
-    return 1 / q, se / q**2, -change / q**2, max(change_se / q**2, 1e-4), mean_time
+    speed, acceleration = 1 / q, -change / q**2
+    ends = np.array([np.nanmin(times[:, axles]), np.nanmax(times[:, axles])])
+    if abs(acceleration) > settings.acceleration_limit or np.min(speed + acceleration * (ends - mean_time)) <= 0.0:
+        return None
+    return speed, se / q**2, acceleration, max(change_se / q**2, 1e-4), mean_time
 
 
 def _truncation_findings(envelopes: SensorEnvelopes, passage: Passage, duration: float) -> list[Rejection]:

@@ -85,3 +85,21 @@ def test_the_axles_of_a_train_pass_each_sensor_at_their_times(acceleration, posi
     for name, expected in zip(passage.at_sensor, times):
         at_axles = 20.0 + acceleration * (expected - 1.0)
         assert np.max(np.abs(passage.at_sensor[name] - expected) * at_axles) < 0.25
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(0.3, 0.5), (0.2, 0.8)])
+def test_a_train_that_starts_within_the_recording_is_counted(speed, acceleration, settings):
+    """Its first wheel passes the first sensor nearly at rest. At the origin, 12 m before it, it was never."""
+    positions = (12.0, 15.5, 22.3, 31.0)
+    recording = rolling_noise(np.random.default_rng(2), IC3, speed, positions, acceleration=acceleration, lead=3.0)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    ends = passing_times(IC3, (12.0, np.mean(positions)), speed, acceleration, 1, 3.0)[1][[0, -1]]
+    assert passage.n_axle == 8 and passage.direction == "facing"
+    assert passage.speed.speed == pytest.approx(speed + acceleration * (ends.mean() - 3.0), abs=3.0 * passage.speed.se)
+
+
+def test_times_that_no_train_can_have_give_no_speed(settings):
+    """They are those of a train that brakes by 3 m/s², beyond any limit."""
+    times = passing_times(IC3, PLACES, 30.0, -3.0, 1, 3.0)
+    sensors = SimpleNamespace(positions=np.array(PLACES))
+    assert _sensor_speed(times, sensors, 1, settings.place_error, settings) is None
