@@ -67,7 +67,9 @@ def test_rows_of_the_bridge_are_read_by_the_scorer():
         answer="named", names=("local_pad",), grade="A", probability=0.9, scores=(best,), reason="because"
     )
     seen = SimpleNamespace(before=40.0, after=48.0, rival=44.0, decoy=float("nan"), n=2)
-    rows = rows_of(SimpleNamespace(verdicts=(verdict,), verification=seen, frames=(), where=None, fit=fit))
+    found = SimpleNamespace(verdicts=(verdict,), verification=seen, frames=(), where=None, fit=fit)
+    found.possible_positions = (None,)
+    rows = rows_of(found)
     assert json.loads(json.dumps(rows)) == rows
     truth = {
         "case": "T1",

@@ -205,9 +205,9 @@ def location_fields(location: Location | None) -> dict[str, Any]:
         return {}
     columns: dict[str, Any] = {"frame": location.frame, "sensor": location.sensor}
     columns |= {"train": location.train, "axle": location.axle}
-    if location.place is not None:  # an interval of 95 %, not below half a bay
+    if location.place is not None:  # an interval of 95 %, not below one bay to either side
         assert location.low is not None and location.high is not None
-        columns |= {"place": location.place, "place_se": max(location.high - location.low, SUPPORT_SPACING) / 4.0}
+        columns |= {"place": location.place, "place_se": max(location.high - location.low, 2.0 * SUPPORT_SPACING) / 4.0}
     return columns
 
 
@@ -235,6 +235,8 @@ def _position(diagnosis: Diagnosis, term: Candidate | None, where: Mapping[str, 
     """Position [m] and its standard error; a fitted ``shift`` from the scanned position is added."""
     position, se = where.get("place"), where.get("place_se")
     names = [p.name for p in term.parameters] if term else []
+    if term is not None and position is not None and (ends := diagnosis.possible_positions[0]) is not None:
+        se = max(position - ends[0], ends[1] - position) / 2.0
     if term is not None and position is not None and "shift" in names:
         k = diagnosis.fit.part(term).start + names.index("shift")
         position, se = round(float(position + diagnosis.fit.psi[k]), 3), float(f"{diagnosis.fit.psi_se[k]:.3g}")

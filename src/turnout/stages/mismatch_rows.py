@@ -124,9 +124,11 @@ def _summary_columns(diagnosis: Diagnosis, case: TrackCase, group: Group, about:
     campaign, fit = group.campaign, diagnosis.fit
     positions = [s.place for s in campaign.sensors] + [t.place for t in campaign.hammer]
     terms = [
-        describe_term(t, c, se, case.predictor.track()) | _term_evidence(v)
-        for t, c, se, v in zip(fit.terms, fit.candidates, _errors_by_candidate(fit), diagnosis.verdicts)
-    ]  # fmt: skip
+        describe_term(t, c, se, case.predictor.track()) | _term_evidence(v) | _possible_positions(ends)
+        for t, c, se, v, ends in zip(
+            fit.terms, fit.candidates, _errors_by_candidate(fit), diagnosis.verdicts, diagnosis.possible_positions
+        )
+    ]
     return {
         "visit": about["visit"],
         "sections": ", ".join(group.labels),
@@ -169,6 +171,11 @@ def _term_evidence(verdict: Verdict) -> dict:
     """Probability of a term, and the other effect of an "a_or_b" verdict."""
     alternative = {"or": verdict.names[1]} if len(verdict.names) > 1 else {}
     return {"probability": _plain(verdict.probability), **alternative}
+
+
+def _possible_positions(ends: tuple[float, float] | None) -> dict:
+    """First and last position that a term may have, where that is more than one."""
+    return {"possible_positions": list(ends)} if ends is not None else {}
 
 
 def _evidence(diagnosis: Diagnosis, case: TrackCase) -> dict:

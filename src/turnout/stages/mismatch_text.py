@@ -192,6 +192,18 @@ def _train_and_axle(finding: Mapping[str, Any]) -> tuple[str, int | None]:
     return (train.removesuffix(f", axle {axle}") if axle else train), axle
 
 
+def _position_text(positions: Sequence[float], shift: float, possible: Sequence[float] | None) -> str:
+    """Middle of the positions of an effect, with the range of those that are possible.
+
+    >>> _position_text((8.4,), 0.0, (7.8, 8.4)), _position_text((7.8, 9.0), 0.0, None), _position_text((), 0.0, None)
+    ('8.4 m (7.8 to 8.4 m)', '8.4 m', 'an unknown place')
+    """
+    if not positions:
+        return "an unknown place"
+    text = f"{sum(positions) / len(positions) + shift:.1f} m"
+    return f"{text} ({possible[0]:.1f} to {possible[1]:.1f} m)" if possible else text
+
+
 def _wheel_text(train: str, axle: int | None, rivals: Sequence[int] = ()) -> str:
     """Axle of a train in words, with those that may be the one instead.
 
@@ -224,7 +236,7 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     words |= {name: _estimate(term, name)[0] for name in term["parameters"]}
     words |= {f"{name}_size": _estimate(term, name, of_size=True)[0] for name in term["parameters"]}
     words |= {
-        "place": f"{sum(positions) / len(positions) + shift:.1f} m" if positions else "an unknown place",
+        "place": _position_text(positions, shift, term.get("possible_positions")),
         "channel": fixed.get("channel_name") or finding["channel"] or "?",
         "train": train,
         "wheel": _wheel_text(train, axle, term.get("rival_axles", ())),

@@ -28,7 +28,7 @@ class Dented(Case):
 
     is_large = True
 
-    def __init__(self, true_position, impossible=()):
+    def __init__(self, true_position, impossible=(), noise=0.05, error=0.05):
         rng = np.random.default_rng(6)
         self.impossible = impossible
         self.nuisances = (Nuisance("slope", "-", 0.0, 0.5),)
@@ -41,7 +41,7 @@ class Dented(Case):
         )
         true = self.shape(DEPTH, true_position)
         self.observations = tuple(
-            Observation(f"o{k}", f"day {k}", true + 0.05 * rng.normal(size=X.size), 0.05) for k in range(4)
+            Observation(f"o{k}", f"day {k}", true + noise * rng.normal(size=X.size), error) for k in range(4)
         )
 
     def shape(self, depth, place):
@@ -83,6 +83,23 @@ def test_a_leader_at_its_best_position_or_without_one_stays(position):
     case = Dented(4.2)
     base, leader = leader_at(case, position)
     assert at_best_position(Search(case), base, leader) is leader
+
+
+@pytest.mark.parametrize(("error", "possible"), [(1.3, None), (2.1, (2.4, 3.6)), (2.65, (1.8, 4.2))])
+def test_positions_with_hardly_less_evidence_are_possible(error, possible):
+    """The model is linear: the evidence of a bump is that of a normal distribution with its covariance."""
+    case = Dented(3.0, noise=0.0, error=error)
+    base, leader = leader_at(case, 3.0)
+    data, slope = case.shape(DEPTH, 3.0), X / 9.0
+    evidence = {}
+    for x in POSITIONS:
+        bump = case.shape(1.0, x)
+        covariance = 0.25 * error**2 * np.eye(X.size) + 0.25 * np.outer(slope, slope) + 9.0 * np.outer(bump, bump)
+        evidence[x] = -0.5 * (data @ np.linalg.solve(covariance, data) + np.linalg.slogdet(covariance)[1])
+    close = [x for x, nats in evidence.items() if nats > evidence[3.0] - 6.0]
+    assert ((min(close), max(close)) if len(close) > 1 else None) == possible
+    found = at_best_position(Search(case), base, leader)
+    assert found.candidate.where["place"] == 3.0 and found.possible_positions == possible
 
 
 def test_an_effect_with_a_length_is_no_neighbour_of_one_without():
@@ -149,7 +166,9 @@ def test_each_position_is_tried_once_even_if_a_fit_to_convergence_has_less_evide
     monkeypatch.setattr(
         leaders, "refit_to_convergence", lambda search, fit, score: replace(score, gain=leader.gain - 1.0)
     )
-    assert at_best_position(Search(case), base, leader) is leader
+    stayed = at_best_position(Search(case), base, leader)
+    assert replace(stayed, possible_positions=None) == leader
+    assert stayed.possible_positions == (3.0, 4.8)  # the trials at 3.6 to 4.8 m have more evidence
 
 
 @pytest.mark.parametrize("where", [{"place": "all supports"}, {}])

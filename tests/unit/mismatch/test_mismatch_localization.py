@@ -264,7 +264,7 @@ def test_nothing_is_located_in_noise():
 def test_a_rejected_candidate_is_the_location_if_it_explains_more():
     case = Places(0.5 * np.random.default_rng(2).normal(size=(3, 40)))
     candidate = SimpleNamespace(frame="wheel", where={"train": "freight", "axle": 3}, key="k", position=None)
-    rejected = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4)
+    rejected = SimpleNamespace(candidate=candidate, gain=30.0, explained=0.4, possible_positions=None)
     found = locate(case, fit_jointly(case), rejected)
     assert (found.frame, found.train, found.axle) == ("wheel", "freight", 3)
     rejected.explained = 0.1
@@ -401,6 +401,12 @@ def test_a_position_beyond_the_measured_range_is_stated_as_such(place, text):
 def test_a_candidate_without_a_name_is_stated_as_the_location(frame, where, text):
     candidate = Candidate.of("soft", (), dict, (), where, frame=frame)
     assert str(_location_of_candidate(Score(candidate, 40.0, 0.0, 1.0, None))) == text
+
+
+def test_a_candidate_without_a_name_is_located_at_all_its_possible_positions():
+    candidate = Candidate.of("soft", (), dict, (), {"place": 8.4}, frame="place")
+    score = Score(candidate, 40.0, 0.0, 1.0, None, possible_positions=(7.8, 8.4))
+    assert str(_location_of_candidate(score)) == "at 8.4 m, between 7.8 and 8.4 m"
 
 
 @pytest.mark.parametrize(

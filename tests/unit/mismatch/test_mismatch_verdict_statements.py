@@ -265,7 +265,8 @@ def dip(place, shift):
     verdict = SimpleNamespace(answer="named", names=("surface_dip",), grade="A", probability=0.97, reason="")
     check = Verification(1, 1.0, 2.0, 1.0, 1.0, 0.5)
     return SimpleNamespace(
-        fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.97, verification=check, frames=(), where=None
+        fit=fit, verdict=verdict, verdicts=(verdict,), probability=0.97, verification=check, frames=(), where=None,
+        possible_positions=(None, None),
     )  # fmt: skip
 
 
@@ -282,6 +283,8 @@ def test_the_position_error_of_a_sensor_is_not_that_of_a_sleeper():
     found.fit.psi, found.fit.psi_se = np.array([1e-3, 0.0, 0.7]), np.array([1e-4, 0.1, 0.2])
     row = finding_row(found, {})
     assert (row["position_m"], row["position_se_m"]) == (23.4, None)
+    found.possible_positions = ((22.8, 23.4), None)  # half of the distance to the end of an interval of 95 %
+    assert finding_row(found, {})["position_se_m"] == pytest.approx(0.3)
 
 
 @pytest.fixture(scope="module")

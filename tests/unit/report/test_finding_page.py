@@ -393,6 +393,13 @@ def test_effects_of_two_trains_keep_their_own_trains_in_a_sentence(order):
     assert "The wheelsets of railcar are 1.6" in text
 
 
+def test_the_sentence_states_the_range_of_possible_positions():
+    gap = {**GAP, "possible_positions": [24.6, 25.2]}
+    text = headline(finding(term="hanging_sleeper", position_m=24.6, term_json=json.dumps([gap])))
+    assert "24.6 m (24.6 to 25.2 m)" in text
+    assert "24.6 m (" not in headline(finding(term="hanging_sleeper", position_m=24.6, term_json=json.dumps([GAP])))
+
+
 def test_the_sentence_of_a_flat_states_all_wheels_that_may_have_it():
     length = {"length": {"value": 0.04, "se": 0.008, "unit": "m"}}
     fixed = {"wheel": 1, "train": "railcar"}

@@ -87,6 +87,12 @@ class Diagnosis:
         return min(v.probability for v in self.verdicts)
 
     @property
+    def possible_positions(self) -> tuple[tuple[float, float] | None, ...]:
+        """First and last position of each effect of the fit [m]; None where only its own is possible, or none known."""
+        possible = {s.candidate.key: s.possible_positions for v in self.verdicts for s in reversed(v.scores)}
+        return tuple(possible.get(c.key) for c in self.fit.candidates)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Families named, in the order in which they were found."""
         return tuple(v.names[0] for v in self.verdicts if v.answer == "named")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -50,7 +51,8 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
 
     The position was chosen by the hammer tests alone, or by columns of one size. It is a parameter like others, but
     with steps of its own: the effect is tried at the next positions, from the leader's size and nuisances. So are the
-    lengths of a stretch, and its two ends. Each site is tried once.
+    lengths of a stretch, and its two ends. Each site is tried once. Positions whose evidence is hardly smaller are kept
+    as ``possible_positions``.
 
     Parameters
     ----------
@@ -65,28 +67,56 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     Score
         The same where no neighbour gains more, and for an effect without a position.
     """
-    tried = {score.candidate.key}
+    gains = {score.candidate.key: score.gain}
     while True:
-        neighbours = [c for c in _neighbours(search.case, score.candidate) if c.key not in tried]
-        tried.update(c.key for c in neighbours)
-        trials = [s for s in (_score_at(search, fit, score, c) for c in neighbours) if s is not None]
+        trials = _trials_beside(search, fit, score, score.candidate, gains)
         best = max(trials, key=lambda s: s.gain, default=score)
         if best.gain <= score.gain:
-            return score
+            break
         moved = refit_to_convergence(search, fit, best)
         if moved.gain <= score.gain:  # smaller in evidence, though it costs no more
-            return score
+            break
         score = moved
+    return _with_possible_positions(search, fit, score, gains)
+
+
+def _trials_beside(
+    search: Search, fit: Fit, score: Score, candidate: Candidate, gains: dict[str, float]
+) -> list[Score]:
+    """Scores of the leader's effect at the neighbours of a candidate that ``gains`` lacks; it has them afterwards."""
+    neighbours = [c for c in _neighbours(search.case, candidate) if c.key not in gains]
+    trials = [s for s in (_score_at(search, fit, score, c) for c in neighbours) if s is not None]
+    gains.update(dict.fromkeys((c.key for c in neighbours), -np.inf))
+    gains.update((s.candidate.key, s.gain) for s in trials)
+    return trials
+
+
+def _with_possible_positions(search: Search, fit: Fit, score: Score, gains: dict[str, float]) -> Score:
+    """The score with the first and last position that are possible, sought outwards; the same if there is only one."""
+    least_gain = score.gain - THRESHOLDS.position_margin
+    possible, outermost = {score.candidate.key: score.candidate}, [score.candidate]
+    while outermost:
+        candidate = outermost.pop()
+        _trials_beside(search, fit, score, candidate, gains)
+        close = [c for c in _neighbours(search.case, candidate) if gains[c.key] > least_gain and c.key not in possible]
+        possible.update((c.key, c) for c in close)
+        outermost += close
+    positions = [c.position for c in possible.values() if c.position is not None]
+    return replace(score, possible_positions=(min(positions), max(positions))) if len(possible) > 1 else score
 
 
 def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> Score | None:
-    """Score of the effect at a neighbouring position. The fit ends where it does not promise to cost less."""
+    """Score of the effect at a neighbouring position.
+
+    The fit ends where it does not promise to cost less, or so little more that the position is possible.
+    """
 
     def compute() -> Fit | None:
         leader = score.fit
         candidates = (*fit.candidates, neighbour)
+        sought_cost = leader.cost + 2.0 * THRESHOLDS.position_margin
         try:
-            return search.fit(candidates, leader.psi, leader.values, leader.jacobian, sought_cost=leader.cost)
+            return search.fit(candidates, leader.psi, leader.values, leader.jacobian, sought_cost=sought_cost)
         except SimulationError:
             return None
 

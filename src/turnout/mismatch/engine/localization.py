@@ -232,7 +232,8 @@ def _location_of_candidate(score: Score) -> Location:
     where, position = score.candidate.where, score.candidate.position
     level = f"{where['wavelength']:.3f} m" if "wavelength" in where else score.candidate.key if where else None
     sensor, train, axle = (where.get(name) for name in ("sensor", "train", "axle"))
-    return Location(score.candidate.frame, level, score.gain, position, position, position, sensor, train, axle)
+    low, high = score.possible_positions or (position, position)
+    return Location(score.candidate.frame, level, score.gain, position, low, high, sensor, train, axle)
 
 
 def _location_of_evidence(ranked: Sequence[SpaceEvidence]) -> Location:

@@ -23,7 +23,8 @@ class Score:
     least gain of a condition. ``explained`` share of the excess. ``is_ordinary``: similar components of this case
     differ by this size anyway, or the required observations do not support it. ``single_source``: the one recording,
     position of impacts or sensor on which it rests, in words (module ``single_source``). ``unmasked_gain`` gain of
-    conditions in which no earlier effect shows.
+    conditions in which no earlier effect shows. ``possible_positions``: first and last position whose evidence is
+    hardly smaller [m], None if there is no other.
     """
 
     candidate: Candidate
@@ -35,6 +36,7 @@ class Score:
     is_ordinary: bool = False
     single_source: str = ""
     unmasked_gain: float = 0.0
+    possible_positions: tuple[float, float] | None = None
 
     @property
     def estimates(self) -> tuple[np.ndarray, np.ndarray]:

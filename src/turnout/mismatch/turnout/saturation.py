@@ -25,7 +25,8 @@ def limit_under_impacts(hammer: Sequence[HammerInput], sensor: Sensor) -> tuple[
 
     Each side of an amplifier is tested by itself; the limit is the mean of those with a positive gain. Near the impact
     peaks grow with the force, and the larger gain counts. Elsewhere waves of all lengths meet. They may limit the peaks
-    of one side as the pulse gets shorter, but not of both: the smaller gain counts.
+    of one side as the pulse gets shorter, but not of both: the smaller gain counts. What the other side has exceeded is
+    no limit of the channel: a part of the track that collides with another one cuts off one side.
 
     Parameters
     ----------
@@ -53,7 +54,26 @@ def limit_under_impacts(hammer: Sequence[HammerInput], sensor: Sensor) -> tuple[
     gain = max(gains) if is_near else min(gains)
     if gain <= 0.0:
         return float("nan"), 0.0
-    return float(np.mean([limit for limit, side_gain in sides if side_gain > 0.0])), gain
+    limit = float(np.mean([limit for limit, side_gain in sides if side_gain > 0.0]))
+    largest_peak = float(np.exp(max(np.max(side) for _, (_, side) in tests)))
+    return (limit, gain) if limit >= lowest_limit(largest_peak) else (float("nan"), 0.0)
+
+
+def lowest_limit(peak: float) -> float:
+    """Lowest limit of a channel that has shown a peak. [m/s²]
+
+    The filter of a recorder rings where a signal is cut off, and a limit need not be the same on both sides.
+
+    Parameters
+    ----------
+    peak : float
+        [m/s²]
+
+    Returns
+    -------
+    float
+    """
+    return SATURATION.min_side_ratio * SATURATION.filter_ringing * peak
 
 
 def _peaks(test: HammerInput, name: str) -> tuple[np.ndarray, np.ndarray] | None:
@@ -161,9 +181,7 @@ def saturated_channels(campaign: CampaignInput, threshold: float) -> dict[str, S
         by_impacts = SaturationLimit(*limit_under_impacts(campaign.hammer, sensor))
         limit = _combine_limits(by_passages.get(sensor.name, by_impacts), by_impacts)
         limit = replace(limit, gain=limit.gain - float(np.log(len(campaign.sensors))))
-        if limit.gain > threshold and limit.limit >= SATURATION.min_side_ratio * SATURATION.filter_ringing * raw_peak(
-            campaign, sensor.name
-        ):
+        if limit.gain > threshold and limit.limit >= lowest_limit(raw_peak(campaign, sensor.name)):
             saturated[sensor.name] = limit
     return saturated if len(saturated) < len(campaign.sensors) else {}
 
