@@ -14,6 +14,7 @@ from turnout.mismatch.engine.localization import _location_of_candidate
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.rule import first_applicable
+from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.two_effects import PairEvidence
 from turnout.physics import Parameter
@@ -35,7 +36,7 @@ def test_a_position_may_be_a_word(first, second, same):
 
 
 def test_a_position_in_words_has_no_coordinate():
-    location = _location_of_candidate(SimpleNamespace(candidate=candidate("soft", "left bearing"), gain=20.0))
+    location = _location_of_candidate(Score(candidate("soft", "left bearing"), 20.0, 0.0, 1.0, None))
     assert location.place is None and location.level == "soft[place=left bearing]"
 
 
