@@ -31,7 +31,8 @@ class PassageSensor:
 class SpeedFinding:
     """``speed`` [m/s] with ``se``, and ``acceleration`` [m/s²] with its error.
 
-    ``time`` [s] is when the middle of the train passes the middle of the sensors: the speed is that moment's.
+    ``time`` [s] is halfway between the passing times of the first and the last axle at the middle of the sensors: the
+    speed is that moment's.
 
     ``source`` is "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's bogies).
     ``disagreement`` is the difference of sensors and axle spacing in standard errors, None without both.

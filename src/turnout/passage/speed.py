@@ -250,7 +250,7 @@ def with_acceleration(envelopes: SensorEnvelopes, motion: Motion, limit: float) 
     Returns
     -------
     Motion
-        ``motion`` itself where the acceleration is not accepted.
+        ``motion`` itself where the acceleration is not accepted, or the first axle would not pass the origin.
     """
     if len(envelopes.positions) < 3:
         return motion
@@ -266,7 +266,7 @@ def with_acceleration(envelopes: SensorEnvelopes, motion: Motion, limit: float) 
         shifts = half_shifts(envelopes, adjusted)
         if np.max(np.abs(slopes)) < SLOPE_TOLERANCE:
             break
-    return adjusted if _half_spread(shifts) < 0.5 * spread else motion
+    return adjusted if adjusted.speed > 0.0 and _half_spread(shifts) < 0.5 * spread else motion
 
 
 def _half_spread(shifts: np.ndarray) -> float:

@@ -16,7 +16,7 @@ FREIGHT = np.concatenate([14.0 * k + np.array(WAGONS[k % 3]) for k in range(22)]
 
 
 def passage_and_speed(settings, offsets, speed, acceleration, direction):
-    """The passage, and the true speed when the middle of the train passes the middle of the sensors. [m/s]"""
+    """The passage, and the true speed halfway between its first and last axle at the middle of the sensors. [m/s]"""
     random = np.random.default_rng(3)
     recording = rolling_noise(random, offsets, speed, PLACES, direction, acceleration=acceleration, lead=3)
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
@@ -96,6 +96,16 @@ def test_a_train_that_starts_within_the_recording_is_counted(speed, acceleration
     ends = passing_times(IC3, (12.0, np.mean(positions)), speed, acceleration, 1, 3.0)[1][[0, -1]]
     assert passage.n_axle == 8 and passage.direction == "facing"
     assert passage.speed.speed == pytest.approx(speed + acceleration * (ends.mean() - 3.0), abs=3.0 * passage.speed.se)
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(0.2, 0.4), (0.5, 0.9)])
+def test_a_train_that_starts_at_few_sensors_stops_no_analysis_and_is_counted_or_doubted(speed, acceleration, settings):
+    """Its halves at three sensors would give a motion in which the first axle never passes the origin."""
+    recording = rolling_noise(
+        np.random.default_rng(2), IC3, speed, (0.0, 5.0, 10.0), acceleration=acceleration, lead=3.0
+    )
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    assert passage.n_axle == 8 or "axles_uncertain" in {f.reason for f in passage.findings}
 
 
 def test_times_that_no_train_can_have_give_no_speed(settings):
