@@ -255,16 +255,21 @@ def _shape(row: bytes) -> tuple[int, int]:
 
 
 def _end_of_content(data: bytes | mmap, source: Source) -> tuple[int, tuple[ReadError, ...]]:
-    """Byte behind the content, and the remark on zero bytes below it, where a file was reserved and not written."""
+    """Byte behind the content, and the remark on zero bytes below it, where a file was reserved and not written.
+
+    The remark states a line: the bytes of a text in UTF-16 are not those of the file.
+    """
     end = len(data)
     while end and data[end - 1] == 0:
         block = data[max(0, end - HEAD_SIZE) : end]
         end -= len(block) - len(block.rstrip(b"\0"))
-    n_zero = len(data) - end
-    if n_zero and data.rfind(b"\n", 0, end) >= 0:
-        problem = f"its last {n_zero} bytes are 0x00: nothing was written to them"
-        return end, (source.error(f"byte {end}", problem, COPY_AGAIN, reason="truncated"),)
-    return len(data) - (data[-1:] == END_OF_FILE), ()
+    remarks: tuple[ReadError, ...] = ()
+    if end < len(data) and (n_line := max(data[:end].count(mark) for mark in (b"\n", b"\r"))):
+        problem = "from here on all bytes are 0x00: nothing was written to them"
+        remarks = (source.error(f"line {n_line + 1}", problem, COPY_AGAIN, reason="truncated"),)
+    else:
+        end = len(data)
+    return end - (data[end - 1 : end] == END_OF_FILE), remarks
 
 
 EMPTY_LINE = re.compile(rb"[;,\t| \"\r]*")

@@ -103,12 +103,14 @@ def cells_of(line: str, separator: str) -> list[str]:
     (['force [N]', '-1,5'], ['force [N]', 'rail (m/s²)'])
     >>> cells_of('"Kraft; Hammer [N]";-1,5', ";")
     ['Kraft; Hammer [N]', '-1,5']
+    >>> cells_of('disc 12"; rail 5"', ";")
+    ['disc 12', 'rail 5']
     >>> cells_of("  [s]   [N]  (m/s²)", " ")
     ['[s]', '[N]', '(m/s²)']
     """
     if separator == BLANK:
         return [word.replace('"', "") for word in WORD.findall(line.lstrip("#%").strip())]
-    is_quoted = separator in line.partition('"')[2] if separator != "," else '"' in line
+    is_quoted = re.search(rf'(?:^|{re.escape(separator)}) *"', line) if separator != "," else '"' in line
     if is_quoted and line.count('"') % 2 == 0:  # a separator between quotation marks separates nothing
         with suppress(csv.Error):  # a byte that no text has
             return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from mmap import mmap
 from typing import NamedTuple
 
+from turnout.readers.attached_units import TIME_WORDS, name_and_unit, unit_behind_mark
 from turnout.readers.csv_blank_rows import BLANK_ROW
 from turnout.readers.csv_cells import (
     BLANK,
@@ -224,11 +225,21 @@ def _are_rows_of_words(data: bytes | mmap, position: int) -> bool:
 def _names_between_other_separators(
     last_lines: Sequence[str], texts: Sequence[Sequence[str]], cells: Sequence[str]
 ) -> list[list[str]]:
-    """Cells of the last line of words if only another separator than that of the rows gives each column a name."""
+    """Cells of the last line of words if only another separator than that of the rows gives each column a name.
+
+    A title has commas and blanks, too, and perhaps one unit, as "Hammer test [N]": between those, each name has a unit.
+    """
     if any(len(text) >= len(cells) - (not cells[-1]) for text in texts):
         return []
-    lines = [cells_of(line, separator) for line in last_lines for separator in (*SEPARATORS, ",", BLANK)]
-    return [names for names in lines if len(names) == len(cells) and are_names(names)][:1]
+    separated = [cells_of(line, separator) for line in last_lines for separator in SEPARATORS]
+    lines = [names for names in separated if are_names(names)]
+    of_text = [cells_of(line, separator) for line in last_lines for separator in (",", BLANK)]
+    lines += [names for names in of_text if are_names(names) and all(map(_is_time_or_has_unit, names))]
+    return [names for names in lines if len(names) == len(cells)][:1]
+
+
+def _is_time_or_has_unit(cell: str) -> bool:
+    return cell.lower() in TIME_WORDS or bool(name_and_unit(cell)[1]) or unit_behind_mark(cell) is not None
 
 
 def _commented_names(

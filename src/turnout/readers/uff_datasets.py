@@ -136,13 +136,13 @@ def ascii_numbers(data: bytes | mmap, at: int, header: Header) -> tuple[np.ndarr
     return values, position, damage
 
 
-TEXT_IN_PLACE = re.compile(r".*(?:float|base 10): (?:np\.bytes_\()?b?'(.*?)'\)?", re.DOTALL)
+TEXT_IN_PLACE = re.compile(r".*(?:float|base 10): (?:np\.bytes_\()?b?(['\"])(.*?)\1\)?", re.DOTALL)
 
 
 def _reason_of(error: ValueError) -> str:
     """What a conversion of text to a number reports, without the words of Python."""
     match = TEXT_IN_PLACE.fullmatch(str(error))
-    return str(error) if match is None else f"'{match[1].strip()}' is no number" if match[1].strip() else "it is blank"
+    return str(error) if match is None else f"'{match[2].strip()}' is no number" if match[2].strip() else "it is blank"
 
 
 def _numbers(body: bytes, widths: Sequence[int]) -> np.ndarray:

@@ -121,17 +121,38 @@ def test_a_single_quotation_mark_quotes_nothing(mark, tmp_path):
     np.testing.assert_allclose(samples_of(result_of(tmp_path, lines)), [FIRST], atol=1e-12)
 
 
+def test_a_quotation_mark_behind_a_name_quotes_nothing(tmp_path):
+    """Two of them, for inches: the names are those of a line with one such mark or none."""
+    channels = tuple(replace(c, source=name) for c, name in zip(CHANNELS, ("disc 12", "rail 5")))
+    for names in ('disc 12";rail 5"', 'disc 12";rail 5', '"disc 12";"rail 5"'):
+        result = result_of(tmp_path, [names, *rows_of(FIRST)], RawDescription(channels, rate=RATE))
+        assert result.errors == ()
+        np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
+
+
 def test_zero_bytes_are_reported_as_not_written(tmp_path):
     text = ("\n".join(["force;rail", *rows_of(FIRST)]) + "\n").encode()
     (tmp_path / "a.csv").write_bytes(text + b"\0" * 5000)
     result = read("a.csv", tmp_path, LAYOUT)
     np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
     (error,) = result.errors
-    assert error.reason == "truncated" and error.where == f"byte {len(text)}" and "5000 bytes are 0x00" in error.problem
+    assert (error.reason, error.where) == ("truncated", f"line {N + 2}") and "all bytes are 0x00" in error.problem
     for hole in (b"\0" * 512 + text[300:], b"\0" * 20 + text[320:]):
         (tmp_path / "a.csv").write_bytes(text[:300] + hole)
         with pytest.raises(ReadError, match=r"a\.csv, line \d+.*: zero bytes, to which nothing was written"):
             read("a.csv", tmp_path, LAYOUT)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-32"])
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("mark", ["", "\x1a"])
+def test_zero_bytes_are_reported_once_with_their_line_in_any_encoding(encoding, line_end, mark, tmp_path):
+    text = line_end.join(["force;rail", *rows_of(FIRST)]) + line_end + mark
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0" * 400)
+    result = read("a.csv", tmp_path, LAYOUT)
+    np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
+    assert [(error.reason, error.where) for error in result.errors] == [("truncated", f"line {N + 2}")]
+    assert "all bytes are 0x00" in result.errors[0].problem
 
 
 def test_a_text_of_blanks_is_not_reported_as_appended_to_itself(tmp_path):
@@ -175,6 +196,14 @@ def test_names_between_other_separators_than_the_numbers_are_read(separators, tm
     above, below = separators
     rows = [f"{a:.4f}{below}{b:.4f}" for a, b in FIRST]
     result = result_of(tmp_path, [f"force [N]{above}rail [m/s²]", *rows])
+    np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
+
+
+@pytest.mark.parametrize("title", ["Hammer test [N]", "Kraftmessung Gleis [N]"])
+def test_a_title_with_a_unit_is_no_line_of_names(title, tmp_path):
+    channels = tuple(replace(channel, source=i) for i, channel in enumerate(CHANNELS))
+    result = result_of(tmp_path, [title, *rows_of(FIRST)], RawDescription(channels, rate=RATE))
+    assert result.errors == ()
     np.testing.assert_allclose(samples_of(result), [FIRST], atol=1e-12)
 
 

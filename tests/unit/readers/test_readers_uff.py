@@ -550,6 +550,7 @@ def test_text_after_the_last_set_is_accepted(tail, tmp_path):
     ("line", "text", "words"),
     [
         (20, "1.2x456e+00", "'1.2x456e+00' is no number"),
+        (20, "1.2'456e+00", "'1.2'456e+00' is no number"),
         (20, "", "it is blank"),
         (9, "4.5", "'4.5' is no number"),
         (9, "", "it is blank"),
