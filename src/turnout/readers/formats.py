@@ -26,12 +26,16 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Format:
-    """``extensions`` are in lower case with a dot; ``signature(head)`` is True if the first bytes prove the format."""
+    """``extensions`` are in lower case with a dot; ``signature(head)`` is True if the first bytes prove the format.
+
+    ``is_binary``: no file of this format is a text.
+    """
 
     module: str
     extensions: tuple[str, ...]
     signature: Callable[[bytes], bool] = lambda head: False
     meaning: str = ""
+    is_binary: bool = False
 
     def read_raw(self, source: Source) -> RawFile:
         """The file's records, not converted. The module is imported only now: h5py alone costs 0.1 s.
@@ -68,7 +72,6 @@ class Format:
         return replace(raw, records=records)
 
 
-TEXT_MODULES = ("uff", "lvm", "csv")
 TEXT_REMEDY = "Give a table of text the extension .csv or .txt; copy any other file again from the logger"
 
 
@@ -81,15 +84,23 @@ FORMATS = {
         "uff", (".uff", ".unv", ".uf", ".58"), lambda h: h.lstrip()[:2] == b"-1", "Universal File Format 58, 58b"
     ),
     "uff58b": Format("uff", (), meaning="Universal File Format 58b, binary"),
-    "tdms": Format("tdms", (".tdms",), lambda h: h[:4] == b"TDSm", "National Instruments TDMS"),
-    "mat73": Format("mat", (), lambda h: h[:10] == b"MATLAB 7.3", "MATLAB from version 7.3"),
-    "mat": Format("mat", (".mat",), lambda h: h[:10] == b"MATLAB 5.0", "MATLAB version 5"),
-    "rcmdx": Format("rcmdx", (".rcmdx",), lambda h: _is_hdf5(h) and b"RCMDX" in h, "RCM-DX, railways' exchange format"),
-    "hdf5": Format("hdf5", (".h5", ".hdf5", ".hdf", ".he5"), _is_hdf5, "HDF5"),
-    "wav": Format("wav", (".wav", ".rf64", ".flac"), lambda h: h[:4] in (b"RIFF", b"RF64", b"fLaC"), "WAV, FLAC"),
+    "tdms": Format("tdms", (".tdms",), lambda h: h[:4] == b"TDSm", "National Instruments TDMS", is_binary=True),
+    "mat73": Format("mat", (), lambda h: h[:10] == b"MATLAB 7.3", "MATLAB from version 7.3", is_binary=True),
+    "mat": Format("mat", (".mat",), lambda h: h[:10] == b"MATLAB 5.0", "MATLAB version 5", is_binary=True),
+    "rcmdx": Format(
+        "rcmdx",
+        (".rcmdx",),
+        lambda h: _is_hdf5(h) and b"RCMDX" in h,
+        "RCM-DX, railways' exchange format",
+        is_binary=True,
+    ),
+    "hdf5": Format("hdf5", (".h5", ".hdf5", ".hdf", ".he5"), _is_hdf5, "HDF5", is_binary=True),
+    "wav": Format(
+        "wav", (".wav", ".rf64", ".flac"), lambda h: h[:4] in (b"RIFF", b"RF64", b"fLaC"), "WAV, FLAC", is_binary=True
+    ),
     "lvm": Format("lvm", (".lvm",), lambda h: h[:19] == b"LabVIEW Measurement", "LabVIEW measurement file"),
-    "npz": Format("npz", (".npz",), lambda h: h[:4] == b"PK\x03\x04", "NumPy archive"),
-    "parquet": Format("parquet", (".parquet", ".pq"), lambda h: h[:4] == b"PAR1", "Apache Parquet"),
+    "npz": Format("npz", (".npz",), lambda h: h[:4] == b"PK\x03\x04", "NumPy archive", is_binary=True),
+    "parquet": Format("parquet", (".parquet", ".pq"), lambda h: h[:4] == b"PAR1", "Apache Parquet", is_binary=True),
     "csv": Format("csv", (".csv", ".txt", ".tsv", ".asc", ".dat"), meaning="text with separated columns"),
 }
 
@@ -121,7 +132,7 @@ def detect_format(source: Source) -> Format:
     for entry in FORMATS.values():
         if extension not in entry.extensions:
             continue
-        if entry.module in TEXT_MODULES or CONTROL_CHARACTER.search(head):
+        if not entry.is_binary or CONTROL_CHARACTER.search(head):
             return entry
         problem = (
             f"its extension {extension!r} is that of {entry.meaning}, and its first bytes are text ({head[:20]!r})"
