@@ -59,6 +59,11 @@ def leader_at(case, position):
     return base, score_of(Search(case), base, fit_jointly(case, (candidate,), [1.0]), candidate)
 
 
+def leader_at_first(case):
+    base, candidate = fit_jointly(case), case.candidates[0]
+    return base, score_of(Search(case), base, fit_jointly(case, (candidate,), [1.0]), candidate)
+
+
 @pytest.mark.parametrize(("start", "true"), [(1.8, 4.2), (3.6, 4.2), (5.4, 4.2), (5.4, 7.2), (3.0, 1.8)])
 def test_a_leader_at_another_position_moves_to_the_true_one(start, true):
     case = Dented(true)
@@ -100,6 +105,22 @@ def test_positions_with_hardly_less_evidence_are_possible(error, possible):
     assert ((min(close), max(close)) if len(close) > 1 else None) == possible
     found = at_best_position(Search(case), base, leader)
     assert found.candidate.where["place"] == 3.0 and found.possible_positions == possible
+
+
+def test_two_possible_lengths_at_one_position_are_no_range(monkeypatch):
+    """Widths of 1.10 and 1.11 m cannot be distinguished."""
+    case = Dented(3.0, noise=0.0)
+    widths = {3: WIDTH, 5: 1.01 * WIDTH}
+    case.candidates = tuple(
+        Candidate.of(
+            "bump", SIZE, lambda p, n=n: p | {"place": 3.0, "width": widths[n]}, ((1.0,),),
+            {"place": 3.0, "sleepers": n},
+        )
+        for n in widths
+    )  # fmt: skip
+    monkeypatch.setattr(case, "shape", lambda depth, place, width: depth * np.exp(-(((X - place) / width) ** 2)))
+    base, leader = leader_at_first(case)
+    assert at_best_position(Search(case), base, leader) is leader
 
 
 def test_an_effect_with_a_length_is_no_neighbour_of_one_without():

@@ -101,8 +101,8 @@ def _with_possible_positions(search: Search, fit: Fit, score: Score, gains: dict
         close = [c for c in _neighbours(search.case, candidate) if gains[c.key] > least_gain and c.key not in possible]
         possible.update((c.key, c) for c in close)
         outermost += close
-    positions = [c.position for c in possible.values() if c.position is not None]
-    return replace(score, possible_positions=(min(positions), max(positions))) if len(possible) > 1 else score
+    positions = sorted({c.position for c in possible.values() if c.position is not None})
+    return replace(score, possible_positions=(positions[0], positions[-1])) if len(positions) > 1 else score
 
 
 def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> Score | None:
