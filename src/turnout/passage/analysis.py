@@ -134,10 +134,11 @@ def _analyse_train(
 ) -> Passage:
     """Passage of the train that ``sensors`` record.
 
-    The motion is sought relative to the middle of the sensors. Relative to a distant origin, an error of the
-    acceleration would change the times of the axles against each other.
+    The motion is sought relative to position 0 where it is among the sensors, else to the sensor nearest to it.
+    Relative to a distant origin, an error of the acceleration would change the times of the axles against each other,
+    and a train that starts within the recording was never there.
     """
-    origin = float(np.mean(envelopes.positions))
+    origin = float(np.clip(0.0, np.min(envelopes.positions), np.max(envelopes.positions)))
     envelopes = envelopes.relative_to(origin)
     is_multi_sensor, direction, all_envelopes = bool(np.ptp(envelopes.positions) > 0.05), "unknown", envelopes
     if is_multi_sensor:

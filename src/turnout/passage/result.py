@@ -31,7 +31,7 @@ class PassageSensor:
 class SpeedFinding:
     """``speed`` [m/s] with ``se``, and ``acceleration`` [m/s²] with its error.
 
-    ``time`` [s] is halfway between the passing times of the first and the last axle at the middle of the sensors: the
+    ``time`` [s] is halfway between the passing times of the first and the last axle at the origin of the motion: the
     speed is that moment's.
 
     ``source`` is "sensors", "axle spacing", "both" or "bogie" (a guess from an unknown train's bogies).
@@ -70,7 +70,7 @@ class Passage:
     """One train found in a recording.
 
     ``offsets`` (n_axle,) [m] behind the first axle, ``times`` (n_axle,) [s] when they pass the turnout's origin.
-    The origin of ``motion`` is in the middle of the sensors.
+    The origin of ``motion`` is position 0, or the sensor nearest to it where it is not among the sensors.
     ``at_sensor`` maps a channel to (n_axle,) [s], for channels that recorded the train; ``audible_sensors`` names them.
     ``status`` is "accepted", "partly" or "rejected" with ``findings``; ``contrast`` of the axle count.
     """
