@@ -85,7 +85,7 @@ def response_faults():
     """Responses that are late, early, in a wrong unit or limited, on random tracks in closed form."""
     rng = np.random.default_rng(8)
     reasons, _ = reasons_on_tracks(rng, 100)
-    yield Bar("accepted impacts on random tracks that are rejected", np.mean(list(map(bool, reasons))), 0.003,
+    yield Bar("intact impacts on random tracks that are rejected", np.mean(list(map(bool, reasons))), 0.003,
               n=f"n={len(reasons)}")  # fmt: skip
     for name, delays, bar in (
         ("response early by 1 to 15 ms: right reason", (-15e-3, -8e-3, -3e-3, -1e-3), 0.99),

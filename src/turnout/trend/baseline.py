@@ -180,12 +180,9 @@ def spread_and_autocorrelation(
     power = np.sum(centred**2, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = np.sqrt(np.where(freedom > 0, power / np.maximum(freedom, 1), np.nan))
-        before = previous(inside)
-        pair = inside & (before >= 0)
-        step = np.where(pair, time - np.take_along_axis(time, np.maximum(before, 0), axis=1), np.nan)
-        near = step <= 1.5 * usual_interval(time, inside)[:, None]
+        near = _intervals(time, inside) <= 1.5 * usual_interval(time, inside)[:, None]
         pairs = near.sum(axis=1)
-        lagged = np.take_along_axis(centred, np.maximum(before, 0), axis=1)
+        lagged = np.take_along_axis(centred, np.maximum(previous(inside), 0), axis=1)
         rho = np.sum(centred * lagged * near, axis=1) / np.where(power > 0.0, power, np.nan)
         n_base = count.sum(axis=1)
         fitted = n_base - freedom
@@ -276,14 +273,10 @@ def usual_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
     >>> usual_interval(np.array([[0.0, 7.0, 10.0, 14.0, 60.0]]), np.array([[True, True, False, True, True]]))
     array([7.])
     """
-    before = previous(inside)
-    pair = inside & (before >= 0)
-    with np.errstate(invalid="ignore"):
-        step = np.where(pair, time - np.take_along_axis(time, np.maximum(before, 0), axis=1), np.inf)
+    step = np.sort(_intervals(time, inside), axis=1)
     if step.shape[1] == 0:
         return np.full(len(step), np.nan)
-    step = np.sort(step, axis=1)
-    count = pair.sum(axis=1)
+    count = np.isfinite(step).sum(axis=1)
     return np.where(count > 0, step[np.arange(len(step)), np.maximum(count - 1, 0) // 2], np.nan)
 
 
@@ -312,12 +305,17 @@ def mean_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
     >>> mean_interval(np.array([[0.0, 2.0, 4.0, 94.0, 96.0, 1096.0]]), np.ones((1, 6), bool))
     array([24.])
     """
+    step = _intervals(time, inside)
+    counts = step <= MAX_INTERVAL
+    return np.sum(step, axis=1, where=counts) / np.where(counts.any(axis=1), counts.sum(axis=1), np.nan)
+
+
+def _intervals(time: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """(n_chart, n_campaign) time since the campaign of the mask before each one; infinite where there is none."""
     before = previous(inside)
-    pair = inside & (before >= 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        step = np.where(pair, time - np.take_along_axis(time, np.maximum(before, 0), axis=1), np.nan)
-        counts = step <= MAX_INTERVAL
-        return np.sum(np.where(counts, step, 0.0), axis=1) / np.where(counts.any(axis=1), counts.sum(axis=1), np.nan)
+    with np.errstate(invalid="ignore"):
+        step = time - np.take_along_axis(time, np.maximum(before, 0), axis=1)
+    return np.where(inside & (before >= 0), step, np.inf)
 
 
 def pooled_autocorrelation(autocorrelation: np.ndarray, classes: np.ndarray) -> np.ndarray:

@@ -9,12 +9,14 @@ from turnout.errors import SimulationError
 from turnout.mismatch.engine import leaders
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
+from turnout.mismatch.engine.diagnose import Diagnosis
 from turnout.mismatch.engine.evidence import score_of
 from turnout.mismatch.engine.leaders import at_best_position
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
+from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter
 
 X = np.linspace(0.0, 9.0, 300)
@@ -105,6 +107,20 @@ def test_positions_with_hardly_less_evidence_are_possible(error, possible):
     assert ((min(close), max(close)) if len(close) > 1 else None) == possible
     found = at_best_position(Search(case), base, leader)
     assert found.candidate.where["place"] == 3.0 and found.possible_positions == possible
+
+
+def test_a_diagnosis_has_the_possible_positions_of_each_effect_of_its_fit():
+    """The fit has the second effect first; a rejected candidate has a range as well."""
+    case = Dented(3.0, noise=0.0, error=2.1)
+    base, leader = leader_at(case, 3.0)
+    found = at_best_position(Search(case), base, leader)
+    whole = next(c for c in case.candidates if c.family == "shift")
+    elsewhere = replace(leader_at(case, 7.2)[1], possible_positions=(6.6, 7.2))
+    second = score_of(Search(case), base, fit_jointly(case, (whole,), [1.0]), whole)
+    fit = base.with_candidates((whole, found.candidate))
+    verdicts = (Verdict("named", ("bump",), scores=(found, elsewhere)), Verdict("named", ("shift",), scores=(second,)))
+    diagnosis = Diagnosis(verdicts, base, fit, (), None)
+    assert diagnosis.possible_positions == (None, (2.4, 3.6))
 
 
 def test_two_possible_lengths_at_one_position_are_no_range(monkeypatch):

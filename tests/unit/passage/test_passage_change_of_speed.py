@@ -69,6 +69,23 @@ def test_a_distant_origin_of_the_positions_does_not_change_the_speed(shift, sett
     assert passage.speed.speed == pytest.approx(expected, rel=3e-3)
 
 
+STEADY = [(0.0, (24.6,)), (0.0, (13.8, 24.6)), (0.0, (13.8, 24.6, 26.4)), (0.0, PLACES)]
+BRAKING = [(-0.6, (24.6,)), (-0.6, (13.8, 24.6, 26.4)), (-0.6, PLACES)]  # two sensors: a limit in docs/passages.md
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(("acceleration", "positions"), [*STEADY, *BRAKING])
+def test_the_axles_of_a_train_pass_each_sensor_at_their_times(acceleration, positions, direction, settings):
+    """Within a quarter of a metre: the wheel is in the middle of what it causes, also where a comb finds the train."""
+    recording = rolling_noise(np.random.default_rng(8), IC3, 20.0, positions, direction, acceleration=acceleration)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    assert passage.n_axle == 8
+    times = passing_times(IC3, positions, 20.0, acceleration, direction, 1.0)
+    for name, expected in zip(passage.at_sensor, times):
+        at_axles = 20.0 + acceleration * (expected - 1.0)
+        assert np.max(np.abs(passage.at_sensor[name] - expected) * at_axles) < 0.25
+
+
 @pytest.mark.parametrize("positions", [(0.0, 5.0, 10.0), (12.0, 15.5, 22.3, 31.0)])
 @pytest.mark.parametrize(("speed", "acceleration"), [(0.2, 0.4), (0.5, 0.9), (0.3, 0.5), (0.2, 0.8)])
 def test_a_train_that_starts_within_the_recording_is_counted_or_doubted(speed, acceleration, positions, settings):

@@ -1,4 +1,4 @@
-"""Sentences of a diagnosis on the wheels that may have an effect."""
+"""Sentences and positions of a diagnosis, with what else is possible."""
 
 from types import SimpleNamespace
 
@@ -7,8 +7,9 @@ import pytest
 
 from turnout import physics
 from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.localization import Location
 from turnout.mismatch.engine.verdict import Verdict
-from turnout.stages.finding_row import sentence
+from turnout.stages.finding_row import location_fields, sentence
 
 FLAT = physics.WheelFlat(1, 0.04, train="railcar")
 
@@ -30,3 +31,10 @@ def test_the_answer_states_every_wheel_that_may_have_the_flat(rivals, end):
     text = sentence(SimpleNamespace(verdict=verdict, verdicts=(verdict,), fit=fit))
     assert text.startswith("The simulation lacks an effect: wheel 2 of railcar has a flat of 0.040 m") and end in text
     assert text.endswith(end)
+
+
+@pytest.mark.parametrize(("low", "high", "half_interval"), [(4.2, 4.2, 0.6), (3.6, 4.2, 0.6), (3.0, 5.4, 1.2)])
+def test_the_position_of_an_unknown_cause_is_known_to_one_bay_to_either_side_at_best(low, high, half_interval):
+    """An interval of 95 % reaches two standard errors to either side; a bay has 0.6 m."""
+    fields = location_fields(Location("place", 4.2, 50.0, 0.5 * (low + high), low, high))
+    assert 2.0 * fields["place_se"] == pytest.approx(half_interval)

@@ -101,7 +101,7 @@ class EffectSite:
     same_quantity : bool
         Whether effect and parameter change one quantity, so that recordings show their joint change alone.
     rival_axles : tuple of int
-        Other axles of the train whose evidence is no more than ``THRESHOLDS.position_margin`` below.
+        Other axles of the train whose evidence is less than ``THRESHOLDS.position_margin`` smaller.
     """
 
     where: Mapping[str, Any] = field(default_factory=dict)

@@ -65,7 +65,7 @@ def at_best_position(search: Search, fit: Fit, score: Score) -> Score:
     Returns
     -------
     Score
-        The same where no neighbour gains more, and for an effect without a position.
+        The same where no neighbour gains more or nearly as much, and for an effect without a position.
     """
     gains = {score.candidate.key: score.gain}
     while True:
@@ -108,7 +108,8 @@ def _with_possible_positions(search: Search, fit: Fit, score: Score, gains: dict
 def _score_at(search: Search, fit: Fit, score: Score, neighbour: Candidate) -> Score | None:
     """Score of the effect at a neighbouring position.
 
-    The fit ends where it does not promise to cost less, or so little more that the position is possible.
+    The fit ends where it promises neither to cost less nor to come so close that the position is possible. A cost is
+    twice as large as the evidence it stands for.
     """
 
     def compute() -> Fit | None:
