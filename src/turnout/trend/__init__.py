@@ -4,7 +4,7 @@ from turnout.trend.alarms import candidates, describe_flagged
 from turnout.trend.cusum import Charts, finish
 from turnout.trend.evaluation import evaluate, evaluate_panels
 from turnout.trend.panel import Panel, panel_of
-from turnout.trend.residuals import prepare
+from turnout.trend.preparation import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, baseline_rows, chart_rows
 

@@ -18,8 +18,8 @@ from turnout.trend.change_point import Change, find_change
 from turnout.trend.drift import adjusted_p_values
 from turnout.trend.forecast import N_RECENT, forecast
 from turnout.trend.panel import WHOLE_TURNOUT
+from turnout.trend.preparation import first_epoch
 from turnout.trend.quantities import RESONANCES, is_damping
-from turnout.trend.residuals import first_epoch
 from turnout.trend.stiffness import COMPONENTS, ResonancePair, chart_numbers, resonance_pair, stiffness_change
 from turnout.trend.times import timestamps
 

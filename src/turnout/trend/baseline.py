@@ -80,7 +80,12 @@ def baseline_window(
 
 
 def fit_baseline(
-    frequency: np.ndarray, temperature: np.ndarray, time: np.ndarray, epoch: np.ndarray, settings: TrendSettings
+    frequency: np.ndarray,
+    temperature: np.ndarray,
+    time: np.ndarray,
+    epoch: np.ndarray,
+    settings: TrendSettings,
+    aside: np.ndarray | bool = False,
 ) -> tuple[Baseline, np.ndarray]:
     """Fit level and temperature slope by least squares on the baseline, with one level per epoch in it.
 
@@ -101,6 +106,8 @@ def fit_baseline(
         Number of the epoch of each campaign.
     settings : TrendSettings
         Minimum length and number of campaigns of a baseline.
+    aside : (n_chart, n_campaign) array of bool
+        Campaigns of the baseline that do not count; False: none.
 
     Returns
     -------
@@ -109,7 +116,8 @@ def fit_baseline(
         temperature.
     """
     usable = np.isfinite(frequency) & np.isfinite(temperature)
-    inside, complete = baseline_window(usable, time, settings.baseline_days, settings.baseline_campaigns)
+    window, complete = baseline_window(usable, time, settings.baseline_days, settings.baseline_campaigns)
+    inside = window & ~np.asarray(aside)
     n_epoch = int(epoch.max(initial=0)) + 1
     level_f, count = by_epoch(frequency, inside, epoch, n_epoch)
     level_t, _ = by_epoch(temperature, inside, epoch, n_epoch)
@@ -216,41 +224,52 @@ LONE_SD = 6.0  # robust standard deviations by which a lone outlier lies outside
 MIN_STEPS = 7  # steps from campaign to campaign that give the robust standard deviation, as in mode_scatter.sql
 
 
-def lone_outliers(values: np.ndarray) -> np.ndarray:
-    r"""Which values of a series lie far outside both of their neighbours, on the same side.
+def lone_outliers(values: np.ndarray, epoch: np.ndarray | int = 0) -> np.ndarray:
+    r"""Which values of each series lie far outside both of their neighbours, on the same side.
 
     A change shows in every campaign from its onset on, so one campaign alone is an error of that campaign. Far are
     ``LONE_SD`` robust standard deviations of a value, from the steps between neighbours,
 
     .. math:: s = 1.4826\, \mathrm{median} |v_i - v_{i-1}| / \sqrt{2}
 
-    so that neither a change nor the outlier widens it. The first and the last value have one neighbour: they cannot be
-    told from a change.
+    so that neither a change nor the outlier widens it. The first and the last value of an epoch have one neighbour:
+    they cannot be told from a change.
 
     Parameters
     ----------
-    values : (n,) array of float
-        Values in order of time, without gaps.
+    values : (n,) or (n_chart, n) array of float
+        Values in order of time, nan where there is none.
+    epoch : array of int
+        Number of the epoch of each value, of the shape of ``values``; 0: all are in one.
 
     Returns
     -------
-    (n,) array of bool
-        True for a value that stands alone; none with fewer than ``MIN_STEPS`` steps.
+    array of bool
+        Of the shape of ``values``. True for a value that stands alone; none with fewer than ``MIN_STEPS`` steps.
 
     Examples
     --------
     >>> np.flatnonzero(lone_outliers(np.array([0.0, 1.0, 0.0, 9.0, 1.0, 0.0, 1.0, -9.0, -8.0, -9.0])))
     array([3])
     """
-    alone = np.zeros(values.shape, dtype=bool)
-    steps = np.diff(values)
-    if steps.size < MIN_STEPS:
-        return alone
-    limit = LONE_SD * MAD_TO_SD * float(np.median(np.abs(steps))) / np.sqrt(2.0)
-    above = np.minimum(steps[:-1], -steps[1:])  # how far each inner value lies above the nearer neighbour
-    below = np.minimum(-steps[:-1], steps[1:])
-    alone[1:-1] = (limit > 0.0) & (np.maximum(above, below) > limit)
-    return alone
+    if np.size(values) == 0:
+        return np.zeros(np.shape(values), dtype=bool)
+    rows = np.atleast_2d(values)
+    epoch = np.broadcast_to(epoch, rows.shape)
+    inside = np.isfinite(rows)
+    before = previous(inside)
+    at = np.maximum(before, 0)
+    is_pair = inside & (before >= 0) & (np.take_along_axis(epoch, at, axis=1) == epoch)
+    step = np.where(is_pair, rows - np.take_along_axis(rows, at, axis=1), np.nan)
+    after = rows.shape[1] - 1 - previous(inside[:, ::-1])[:, ::-1]
+    next_step = np.take_along_axis(np.pad(step, ((0, 0), (0, 1)), constant_values=np.nan), after, axis=1)
+    size = np.sort(np.abs(step), axis=1)  # nan at the end
+    count = is_pair.sum(axis=1, keepdims=True)
+    middle = np.maximum(np.concatenate([count - 1, count], axis=1) // 2, 0)
+    limit = LONE_SD * MAD_TO_SD / np.sqrt(2.0) * np.take_along_axis(size, middle, axis=1).mean(axis=1)
+    beyond = np.maximum(np.minimum(step, -next_step), np.minimum(-step, next_step))  # the nearer neighbour
+    judged = (count >= MIN_STEPS) & (limit > 0.0)[:, None]
+    return (judged & (beyond > limit[:, None])).reshape(np.shape(values))
 
 
 def usual_interval(time: np.ndarray, inside: np.ndarray) -> np.ndarray:

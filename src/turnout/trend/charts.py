@@ -10,7 +10,7 @@ import numpy as np
 from turnout.trend.baseline import lone_outliers
 
 if TYPE_CHECKING:
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 
 @dataclass

@@ -12,15 +12,13 @@ import numpy as np
 from turnout.trend.charts import Charts
 from turnout.trend.confirmation import far_deviations
 from turnout.trend.epochs import by_epoch, expand_epochs
+from turnout.trend.preparation import Prepared, first_epoch, stack_padded
 from turnout.trend.quantities import targets
 from turnout.trend.residuals import (
-    Prepared,
     Residuals,
-    first_epoch,
     learning_campaigns,
     nearer_residuals,
     section_residuals,
-    stack_padded,
     turnout_residuals,
 )
 from turnout.trend.threshold import run_lengths, threshold_for
@@ -306,7 +304,7 @@ class _ChartSums:
         k, factor = self.allowance[rows], self.factor[rows]
         with np.errstate(invalid="ignore", divide="ignore"):
             z = residuals.residual / (_sigma_of_sum(residuals, k * factor) * factor[:, None])
-        active = np.isfinite(z) & ~window & p.baseline.complete[rows, None]
+        active = np.isfinite(z) & ~window & ~p.aside[rows] & p.baseline.complete[rows, None]
         fresh = np.diff(epoch, axis=1, prepend=0) > 0
         sums = {"z": z, "extra": extra}
         bands = p.charts["band"].to_numpy()[rows]

@@ -10,12 +10,13 @@ from turnout.constants import DAYS_PER_YEAR
 from turnout.trend.baseline import mean_interval
 from turnout.trend.detectability import detectable_shift
 from turnout.trend.epochs import by_epoch
-from turnout.trend.residuals import first_epoch, temperature_variance
+from turnout.trend.preparation import first_epoch
+from turnout.trend.residuals import temperature_variance
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.trend.charts import Charts
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 
 def detectable_change(charts: Charts, settings: TrendSettings) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from turnout.trend.baseline import pooled_autocorrelation
 from turnout.trend.cusum import finish
 from turnout.trend.panel import WHOLE_TURNOUT, panel_of
-from turnout.trend.residuals import prepare
+from turnout.trend.preparation import prepare
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.trend.charts import Charts
     from turnout.trend.panel import Panel
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 
 def autocorrelation_classes(prepared: Iterable[Prepared]) -> list[np.ndarray]:

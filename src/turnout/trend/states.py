@@ -13,15 +13,16 @@ import pandas as pd
 from turnout.trend.detectable_change import detectable_change, is_temperature_known
 from turnout.trend.drift import slopes, span
 from turnout.trend.panel import WHOLE_TURNOUT
+from turnout.trend.preparation import first_epoch
 from turnout.trend.quantities import targets
-from turnout.trend.residuals import FREQUENCY_RESOLUTION, first_epoch
+from turnout.trend.residuals import FREQUENCY_RESOLUTION
 from turnout.trend.threshold import run_lengths
 from turnout.trend.times import timestamps
 
 if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.trend.charts import Charts
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 
 def chart_status(charts: Charts, settings: TrendSettings) -> pd.DataFrame:

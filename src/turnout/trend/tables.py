@@ -16,8 +16,8 @@ from turnout.registry.arrow_types import arrow_schema
 from turnout.registry.schema import tables
 from turnout.trend.detectable_change import campaigns_a_year, detectable_in_epoch, spread_in
 from turnout.trend.epochs import by_epoch
+from turnout.trend.preparation import first_epoch
 from turnout.trend.quantities import ACCELERATION, DAMPING_SCALE, is_damping
-from turnout.trend.residuals import first_epoch
 from turnout.trend.threshold import run_lengths
 from turnout.trend.times import timestamps
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.registry.schema import Column
     from turnout.trend.charts import Charts
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 TABLE_KEYS = ["turnout_id", "section_id", "band", "source"]
 CELL_STATES = np.array(
@@ -52,9 +52,10 @@ def cell_states(charts: Charts) -> np.ndarray:
     no_temperature = np.zeros(charts.z.shape, dtype=bool)
     no_temperature[:n_section] = np.isfinite(p.panel.frequency) & ~np.isfinite(p.values)
     first = p.epoch <= first_epoch(p)[:, None]
-    started = p.baseline.complete[:, None] & ~(charts.learning & first)
+    learning = charts.learning | p.aside
+    started = p.baseline.complete[:, None] & ~(learning & first)
     return np.select(
-        [no_temperature, ~started, charts.learning, ~np.isfinite(charts.z), charts.down_open, charts.up_open],
+        [no_temperature, ~started, learning, ~np.isfinite(charts.z), charts.down_open, charts.up_open],
         [5, 1, 2, 6, 3, 4],
         0,
     ).astype(np.int8)

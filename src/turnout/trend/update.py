@@ -27,8 +27,8 @@ from turnout.trend.alarms import PREVIOUS_ALARMS, Flag, candidates, describe_fla
 from turnout.trend.cusum import finish
 from turnout.trend.evaluation import shared_autocorrelation
 from turnout.trend.panel import CHART_KEYS, lay_out
+from turnout.trend.preparation import prepare
 from turnout.trend.quantities import DAMPING_ENDING, DAMPING_SCALE, RESONANCES
-from turnout.trend.residuals import prepare
 from turnout.trend.states import chart_status
 from turnout.trend.tables import alarm_rows, arrow_rows, baseline_rows, chart_rows
 from turnout.trend.times import SECONDS_PER_DAY, believable_times, days, timestamps
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from turnout.config.settings.trend import TrendSettings
     from turnout.registry.generation import Generation
     from turnout.trend.panel import Panel
-    from turnout.trend.residuals import Prepared
+    from turnout.trend.preparation import Prepared
 
 
 def split_by_year(rows: pa.Table) -> dict[int, pa.Table]:

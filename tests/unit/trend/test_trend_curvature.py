@@ -8,7 +8,7 @@ from turnout.config.settings.trend import TrendSettings
 from turnout.trend import evaluate
 from turnout.trend.curvature import fit_curved_law
 from turnout.trend.panel import panel_of
-from turnout.trend.residuals import prepare
+from turnout.trend.preparation import prepare
 
 SETTINGS = TrendSettings()
 YEAR, TURNOUTS = 52, 120
