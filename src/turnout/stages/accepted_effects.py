@@ -300,7 +300,8 @@ def describe_term(term: Any, candidate: Candidate, standard_errors: Sequence[flo
     Returns
     -------
     dict
-        ``term``, ``fixed`` and ``parameters``; ``rival_axles`` where other axles may have the effect instead.
+        ``term``, ``fixed`` and ``parameters``; the ``position`` [m] of an effect between two supports, and
+        ``rival_axles`` where other axles may have the effect instead.
     """
     fitted = {p.name: p for p in candidate.parameters}
     errors = dict(zip(fitted, standard_errors))
@@ -315,4 +316,5 @@ def describe_term(term: Any, candidate: Candidate, standard_errors: Sequence[flo
         for name, p in fitted.items()
     }
     rivals = {"rival_axles": list(candidate.site.rival_axles)} if candidate.site.rival_axles else {}
-    return {"term": candidate.family, "fixed": fixed, "parameters": parameters, **rivals}
+    between = {"position": candidate.site.where["place"]} if getattr(term, "beyond", 0.0) else {}
+    return {"term": candidate.family, "fixed": fixed, "parameters": parameters, **between, **rivals}

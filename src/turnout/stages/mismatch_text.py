@@ -230,7 +230,8 @@ def effect_in_words(term: Mapping[str, Any], finding: Mapping[str, Any]) -> str:
     fixed = term["fixed"]
     axle = fixed["wheel"] + 1 if "wheel" in fixed else None
     train = fixed.get("train") or (_train_and_axle(finding)[0] if finding["train"] else "a train")
-    positions = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    of_supports = [fixed[k] for k in ("sleeper", "support", "first", "last", "place") if k in fixed]
+    positions = [term["position"]] if "position" in term else of_supports
     shift = term["parameters"].get("shift", {"value": 0.0})["value"] if "place" in fixed else 0.0
     words = {name: str(value) for name, value in fixed.items()}
     words |= {name: _estimate(term, name)[0] for name in term["parameters"]}

@@ -25,6 +25,7 @@ from turnout.stages.accept_finding import accept
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
 from turnout.stages.mismatch_groups import Group
 from turnout.stages.mismatch_results import Results
+from turnout.stages.mismatch_text import effect_in_words
 from turnout.stages.track_files import digest_of_model
 
 GAP = {"value": 1.12e-3, "se": 0.05e-3, "unit": "m"}
@@ -212,6 +213,17 @@ def test_a_fitted_flat_is_stored_with_the_other_axles_that_may_have_it(config):
         candidate = SimpleNamespace(family=flat.name, parameters=flat.parameters, site=site)
         described = describe_term(flat, candidate, errors, own_track(config))
         assert {k: v for k, v in described.items() if k not in ("term", "fixed", "parameters")} == stored
+
+
+def test_the_sentence_of_a_mass_between_two_sleepers_has_its_position(config):
+    """It said the position of the sleeper before it, half a bay off."""
+    mass, track = physics.AttachedResonator(20, 30.0, 180.0, beyond=0.5), own_track(config)
+    middle = round(float(track.support[20:22].mean()), 3)
+    candidate = SimpleNamespace(family=mass.name, parameters=mass.parameters, site=EffectSite(where={"place": middle}))
+    described = describe_term(mass, candidate, [3.0, 2.0, 0.01], track)
+    assert described["fixed"]["support"] == pytest.approx(middle - 0.3) and described["position"] == middle
+    row = {"train": None, "axle": None, "channel": None}
+    assert f" at {middle:.1f} m " in effect_in_words(described, row)
 
 
 def own_track(config):
