@@ -1,20 +1,26 @@
 """Sums over the sealed sets that the pages of the blind proof pool, with exact 95 % intervals.
 
-    python -m benchmarks.pooled_sets
+    python -m benchmarks.pooled_sets [--write]
 
-Prints a table for each group of sums in README and docs. It reads docs/sealed: ``plain.csv``, ``crossing.csv`` and
-``histories.csv`` have a row for each sealed set. A figure has two columns, for example ``clear_named``, the number of
-clear effects with the right name, and ``clear_named_of``, the number of clear effects. An empty cell: the set does not
-state the figure, and the sum is without it. A test compares the sums with the pages, and the rows with their sections.
+Prints a table for each group of sums in README and docs; ``--write`` puts the sums into these pages. It reads
+docs/sealed: ``plain.csv``, ``crossing.csv`` and ``histories.csv`` have a row for each sealed set. A figure has two
+columns, for example ``clear_named``, the number of clear effects with the right name, and ``clear_named_of``, the
+number of clear effects. An empty cell: the set does not state the figure, and the sum is without it. A test compares
+the sums with the pages, and the rows with their sections.
 """
 
+import argparse
 import csv
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from turnout_blind.score.intervals import clopper_pearson, poisson_interval
 
-SEALED = Path(__file__).resolve().parents[1] / "docs" / "sealed"
+ROOT = Path(__file__).resolve().parents[1]
+SEALED = ROOT / "docs" / "sealed"
+FRACTION = re.compile(r"(\d+)( of | in )(\d+(?:\.\d+)?)\b")
+INTERVAL = re.compile(r"(?:\b([\d.]+) )?\bto ([\d.]+) %")
 RATES = ("change_alarms",)  # events in site-years; all other figures are cases of cases
 FIRST_RIGHT_DERIVATIVES = {"plain": 11, "crossing": 10}  # number of the first set with right derivatives of passages
 FIRST_OF_LAST_HISTORIES = 13
@@ -60,10 +66,10 @@ class Sum:
         rows = self.rows()
         return sum(int(r[self.figure]) for r in rows), sum(float(r[f"{self.figure}_of"]) for r in rows)
 
-    def interval(self):
-        """95 % interval of the share, or of the rate a year [%]."""
+    def interval(self, counts=None):
+        """95 % interval of the share, or of the rate a year [%]; of ``counts`` if given, else of the sets."""
         interval_of = poisson_interval if self.figure in RATES else clopper_pearson
-        return tuple(100.0 * x for x in interval_of(*self.counts()))
+        return tuple(100.0 * x for x in interval_of(*(counts or self.counts())))
 
     def __str__(self):
         k, n = self.counts()
@@ -245,8 +251,56 @@ STATEMENTS = (
 )
 
 
+def is_rounded(stated, exact):
+    """Whether a number is the exact one, rounded to the stated decimals."""
+    decimals = len(stated.partition(".")[2])
+    return abs(float(stated) - exact) <= 0.5 * 10**-decimals + 1e-9
+
+
+def updated(line, sums):
+    """The line with the fractions and intervals of ``sums``, which it states in their order.
+
+    An interval belongs to the first sum left whose fraction in the line has it; it keeps its decimals.
+    """
+    stated = zip(sums, [(int(k), float(n)) for k, _, n in FRACTION.findall(line)])
+    counts = iter([s.counts() for s in sums])
+
+    def fraction(m):
+        k, n = next(counts)
+        return f"{k}{m[2]}{n:.0f}"
+
+    def interval(m):
+        for total, before in stated:
+            low, high = total.interval(before)
+            if is_rounded(m[2], high) and (not m[1] or is_rounded(m[1], low)):
+                ends = [_rounded_as(text, x) for text, x in zip((m[1], m[2]), total.interval()) if text]
+                return f"{' '.join([*ends[:-1], 'to', ends[-1]])} %"
+        return m[0]
+
+    return INTERVAL.sub(interval, FRACTION.sub(fraction, line))
+
+
+def _rounded_as(text, value):
+    return f"{value:.{len(text.partition('.')[2])}f}"
+
+
+def write():
+    """Put the sums into the pages that state them."""
+    for page, heading, statements in STATEMENTS:
+        head, mark, rest = (ROOT / page).read_text(encoding="utf-8").partition(heading)
+        lines = rest.splitlines(keepends=True)
+        for beginning, sums in statements.items():
+            i = next(i for i, line in enumerate(lines) if line.startswith(beginning))
+            lines[i] = updated(lines[i], sums)
+        (ROOT / page).write_text(head + mark + "".join(lines), encoding="utf-8")
+
+
 def main():
     """Print the number of sets and cases, then a table of sums for each group of statements."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="put the sums into the pages")
+    if parser.parse_args().write:
+        write()
     for kind in ("plain", "crossing", "histories"):
         n_sets, n_cases = size_of((kind,))
         print(f"{kind}: {n_sets} sealed sets, {n_cases} cases")

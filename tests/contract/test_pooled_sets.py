@@ -5,13 +5,21 @@ from itertools import dropwhile, pairwise, takewhile
 from pathlib import Path
 
 import pytest
-from benchmarks.pooled_sets import FIRST_RIGHT_DERIVATIVES, STATEMENTS, Sum, read_sets, size_of
+from benchmarks.pooled_sets import (
+    FIRST_RIGHT_DERIVATIVES,
+    FRACTION,
+    INTERVAL,
+    STATEMENTS,
+    Sum,
+    is_rounded,
+    read_sets,
+    size_of,
+    updated,
+)
 
 from turnout_blind.score.intervals import clopper_pearson
 
 ROOT = Path(__file__).parents[2]
-FRACTION = re.compile(r"(\d+) (?:of|in) (\d+(?:\.\d+)?)\b")
-INTERVAL = re.compile(r"(?:\b([\d.]+) )?\bto ([\d.]+) %")
 LINES = [(page, heading, beginning, sums) for page, heading, rows in STATEMENTS for beginning, sums in rows.items()]
 TABLES = [s for s in STATEMENTS if any(beginning.startswith("| ") for beginning in s[2])]
 # (file, beginning of a row in the section of a set, figure, which fraction of the row)
@@ -51,7 +59,8 @@ ROWS = [
 ]
 ORDINALS = (
     "seventh eighth ninth tenth eleventh twelfth thirteenth fourteenth fifteenth sixteenth seventeenth eighteenth "
-    "nineteenth twentieth twenty-first twenty-second twenty-third twenty-fourth twenty-fifth twenty-sixth"
+    "nineteenth twentieth twenty-first twenty-second twenty-third twenty-fourth twenty-fifth twenty-sixth "
+    "twenty-seventh"
 ).split()
 
 
@@ -62,13 +71,7 @@ def text_of(page):
 
 def fractions(line):
     """(number, number of all) of each "a of b" and "a in b"."""
-    return [(int(k), float(n)) for k, n in FRACTION.findall(line)]
-
-
-def is_rounded(stated, exact):
-    """Whether a number is the exact one, rounded to the stated decimals."""
-    decimals = len(stated.partition(".")[2])
-    return abs(float(stated) - exact) <= 0.5 * 10**-decimals + 1e-9
+    return [(int(k), float(n)) for k, _, n in FRACTION.findall(line)]
 
 
 def unexplained_intervals(line, sums):
@@ -174,3 +177,20 @@ def test_intervals_are_compared_at_their_stated_decimals_and_in_order():
     assert unexplained_intervals(f"a (to {high:.1f} %)", sums) == []
     assert unexplained_intervals(f"a ({low + 0.1:.1f} to {high:.1f} %)", sums) == [(f"{low + 0.1:.1f}", f"{high:.1f}")]
     assert unexplained_intervals(f"b {second}, a {first}", sums) == [(f"{low:.1f}", f"{high:.1f}")]
+
+
+def test_a_statement_of_other_sets_is_updated_and_one_of_these_sets_stays():
+    sums = (Sum("alarms", ("plain",)), Sum("change_alarms", ("histories",)))
+    before = [(2, 100), (3, 50.0)]
+    (low, high), (rate_low, rate_high) = (s.interval(c) for s, c in zip(sums, before))
+    old = (
+        f"| **2 of 100** ({low:.1f} to {high:.1f} %); 4 names | "
+        f"3 in 50 site-years ({rate_low:.2f} to {rate_high:.0f} % a year) |"
+    )
+    (k, n), (events, years) = (s.counts() for s in sums)
+    (low, high), (rate_low, rate_high) = (s.interval() for s in sums)
+    new = (
+        f"| **{k} of {n:.0f}** ({low:.1f} to {high:.1f} %); 4 names | "
+        f"{events} in {years:.0f} site-years ({rate_low:.2f} to {rate_high:.0f} % a year) |"
+    )
+    assert updated(old, sums) == new == updated(new, sums)
