@@ -239,13 +239,13 @@ def lone_outliers(values: np.ndarray, epoch: np.ndarray | int = 0) -> np.ndarray
     ----------
     values : (n,) or (n_chart, n) array of float
         Values in order of time, nan where there is none.
-    epoch : array of int
-        Number of the epoch of each value, of the shape of ``values``; 0: all are in one.
+    epoch : (n_chart, n) array of int
+        Number of the epoch of each value; 0: all are in one.
 
     Returns
     -------
-    array of bool
-        Of the shape of ``values``. True for a value that stands alone; none with fewer than ``MIN_STEPS`` steps.
+    (n,) or (n_chart, n) array of bool
+        True for a value that stands alone; none with fewer than ``MIN_STEPS`` steps.
 
     Examples
     --------
