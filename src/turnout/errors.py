@@ -91,7 +91,8 @@ class PartlyComputed(Exception):
 class ConfigError(TurnoutError):
     """A configuration file contains something that cannot be used.
 
-    ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead.
+    ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead. ``turnout`` is the id in the row
+    of a table that has the error, "" where that row has no valid one; None for an error that is in no row.
 
     Parameters
     ----------
@@ -104,6 +105,8 @@ class ConfigError(TurnoutError):
     remedy : str
         What to write instead: a sentence without its full stop.
     """
+
+    turnout: str | None = None
 
     def __init__(self, path: PathLike | str, place: str, problem: str, remedy: str):
         super().__init__(f"{path}, {place}: {problem}. {remedy}.")

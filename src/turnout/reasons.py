@@ -18,6 +18,7 @@ REASONS = {
     "name_unknown": "the file's name follows no pattern of the layout",
     "nothing_found": "no file of the turnout matches a pattern of the layout",
     "not_counted": "a row of events.csv or acknowledgements.csv that cannot be right",
+    "configuration_error": "an error in its configuration: the turnout is left out until it is corrected",
     "outside_root": "the path leads outside the raw root",
     "wrong_rate": "the sampling rate is not the configured one",
     "channel_missing": "a configured channel is not in the file",

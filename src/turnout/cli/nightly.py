@@ -78,7 +78,9 @@ def run(args: argparse.Namespace) -> int:
     add_result(args, asdict(night))
     add_use(args, n_used=0 if night.nothing_usable else 1, n_left_out=len(night.unused))
     print(night)
-    return night.code or (_alert(args.options) if night.published else 0)
+    has_ended_well = not night.code or (night.left_out and not night.reason)
+    not_sent = _alert(args.options) if has_ended_well and night.published else 0
+    return night.code or not_sent
 
 
 def _configuration_folder(options: Sequence[str]) -> str:
@@ -140,7 +142,7 @@ def _alert(options: Sequence[str]) -> int:
     from turnout.workflow.alerts import has_channel, send_alerts, worklist_entries
     from turnout.workflow.nightly import GENERATION
 
-    settings = load_configuration(_configuration_folder(options)).settings["alerts"]
+    settings = load_configuration(_configuration_folder(options), leave_out=True).settings["alerts"]
     if not has_channel(settings):
         return 0
     try:

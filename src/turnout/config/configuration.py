@@ -21,7 +21,8 @@ class Configuration:
     """Configuration of the fleet: common ``settings``, ``rows`` of turnouts by id, ``events`` in order of time.
 
     ``acknowledgements`` are rows of the table of that name. ``warnings`` are its invalid rows and events of unknown
-    turnouts. They are no errors: one wrong row must not hide the alarms of other turnouts.
+    turnouts. They are no errors: one wrong row must not hide the alarms of other turnouts. ``faulty`` are the errors of
+    the turnouts that were left out for them, by id; those of rows without a valid id are under "".
     """
 
     folder: Path
@@ -31,6 +32,7 @@ class Configuration:
     variants: Mapping[str, Variant] = field(repr=False)
     acknowledgements: tuple[dict, ...] = ()
     warnings: tuple[ConfigError, ...] = ()
+    faulty: Mapping[str, tuple[ConfigError, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         layouts = sorted({row.values["layout"] for row in self.rows.values()})
@@ -42,6 +44,26 @@ class Configuration:
     def ids(self) -> tuple[str, ...]:
         """Ids of all turnouts, in the order of turnouts.tsv."""
         return tuple(self.rows)
+
+    @property
+    def errors(self) -> tuple[ConfigError, ...]:
+        """The errors for which turnouts were left out, each once."""
+        return tuple({str(error): error for errors in self.faulty.values() for error in errors}.values())
+
+    def is_left_out(self, turnout: str) -> bool:
+        """Whether nothing of a turnout may be changed, because its configuration has an error.
+
+        Parameters
+        ----------
+        turnout : str
+            Id of a turnout that was known before.
+
+        Returns
+        -------
+        bool
+            True also for one without a row if a row has no valid id, because it may be that row.
+        """
+        return turnout in self.faulty or ("" in self.faulty and turnout not in self.rows)
 
     def hash_of(self, turnout: str, unit_kind: str = "") -> str:
         """Hash of the configuration of one turnout.
@@ -76,8 +98,10 @@ class Configuration:
         Raises
         ------
         ConfigError
-            For an unknown id.
+            For an unknown id, or one that was left out for an error.
         """
+        if turnout in self.faulty:
+            raise self.faulty[turnout][0]
         if turnout not in self.rows:
             place = Place(str(self.folder / "turnouts.tsv"), 1, 1)
             raise place.error(f"no turnout {turnout!r}", suggestion(turnout, self.rows, NO_TURNOUT))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -93,14 +93,17 @@ def read_events(
     first_rows: dict[tuple, tuple[int, Event]] = {}
     for line, cells in table.rows:
         problems = list(_row_problems(cells))
+        n_before = len(errors)
         errors += [cells.place(name, line, column).error(*problem) for column, *problem in problems]
         if problems:
+            _note_turnout(cells, errors[n_before:])
             continue
         event = event_of(cells)
         first_line, first = first_rows.setdefault(event.work, (line, event))
         if first is not event:
             faults = warnings if first.resets == event.resets else errors
             faults.append(cells.place(name, line, "resets").error(*_repetition(first_line, first, event)))
+            _note_turnout(cells, errors[n_before:])
             continue
         events.append(event)
         unknown_turnouts = turnout_problems(cells, turnout_ids, variants)
@@ -108,6 +111,12 @@ def read_events(
         if problem := date_problem(event):
             warnings.append(cells.place(name, line, "date").error(*problem))
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
+
+
+def _note_turnout(cells: Mapping[str, str], errors: Iterable[ConfigError]) -> None:
+    """Note in the errors of a row which turnout it is about."""
+    for error in errors:
+        error.turnout = cells["turnout"]
 
 
 def date_problem(event: Event) -> tuple[str, str] | None:

@@ -1,7 +1,7 @@
 """Reading and checking of the whole configuration of a fleet."""
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 from turnout.config import merge
@@ -28,6 +28,7 @@ def load_configuration(
     formats: Collection[str] | None = None,
     to_si: ToSi | None = None,
     tables: Mapping[str, Path] | None = None,
+    leave_out: bool = False,
 ) -> Configuration:
     """Read and check config.yaml, turnouts.tsv, layouts/, overrides/, events.csv and acknowledgements.csv.
 
@@ -41,6 +42,9 @@ def load_configuration(
         Converts units, as ``turnout.units.to_si``; None: units of channels are not checked.
     tables : mapping of str to Path or None
         Name of a table -> file that is read in its place; errors name the table. None: those of the folder.
+    leave_out : bool
+        Leave out the turnouts with an error in their row, layout, override or events, as the nightly run does for the
+        others' sake. ``faulty`` has their errors.
 
     Returns
     -------
@@ -50,7 +54,8 @@ def load_configuration(
     Raises
     ------
     ConfigErrors
-        With all errors: file, line, column, problem, remedy.
+        With all errors: file, line, column, problem, remedy. With ``leave_out`` only if one concerns the whole fleet,
+        or if no turnout is left.
     """
     if Path(folder).is_file():
         remedy = "Name the folder of the configuration, 'config' in a project"
@@ -64,24 +69,28 @@ def load_configuration(
     reading.errors += check_ranges(settings)
     rows, errors = read_table(paths["turnouts.tsv"], reading.name("turnouts.tsv"))
     reading.errors += errors
+    reading.note_rows(errors)
     turnout_ids = None if errors else {row.id for row in rows}
     variants = reading.variants(rows, settings, are_all_rows_valid=not errors)
     events, errors, event_warnings = read_events(paths["events.csv"], reading.name("events.csv"), turnout_ids, variants)
     reading.errors += errors
-    if reading.errors:
+    reading.note_rows(errors)
+    if reading.errors and not (leave_out and reading.can_leave_out(rows)):
         raise ConfigErrors(list({str(e): e for e in reading.errors}.values()))
+    faulty = reading.faulty
     name = "acknowledgements.csv"
     acknowledgements, warnings = read_acknowledgements(paths[name], reading.name(name), turnout_ids, variants)
-    by_id = {row.id: row for row in rows}
+    by_id = {row.id: row for row in rows if row.id not in faulty}
     base = merge.settings(plain_values(settings))
     return Configuration(
         reading.folder,
         base,
         Frozen(by_id),
         tuple(events),
-        Frozen(variants),
+        Frozen({turnout: variant for turnout, variant in variants.items() if turnout not in faulty}),
         tuple(acknowledgements),
-        (*event_warnings, *warnings),
+        (*event_warnings, *warnings, *reading.unused),
+        Frozen({turnout: tuple(errors) for turnout, errors in faulty.items()}),
     )
 
 
@@ -157,12 +166,41 @@ class _ConfigurationReader:
     def __init__(self, folder: Path, formats: Collection[str] | None, to_si: ToSi | None) -> None:
         self.folder, self.formats, self.to_si = folder, formats, to_si
         self.errors: list[ConfigError] = []
+        self.faulty: dict[str, list[ConfigError]] = {}  # by turnout; of rows without a valid id under ""
+        self.unused: list[ConfigError] = []  # of files that no turnout uses
         self.layouts: dict[str, Branch | None] = {}
+        self.layout_errors: dict[str, list[ConfigError]] = {}
         self.shared: dict[tuple, Variant] = {}
+        self.shared_errors: dict[tuple, list[ConfigError]] = {}
 
     def name(self, *parts: str) -> str:
         """Name of a file in errors: its path below the configuration folder, with the name of that folder in front."""
         return "/".join((self.folder.name, *parts))
+
+    def note_rows(self, errors: Iterable[ConfigError]) -> None:
+        """Note which turnouts the errors in rows of a table concern."""
+        for error in errors:
+            if error.turnout is not None:
+                self.faulty.setdefault(error.turnout, []).append(error)
+
+    def can_leave_out(self, rows: Iterable[Row]) -> bool:
+        """Whether every error concerns single turnouts or unused files, and any turnout is left."""
+        noted = {id(error) for errors in (self.unused, *self.faulty.values()) for error in errors}
+        has_rest = any(row.id not in self.faulty for row in rows)
+        return has_rest and all(id(error) in noted for error in self.errors)
+
+    def note_misnamed(self, rows: Iterable[Row]) -> None:
+        """Note which turnouts the errors in the names of layouts and overrides concern; those of others are unused."""
+        for error in self.errors:
+            path = Path(error.path)
+            if path.parent.name not in ("layouts", "overrides") or not path.parent.parent.name == self.folder.name:
+                continue
+            names = {row.id: row.id if path.parent.name == "overrides" else row.values["layout"] for row in rows}
+            concerned = [turnout for turnout, name in names.items() if file_key(name) == file_key(path.stem)]
+            for turnout in concerned:
+                self.faulty.setdefault(turnout, []).append(error)
+            if not concerned:
+                self.unused.append(error)
 
     def check_extensions(self) -> None:
         """Add an error for every YAML file that is not read for its name, or that is another one elsewhere."""
@@ -199,7 +237,9 @@ class _ConfigurationReader:
         name = row.values["layout"]
         path = self.folder / "layouts" / f"{name}.yaml"
         if name not in self.layouts:
+            before = len(self.errors)
             self.layouts[name] = self.layout_of(path, settings) if os.path.lexists(path) else None
+            self.layout_errors[name] = self.errors[before:]
         if self.layouts[name] is None and not os.path.lexists(path):
             self._add_unknown_layout(name, row)
         return self.layouts[name]
@@ -237,24 +277,30 @@ class _ConfigurationReader:
         """
         overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
         merged = {}
+        self.note_misnamed(rows)
         for row in rows:
+            before = len(self.errors)
             layout = self.layout(row, settings)
             override = overrides.pop(row.id, None)
             if layout is not None:
                 merged[row.id] = self._variant(row, layout, override)
+            shared = [*self.layout_errors[row.values["layout"]], *self.shared_errors.get(_variant_key(row), ())]
+            if errors := [*self.errors[before:], *shared]:
+                self.faulty.setdefault(row.id, []).extend(errors)
         for stem, path in overrides.items() if are_all_rows_valid else ():
             place = Place(self.name("overrides", path.name), 1, 1)
             remedy = suggestion(stem, [row.id for row in rows], NO_TURNOUT)
-            self.errors.append(place.error(f"an override without a turnout {stem!r}", remedy))
+            self.unused.append(place.error(f"an override without a turnout {stem!r}", remedy))
+            self.errors.append(self.unused[-1])
         return merged
 
     def _variant(self, row: Row, layout: Branch, override: Path | None) -> Variant:
-        key = (row.values["layout"], *(row.values.get(c) for c in (*ROW_KEYS, *SECTION_ROW_KEYS)))
+        key = _variant_key(row)
         if key not in self.shared:
-            tree = with_row(layout, row)
+            tree, start = with_row(layout, row), len(self.errors)
             if tree is not layout:
                 self._has_errors(tree)
-            self.shared[key] = Variant(tree)
+            self.shared[key], self.shared_errors[key] = Variant(tree), self.errors[start:]
         if override is None:
             return self.shared[key]
         tree = merge_branches(self.shared[key].tree, self.document(override, layout_keys()))
@@ -263,3 +309,8 @@ class _ConfigurationReader:
         if len(self.errors) == before:
             self._has_errors(tree)
         return Variant(tree)
+
+
+def _variant_key(row: Row) -> tuple:
+    """The layout and the technical columns of a row: rows with the same share one merged configuration."""
+    return (row.values["layout"], *(row.values.get(c) for c in (*ROW_KEYS, *SECTION_ROW_KEYS)))

@@ -1,7 +1,8 @@
 """Reader of config/turnouts.tsv: one row per turnout."""
 
 import os
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -108,9 +109,11 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     folders: dict[str, Row] = {}
     ids: dict[str, str] = {}
     for line, text in numbered[1:]:
+        n_before = len(errors)
         row, row_errors = _row(text, line, header, name)
         errors += row_errors
         if row_errors:
+            _note_turnout(row, row_errors)
             continue
         if row.id in line_of_id:
             remedy = f"Give it another id, or remove one of the lines {line_of_id[row.id]} and {line}"
@@ -127,7 +130,15 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
         else:
             line_of_id[row.id], folders[folder], ids[key] = line, row, row.id
             rows.append(row)
+        _note_turnout(row, errors[n_before:])
     return rows, errors
+
+
+def _note_turnout(row: Row, errors: Iterable[ConfigError]) -> None:
+    """Note in the errors of a row which turnout it is about."""
+    turnout = str(row.values.get("turnout", ""))
+    for error in errors:
+        error.turnout = turnout if re.fullmatch(ID, turnout) else ""
 
 
 def titles_of(line: str) -> tuple[str, ...]:

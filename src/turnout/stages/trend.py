@@ -5,9 +5,9 @@ import logging
 from pathlib import Path
 from typing import Any
 
-from turnout.config import load_configuration
 from turnout.files import read_json, write_text
 from turnout.trend.update import update
+from turnout.workflow.launch import usable_configuration
 
 
 def trend_job(
@@ -34,7 +34,7 @@ def trend_job(
     """
     registry, state = Path(generation).parent, Path(state)
     old_state = read_json(state, {})
-    loaded = load_configuration(configuration)
+    loaded = usable_configuration(configuration)
     warnings = [str(warning) for warning in loaded.warnings]
     for warning in warnings:
         logging.getLogger("turnout.trend").warning("%s", warning)

@@ -1,12 +1,33 @@
 """Make registry rows of the configuration: turnouts, sections, events, campaigns, and excluded files."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from turnout.config import Configuration, Event, Section, TurnoutConfig, with_raw
+from turnout.errors import ConfigError
+from turnout.registry.database import open_registry
+from turnout.registry.generation import GENERATION_FILE
 from turnout.registry.ids import content_id
 from turnout.workflow.plan import read_plan, read_problems
+
+FAULTY = "configuration_error"  # reason of the turnouts that are left out
+# Tables that are replaced as a whole, with the columns that the configuration fills; the first is the key.
+KEPT_COLUMNS = {
+    "turnouts": (
+        "turnout_id", "name", "line", "km", "layout", "lat_deg", "lon_deg", "external_id", "id_scheme", "config_hash",
+    ),
+    "sections": (
+        "section_id", "turnout_id", "label", "panel", "track", "position_m", "pad_type", "sleeper_type",
+    ),
+    "events": (
+        "event_id", "turnout_id", "section_id", "event_at_utc", "kind", "resets_ballast", "resets_railpad", "note",
+    ),
+    "campaigns": (
+        "campaign_id", "turnout_id", "started_at_utc", "hammer_id", "tip", "operator", "rail_temperature_c",
+    ),
+}  # fmt: skip
 
 
 def configuration_rows(configuration: Configuration, raw_root: Path, plans: Iterable[Path]) -> dict[str, list[dict]]:
@@ -132,19 +153,66 @@ def _uncounted_rows(configuration: Configuration) -> list[dict]:
     """
     unknown = {event.turnout for event in configuration.events} - set(configuration.ids)
     return [
-        {
-            "quarantine_id": content_id("quarantine", str(warning), "configuration"),
-            "turnout_id": next((t for t in sorted(unknown) if f"turnout {t!r} has" in warning.problem), None),
-            "kind": "configuration",
-            "path": warning.path,
-            "stage": "plan",
-            "reason_code": "not_counted",
-            "place": warning.place,
-            "found": warning.problem,
-            "remedy": warning.remedy,
-        }
+        _error_row(warning, next((t for t in sorted(unknown) if f"turnout {t!r} has" in warning.problem), None))
         for warning in configuration.warnings
     ]
+
+
+def _error_row(error: ConfigError, turnout: str | None, reason: str = "not_counted") -> dict:
+    """Quarantine row of an error in the configuration."""
+    return {
+        "quarantine_id": content_id(
+            "quarantine", str(error), "configuration", *([turnout] if reason == FAULTY else [])
+        ),
+        "turnout_id": turnout,
+        "kind": "configuration",
+        "path": error.path,
+        "stage": "plan",
+        "reason_code": reason,
+        "place": error.place,
+        "found": error.problem,
+        "remedy": error.remedy,
+    }
+
+
+def keep_rows(tables: dict[str, list[dict]], configuration: Configuration, registry: Path) -> None:
+    """Add the rows of turnouts that are left out for an error: those of the registry stay as they are.
+
+    Their errors become rows of the quarantine, of the turnout where the registry knows it. If a row has no valid id,
+    all earlier events stay, too, because it may be one of them.
+
+    Parameters
+    ----------
+    tables : dict of str to list of dict
+        Rows of the configuration; they are changed.
+    configuration : Configuration
+        Configuration of the fleet.
+    registry : Path
+        Folder of the registry.
+    """
+    if not configuration.faulty:
+        return
+    known = {row["turnout_id"] for row in tables["turnouts"]}
+    if (registry / GENERATION_FILE).exists():
+        with open_registry(registry) as connection:
+            for name, columns in KEPT_COLUMNS.items():
+                in_use = "where panel is not null and not coalesce(left_layout, false)" if name == "sections" else ""
+                cursor = connection.execute(f"select {', '.join(columns)} from {name} {in_use}")
+                rows = [dict(zip(columns, row)) for row in cursor.fetchall()]
+                kept = [row for row in rows if _is_kept(row, name, configuration)]
+                new = {row[columns[0]] for row in tables[name]}
+                tables[name] += [row for row in kept if row[columns[0]] not in new]
+        known = {row["turnout_id"] for row in tables["turnouts"]}
+    tables["quarantine"] += [
+        _error_row(error, turnout if turnout in known else None, FAULTY)
+        for turnout, errors in configuration.faulty.items()
+        for error in {str(e): e for e in errors}.values()
+    ]
+
+
+def _is_kept(row: Mapping[str, Any], table: str, configuration: Configuration) -> bool:
+    """Whether a row of the registry stays although the configuration has none for it now."""
+    return configuration.is_left_out(row["turnout_id"]) or (table == "events" and "" in configuration.faulty)
 
 
 def fleet_hash(configuration: Configuration) -> str:
@@ -163,5 +231,5 @@ def fleet_hash(configuration: Configuration) -> str:
     hashes = [
         [t, configuration.hash_of(t), json.dumps(configuration.rows[t].values)] for t in sorted(configuration.ids)
     ]
-    warnings = map(str, configuration.warnings)
+    warnings = map(str, (*configuration.warnings, *configuration.errors))
     return content_id(hashes, [_event(e)["event_id"] for e in configuration.events], *warnings)

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from turnout import __version__
-from turnout.config import load_configuration
 from turnout.errors import TurnoutError
 from turnout.files import changed_at, write_text
 from turnout.workflow.batches import read_results
-from turnout.workflow.configuration_rows import configuration_rows
+from turnout.workflow.configuration_rows import configuration_rows, keep_rows
 from turnout.workflow.current_results import DamagedBatch
 from turnout.workflow.duplicate_files import files_at_two_turnouts, withdraw_moved
-from turnout.workflow.launch import launch_time
+from turnout.workflow.launch import launch_time, usable_configuration
 from turnout.workflow.quality_gate import QualityGate, check_quality
 from turnout.workflow.registry_damage import note_repair
 from turnout.workflow.retries import attempt, request_rerun
@@ -57,7 +56,7 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
     _log_to(log)
     stage = Stage(params.kind, params.function, params.algo, params.get("context"), params.get("gather"))
     job = params.job
-    configuration = load_configuration(job["configuration"])
+    configuration = usable_configuration(job["configuration"])
     try:
         summary = run_shard(
             Path(plan), state_of_mark(mark), stage, configuration, Path(job["raw"]),
@@ -99,7 +98,7 @@ def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: An
     states = [state_of_mark(mark) for mark in marks]
     try:
         with attempt("verdict", params.again):
-            gate = check_quality(states, load_configuration(params.job["configuration"]), Path(output))
+            gate = check_quality(states, usable_configuration(params.job["configuration"]), Path(output))
     except TurnoutError as error:
         _report(error)
         raise SystemExit(1) from None
@@ -128,10 +127,11 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
         job, stages, shards, configuration, again, damage.
     """
     _log_to(log)
-    configuration = load_configuration(params.job["configuration"])
+    configuration = usable_configuration(params.job["configuration"])
     plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
     states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
     tables = configuration_rows(configuration, Path(params.job["raw"]), plans)
+    keep_rows(tables, configuration, Path(generation).parent)
     with attempt("register", params.again):
         published = changed_at(Path(generation))
         withdraw_moved(Path("work"), params.stages, params.shards, configuration.settings["fleet"], published)

@@ -1,5 +1,6 @@
 """Prepare the workflow before its first job: options, shards, plan files."""
 
+import logging
 import shlex
 import sys
 from collections.abc import Collection, Mapping
@@ -115,7 +116,7 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     for name in options:
         if name not in OPTIONS:
             raise ConfigError("--config", "option", f"unknown option {name!r}", suggestion(name, OPTIONS))
-    configuration = load_configuration(options.get("configuration", "config"), formats, to_si)
+    configuration = load_configuration(options.get("configuration", "config"), formats, to_si, leave_out=True)
     turnouts = _turnouts(options.get("turnouts"), configuration)
     shards = _number(options.get("shards", configuration.settings["fleet"].shards))
     job: dict = {
@@ -125,6 +126,8 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
         "strict": _flag(options, "strict"),
     }
     if scan:
+        for error in configuration.errors:
+            logging.getLogger("turnout.workflow").warning("left out: %s", error)
         load(REGISTRY)  # before anything is computed for it: a list that cannot be read stops the run with its remedy
         _keep_other_runs_out()  # Snakemake's own lock comes too late: a rejected run would have replaced the plans
         started = datetime.now(UTC).replace(tzinfo=None)
@@ -144,6 +147,30 @@ def launch(options: Mapping, scan: bool, formats: Collection[str] | None = None,
     return Launch(
         names, shard_names(shards), turnouts, fleet_hash(configuration), job, diagnosis, functions, learned, day, alarms
     )
+
+
+def usable_configuration(folder: Path | str) -> Configuration:
+    """The configuration of a run in one of its jobs: without the turnouts that have an error in theirs.
+
+    Parameters
+    ----------
+    folder : Path or str
+        Folder of the configuration.
+
+    Returns
+    -------
+    Configuration
+        With the errors in ``faulty``, the same as in ``launch``.
+
+    Raises
+    ------
+    ConfigErrors
+        If an error concerns the whole fleet, or no turnout is left.
+    """
+    from turnout.readers.formats import FORMATS
+    from turnout.units import to_si
+
+    return load_configuration(folder, FORMATS, to_si, leave_out=True)
 
 
 def _keep_other_runs_out() -> None:

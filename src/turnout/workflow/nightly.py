@@ -22,11 +22,19 @@ from turnout.installation import shipped_path
 from turnout.workflow.output_places import require_writable_places
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
-from turnout.workflow.run_report import excluded_entries, failure_reason, rejected_units, unread_files, unused_turnouts
+from turnout.workflow.run_report import (
+    configuration_errors,
+    excluded_entries,
+    failure_reason,
+    rejected_units,
+    unread_files,
+    unused_turnouts,
+)
 from turnout.workflow.scan import unit_id
 from turnout.workflow.state import VANISHED, load_state, states_below
 
 JOB_NAMES = "turnouts"
+LEFT_OUT_CODE = 1  # exit code of a run that left turnouts out for an error in their configuration
 EXIT_TIME_LIMIT = 124  # exit code of a run ended by the time limit, as of timeout(1)
 SIGNAL_BASE = 128  # exit code of a process that a signal ended, less the number of the signal, as of a shell
 PUBLISHING_SHARE = 1 / 6  # share of the time limit reserved for publishing
@@ -45,7 +53,8 @@ class NightReport:
     ``vanished`` is the number of units gone since the last run. ``worst`` are the turnouts with most unused units, and
     their numbers. ``unused`` are the turnouts without any usable unit so far; ``nothing_usable`` is True if that holds
     for the whole fleet. ``excluded`` are files and rows in quarantine that belong to no unit. ``unread`` are files that
-    are there and could not be read; they leave the code as it is.
+    are there and could not be read; they leave the code as it is. ``left_out`` are errors of the configuration for
+    which turnouts were left out; the code is then at least 1.
     """
 
     code: int
@@ -61,16 +70,20 @@ class NightReport:
     excluded: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
     reason: str = ""
+    left_out: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         well = "ok"
-        if self.nothing_usable:
+        if self.left_out:
+            well = f"every job ran, but {count_of(len(self.left_out), 'error')} in the configuration left turnouts out"
+        elif self.nothing_usable:
             well = "every job ran, but nothing could be used"
         elif self.unread:
             well = f"every job ran, but {count_of(len(self.unread), 'file')} could not be read"
         outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
             self.code, f"failed with exit code {self.code}"
         )
+        outcome = well if self.left_out and self.code == LEFT_OUT_CODE and not self.reason else outcome
         return (
             f"{outcome}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, "
@@ -78,6 +91,7 @@ class NightReport:
             + f"{self.vanished} vanished"
             + (f"; nothing could be used yet of {first_texts(self.unused, MAX_TURNOUTS_SHOWN)}" if self.unused else "")
             + (f"; worst: {', '.join(f'{t} ({n})' for t, n in self.worst)}" if self.worst else "")
+            + (f"; left out: {first_texts(self.left_out, MAX_EXCLUDED_SHOWN)}" if self.left_out else "")
             + (f"; not read: {first_texts(self.unread, MAX_EXCLUDED_SHOWN)}" if self.unread else "")
             + (f"; in no unit: {first_texts(self.excluded, MAX_EXCLUDED_SHOWN)}" if self.excluded else "")
             + (f", see {QUERY_HINT}" if self.worst or self.unused or self.excluded or self.unread else "")
@@ -276,7 +290,10 @@ def _report(code: int, before: set, planned_before: set[str], reason: str, work:
     by_turnout = Counter(name.partition("/")[0] for name in {*quarantined, *tests})
     worst = sorted(by_turnout.items(), key=lambda item: (-item[1], item[0]))[:MAX_TURNOUTS_SHOWN]
     counts = len(units), len(processed), len(quarantined), len(missing & units)
+    left_out = tuple(configuration_errors(GENERATION.parent)) if published else ()
+    code = LEFT_OUT_CODE if code == 0 and left_out else code
     excluded, unread = tuple(excluded_entries(GENERATION.parent, unused)), tuple(unread_files(GENERATION.parent))
     return NightReport(
-        code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, excluded, unread, reason
-    )
+        code, *counts, published, len(tests), tuple(worst), tuple(unused), nothing_usable, excluded, unread, reason,
+        left_out,
+    )  # fmt: skip

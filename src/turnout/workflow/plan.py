@@ -9,6 +9,7 @@ import json
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 from turnout.config import Configuration, TurnoutConfig
@@ -258,7 +259,10 @@ def missing_files(
 def _scan_turnouts(
     configuration: Configuration, raw_root: Path, folder: Path, shards: int, turnouts: Iterable[str] | None
 ) -> tuple[dict[Path, str], MissingFiles]:
-    """New text of each plan, and the files of the existing plans that are missing now."""
+    """New text of each plan, and the files of the existing plans that are missing now.
+
+    The entry of a turnout that is left out for an error stays as it was: its results stay, and none is computed.
+    """
     for turnout in turnouts or ():
         configuration.turnout(turnout)
     requested = set(shard_names(shards, turnouts))
@@ -267,11 +271,13 @@ def _scan_turnouts(
     for turnout in sorted(configuration.ids):
         members.get(shard_of(turnout, shards), []).append(turnout)
     texts, missing, n_known = {}, [], 0
+    faulty, is_left_out = configuration.faulty, configuration.is_left_out
     for name in names:
         path = Path(folder) / f"{name}.json"
-        entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
-        texts[path] = _text(name, entries)
         before = path.read_text(encoding="utf-8") if path.exists() and not is_cut_plan(path) else ""
+        kept = [e for e in json.loads(before)["turnouts"] if is_left_out(e["turnout"])] if before and faulty else []
+        entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
+        texts[path] = _text(name, sorted(entries + kept, key=itemgetter("turnout")))
         if before and before != texts[path]:
             # files of a turnout that was removed or renamed in the configuration do not count as missing
             files = _paths(e for e in json.loads(before)["turnouts"] if e["turnout"] in configuration.rows)

@@ -83,15 +83,35 @@ select turnout_id, not exists (select 1 from used u where in_service(u.turnout_i
 from unusable() where used_at_utc is null and turnout_id not in (select turnout_id from used)
 group by turnout_id order by turnout_id"""
 
+LEFT_OUT_SQL = """
+select path || ', ' || place || ': ' || found from quarantine_open where reason_code = 'configuration_error'
+group by path, place, found order by path, place, found"""
+
 UNREAD_SQL = """
 select path || ': ' || found from quarantine_open where reason_code in ('no_access', 'read_fault') order by path"""
 
 # Entries of the raw root that belong to no unit: tables beside the recordings, which many recordings need, come first.
 EXCLUDED_SQL = """
 select path || coalesce(', ' || place, '') || ': ' || found from quarantine_open
-where kind = 'configuration' and reason_code <> 'no_access' and not is_remark
+where kind = 'configuration' and reason_code not in ('no_access', 'configuration_error') and not is_remark
     and not coalesce(list_contains(?, turnout_id), false)
 order by path not like '%.csv' or reason_code = 'name_unknown', path, place"""
+
+
+def configuration_errors(registry: Path) -> list[str]:
+    """Errors of the configuration for which turnouts were left out.
+
+    Parameters
+    ----------
+    registry : Path
+        Folder of the registry.
+
+    Returns
+    -------
+    list of str
+        File, place and what was found; none without a registry.
+    """
+    return [text for (text,) in _query(registry, LEFT_OUT_SQL, [])]
 
 
 def unread_files(registry: Path) -> list[str]:

@@ -109,6 +109,22 @@ def test_an_unreadable_table_is_reported_before_a_file_with_an_unknown_name(fold
     assert "nothing could be used yet of t2;" in line and "t2/campaigns.csv" not in line
 
 
+def test_a_night_that_left_turnouts_out_is_not_ok_and_its_exit_code_is_1(folder):
+    """Somebody has to correct the configuration; the results of the other turnouts may be trusted."""
+    error = excluded("t2", "x", "configuration_error", "line 3, column 5", "unknown key 'rat'")
+    error["path"] = "config/overrides/t2.yaml"
+    name = excluded("t1", "a.csv", "name_unknown", "file name", "its name follows no pattern of the layout")
+    registry(folder, (error, name), t1="accepted", t2="accepted")
+    known = dict.fromkeys(units("t1", "t2"), "ok")
+    (folder / "snakemake.py").write_text(STATE.format(known=known, plan=plan(*known), more=""))
+    night = nightly([], "profiles/default")
+    assert (night.code, night.reason, night.published) == (1, "", True)
+    assert str(night).startswith("every job ran, but 1 error in the configuration left turnouts out: 2 units known")
+    assert "; left out: config/overrides/t2.yaml, line 3, column 5: unknown key 'rat'; in no unit: t1/a.csv" in str(
+        night
+    )
+
+
 def damaged_disk(turnout, label, name):
     """A quarantine row of a file of a unit that the disk did not give in two runs."""
     row = excluded(turnout, name, "read_fault", "the file", "OSError: [Errno 5] Input/output error")
