@@ -10,7 +10,7 @@ if RUN.diagnose:
 MODELS = [
     p
     for kind in ("tracks", "vehicles")
-    for p in sorted(Path(RUN.job["configuration"]).glob(f"{kind}/*.yaml"))
+    for p in sorted(Path(RUN.job["configuration"]).glob(f"{kind}/[!.]*.yaml"))
 ]
 
 

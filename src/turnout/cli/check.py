@@ -139,7 +139,7 @@ def _unread_files(folder: Path) -> list[Path]:
     ]
     read_folders = (*YAML_FOLDERS, "schema", "passages")
     folders = [p for p in folder.iterdir() if p.is_dir() and p.name not in read_folders and not _is_hidden(p)]
-    return sorted(tables + strays + [p for p in folders if any(p.glob("*.yaml"))])
+    return sorted(tables + strays + [p for p in folders if any(p.glob("[!.]*.yaml"))])
 
 
 def _is_hidden(path: Path) -> bool:
@@ -152,8 +152,8 @@ def _unnamed_tracks(configuration: Configuration) -> Iterator[str]:
     from turnout.config.parameter_files import read_unchanged_parameters
     from turnout.errors import ConfigError
 
-    names = {*configuration.ids, *(path.stem for path in (configuration.folder / "layouts").glob("*.yaml"))}
-    paths = sorted((configuration.folder / "tracks").glob("*.yaml"))
+    names = {*configuration.ids, *(path.stem for path in (configuration.folder / "layouts").glob("[!.]*.yaml"))}
+    paths = sorted((configuration.folder / "tracks").glob("[!.]*.yaml"))
     for path in paths:
         with suppress(ConfigError):  # a fault of its own
             names.add(str(read_unchanged_parameters(path).get("extends")))
@@ -169,7 +169,7 @@ def _open_decisions(folder: Path) -> Iterator[str]:
     """Each line of a layout, used or not, that a person has yet to decide, as `turnout layout new` marks it."""
     from turnout.stages.layout_draft import decisions
 
-    for path in sorted(path for path in folder.glob("*.yaml") if path.is_file()):
+    for path in sorted(path for path in folder.glob("[!.]*.yaml") if path.is_file()):
         for decision in decisions(path.read_text(encoding="utf-8", errors="replace")):
             yield f"{path}, {decision}: still marked with DECIDE. Write the value, and remove the mark"
 

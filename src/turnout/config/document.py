@@ -39,6 +39,7 @@ YAML_PROBLEMS = {
         "Put a text with ': ' in quotes, and begin all lines of a block with the same number of blanks",
     ),
     "duplicate key": ("a name for the second time", "Keep one of them"),
+    "found unexpected end of stream": ("a quote that is not closed", "Close it, or leave it out"),
     "another document": ("a second document begins", "Remove the line '---', or keep one of the two"),
 }
 
@@ -82,10 +83,11 @@ def as_config_errors(path: Path | str, where: str, syntax_remedy: str = "") -> I
         if not syntax_remedy:
             raise
         mark = error.problem_mark or error.context_mark
-        if error.context == "while scanning a simple key":  # the problem is the key, not what follows it
-            mark = error.context_mark
-        place = str(Place(str(path), mark.line + 1, mark.column + 1)) if mark else where
         stated = str(error.problem)
+        # the problem is the key, or what was opened there, not what follows it
+        if error.context == "while scanning a simple key" or "end of stream" in stated or "<stream end>" in stated:
+            mark = error.context_mark or mark
+        place = str(Place(str(path), mark.line + 1, mark.column + 1)) if mark else where
         problem, remedy = next(
             (texts for part, texts in YAML_PROBLEMS.items() if part in stated),
             (stated.replace("'<stream end>'", "the end of the file"), syntax_remedy),
@@ -289,6 +291,8 @@ def load(path: Path, name: str | None = None) -> Branch:
     if node is None:
         return Branch(Place(name, 1, 1))
     tree = _tree(node, name, constructor)
+    if isinstance(tree, Leaf) and tree.value is None and not tree.text:
+        return Branch(Place(name, 1, 1))
     if not isinstance(tree, Branch):
         what = "a list" if isinstance(tree.value, tuple) else repr(tree.value)
         raise tree.place.error(f"{what} where names with values are expected", "Write 'name: value' lines")
@@ -382,6 +386,15 @@ def _tree(node: AnyNode, path: str, constructor: BaseConstructor, ancestors: tup
         branch = Branch(place)
         for key, value in node.value:
             key_place = place_of_node(key, path)
+            if key.id != "scalar":
+                raise key_place.error(
+                    f"a {'list' if key.id == 'sequence' else key.id} in place of a name",
+                    "Write 'name: value', without '?' and brackets",
+                )
+            if key.value == "<<":
+                raise key_place.error(
+                    "the merge key '<<', which is not read", "Write out the values that it stands for"
+                )
             name = _compose_letters(key.value)
             if name in branch:
                 first = branch.key_places[name].line

@@ -3,6 +3,7 @@
 import re
 import unicodedata
 
+YAML_FILES = "[!.]*.yaml"  # a glob; hidden files are locks and copies of editors, or of the system
 RESERVED = re.compile(r"(?:con|prn|aux|nul|(?:com|lpt)[1-9¹²³])(?:\..*)?", re.IGNORECASE)
 UNUSABLE = re.compile(r'[\x00-\x1f<>:"|?*\\]')
 PORTABLE = "Results could not be copied to a computer with Windows. Choose another name"

@@ -10,7 +10,7 @@ from turnout.config.configuration import Configuration
 from turnout.config.consistency import ToSi, check_consistency
 from turnout.config.document import Branch, Place, load, merge_branches, plain_values
 from turnout.config.events import read_events
-from turnout.config.file_names import file_key
+from turnout.config.file_names import YAML_FILES, file_key
 from turnout.config.frozen_mapping import Frozen
 from turnout.config.layout_schema import layout_keys
 from turnout.config.merge import ROW_KEYS, SECTION_ROW_KEYS, Variant, with_row
@@ -154,7 +154,7 @@ def errors_of_unused_layouts(
     reading = _ConfigurationReader(configuration.folder, formats, to_si)
     settings = reading.document(reading.folder / "config.yaml", settings_keys())
     used = {row.values["layout"] for row in configuration.rows.values()}
-    for path in sorted((reading.folder / "layouts").glob("*.yaml")):
+    for path in sorted((reading.folder / "layouts").glob(YAML_FILES)):
         if path.stem not in used:
             reading.layout_of(path, settings)
     return reading.errors
@@ -206,7 +206,7 @@ class _ConfigurationReader:
         """Add an error for every YAML file that is not read for its name, or that is another one elsewhere."""
         for parts in ((), ("layouts",), ("overrides",), ("tracks",), ("vehicles",)):
             names: dict[str, str] = {}
-            for path in sorted(self.folder.joinpath(*parts).glob("*")):
+            for path in sorted(self.folder.joinpath(*parts).glob("[!.]*")):
                 if path.suffix.lower() in (".yml", ".yaml") and path.suffix != ".yaml":
                     place = Place(self.name(*parts, path.name), 1, 1)
                     remedy = f"Rename it to {path.stem}.yaml, or remove it"
@@ -256,7 +256,7 @@ class _ConfigurationReader:
 
     def _add_unknown_layout(self, name: str, row: Row) -> None:
         nothing_to_choose = f"There are no layouts yet: write layouts/{name}.yaml"
-        names = [p.stem for p in (self.folder / "layouts").glob("*.yaml")]
+        names = [p.stem for p in (self.folder / "layouts").glob(YAML_FILES)]
         self.errors.append(row.place("layout").error(f"no layout {name!r}", suggestion(name, names, nothing_to_choose)))
 
     def _has_errors(self, tree: Branch) -> bool:
@@ -275,7 +275,7 @@ class _ConfigurationReader:
 
         An override of a turnout that is not in ``rows`` is an error, unless it may be that of a row with an error.
         """
-        overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob("*.yaml"))}
+        overrides = {p.stem: p for p in sorted((self.folder / "overrides").glob(YAML_FILES))}
         merged = {}
         self.note_misnamed(rows)
         for row in rows:

@@ -1,7 +1,8 @@
 """Types of configuration keys, and the check of a tree of YAML against them."""
 
+import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any
@@ -87,13 +88,31 @@ Rule = Key | NamedEntries | Group | FleetWideKey
 
 
 # Keys that were renamed, with their present name.
+MAX_PLACES = 3  # of a misplaced key that a message names
+MISSPELT = 0.8  # likeness from which an unknown key is taken for a misspelt one, not for one of another place
 FORMER_KEYS = {"softest_blow": "minimum_peak_force", "weakest_blow": "minimum_peak_share"}
 
 
-def _remedy_of_unknown_key(name: str, allowed: Collection[str]) -> str:
-    """The present name of a key that was renamed, else the most similar one."""
+def _remedy_of_unknown_key(name: str, allowed: Collection[str], root: Mapping[str, Rule]) -> str:
+    """The present name of a renamed key, the place of one that belongs elsewhere, else the most similar name."""
     present = FORMER_KEYS.get(name, "")
-    return f"It is called {present!r} now" if present in allowed else suggestion(name, allowed)
+    if present in allowed:
+        return f"It is called {present!r} now"
+    places = list(_places_of(name, root))
+    if places and not get_close_matches(_letters(name), map(_letters, allowed), cutoff=MISSPELT):
+        return f"It belongs below {' or '.join(map(repr, places[:MAX_PLACES]))}: move it there"
+    return suggestion(name, allowed)
+
+
+def _places_of(name: str, spec: Mapping[str, Rule], path: str = "") -> Iterator[str]:
+    """Where a schema has a name: the names above it, with points between them."""
+    for above, rule in spec.items():
+        below = f"{path}{above}"
+        if isinstance(rule, Group | NamedEntries):
+            inner = below if isinstance(rule, Group) else f"{below}.NAME"
+            if name in rule.spec and not isinstance(rule.spec[name], FleetWideKey):
+                yield inner
+            yield from _places_of(name, rule.spec, f"{inner}.")
 
 
 def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to choose from") -> str:
@@ -117,13 +136,21 @@ def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to 
     --------
     >>> suggestion("posiiton", ["position", "panel"])
     "Did you mean 'position'? Allowed: panel, position"
+    >>> suggestion("cp", ["CLP", "CP"])
+    "Did you mean 'CP'? Allowed: CLP, CP"
     """
     allowed = sorted(map(str, allowed))
     if not allowed:
         return none
-    close = get_close_matches(name, allowed, n=1, cutoff=0.6)
+    by_letters = {_letters(other): other for other in allowed}
+    close = [by_letters[letters] for letters in get_close_matches(_letters(name), by_letters, n=1, cutoff=0.6)]
     listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/settings.md"
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"
+
+
+def _letters(name: str) -> str:
+    """A name without what is easily written otherwise: capitals, and a dash or a blank for an underscore."""
+    return name.casefold().replace("-", "_").replace(" ", "_")
 
 
 def quotation(value: Any) -> str:
@@ -145,6 +172,12 @@ def quotation(value: Any) -> str:
     ("'20 kHz'", '0 ...')
     """
     text = repr(value)
+    if value is None:
+        text = "empty"
+    elif isinstance(value, tuple):
+        text = f"[{', '.join(map(repr, value))}]"
+    elif isinstance(value, bool):
+        text = str(value).lower()
     return text if len(text) <= MAX_QUOTED else text[:MAX_QUOTED] + " ..."
 
 
@@ -180,7 +213,9 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         single = Key(**{**key.__dict__, "many": False})
         return next((p for v in value if (p := value_problem(single, v))), None)
     if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
-        hint = decimal_point_hint(value) if key.value_type == "number" and isinstance(value, str) else ""
+        hint = ""
+        if key.value_type in ("number", "integer") and isinstance(value, str):
+            hint = decimal_point_hint(value) or _hint_without_unit(key, value)
         return quotation(value), f"Write {_expected_text(key)}{hint}"
     if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
         return quotation(value), f"Write {_expected_text(key)}"
@@ -201,6 +236,7 @@ CONTROL_CHARACTER = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # of no text; pages
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,(?!\d{3}$)\d+")  # three digits may be a mark for thousands
 PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
 PREFIXES = (("m", 1e-3), ("k", 1e3))
+NUMBER_WITH_UNIT = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)\s*([^\s\d.,]\S*)", re.ASCII)
 LARGEST_NUMBER = 1e300  # beyond it a whole number is no floating-point number
 MAX_QUOTED = 60  # characters of a wrong value that a message quotes
 
@@ -231,6 +267,18 @@ def decimal_point_hint(text: str) -> str:
     (', with a decimal point: 13.1', '', '')
     """
     return f", with a decimal point: {text.strip().replace(',', '.')}" if DECIMAL_COMMA.fullmatch(text.strip()) else ""
+
+
+def _hint_without_unit(key: Key, text: str) -> str:
+    """How a number with its unit behind it has to be written, "" for another text."""
+    match = NUMBER_WITH_UNIT.fullmatch(text.strip())
+    if not match:
+        return ""
+    if match[2] == key.unit:
+        return f", without the unit: {match[1]}"
+    factors = {"%": 0.01} if key.unit in ("", None, "-", "1") else {prefix + key.unit: f for prefix, f in PREFIXES}
+    value = float(match[1]) * factors.get(match[2], math.nan)
+    return f", without the unit: {value:.9g}" if _is_in_range(key, value) and value == value else ""
 
 
 def _hint_at_other_unit(key: Key, value: float) -> str:
@@ -336,7 +384,9 @@ def _mapping_below(tree: Branch, name: str) -> Branch | None:
     return tree[name] if isinstance(tree[name], Branch) else None
 
 
-def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]:
+def check(
+    spec: dict, tree: Branch, whole: bool = True, root: Mapping[str, Rule] | None = None
+) -> Iterator[ConfigError]:
     """Compare a tree with its schema.
 
     Parameters
@@ -347,6 +397,8 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         Tree of a file, or of merged files.
     whole : bool
         Whether required names must be there.
+    root : mapping of str to Rule, optional
+        Schema of the whole file, in which a misplaced name is searched; by default ``spec``.
 
     Yields
     ------
@@ -354,13 +406,14 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         Every error, at the name or value to correct.
     """
     misspelt: set[str] = set()
+    root = spec if root is None else root
     for name, value in tree.items():
         rule = spec.get(name)
         if rule is None:
             present = FORMER_KEYS.get(name, "")
             misspelt.update([present] if present in spec else get_close_matches(name, spec, n=1))
             allowed = [allowed_name for allowed_name, rule in spec.items() if not isinstance(rule, FleetWideKey)]
-            remedy = DECIMAL_POINT if name.isdecimal() else _remedy_of_unknown_key(name, allowed)
+            remedy = DECIMAL_POINT if name.isdecimal() else _remedy_of_unknown_key(name, allowed, root)
             yield tree.key_places[name].error(f"unknown key {name!r}", remedy)
         elif isinstance(rule, FleetWideKey):
             message = f"{name!r} holds for the whole fleet and would be ignored here"
@@ -373,16 +426,18 @@ def check(spec: dict, tree: Branch, whole: bool = True) -> Iterator[ConfigError]
         elif isinstance(value, Leaf):
             yield value.place.error(f"{name} is {quotation(value.value)}", "Write 'name: value' lines below it")
         elif isinstance(rule, Group):
-            yield from check(rule.spec, value, whole and not rule.fragment)
+            yield from check(rule.spec, value, whole and not rule.fragment, root)
         else:
-            yield from _check_each(rule, name, value, whole)
+            yield from _check_each(rule, name, value, whole, root)
     if whole:
         for name, rule in spec.items():
             if rule.required and name not in tree and name not in misspelt:
                 yield tree.place.error(f"{name!r} is missing", f"Add '{name}:', {rule.meaning}")
 
 
-def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Iterator[ConfigError]:
+def _check_each(
+    rule: NamedEntries, name: str, tree: Branch, whole: bool, root: Mapping[str, Rule]
+) -> Iterator[ConfigError]:
     for label, value in tree.items():
         if not re.fullmatch(rule.pattern, label):
             remedy = f"Write a name of {PATTERN_TEXTS[rule.pattern]}"
@@ -390,7 +445,7 @@ def _check_each(rule: NamedEntries, name: str, tree: Branch, whole: bool) -> Ite
         elif isinstance(value, Leaf):
             yield value.place.error(f"{label} is {quotation(value.value)}", "Write 'name: value' lines below it")
         else:
-            yield from check(rule.spec, value, whole)
+            yield from check(rule.spec, value, whole, root)
     if whole and not tree:
         yield tree.place.error(f"{name!r} is empty", f"Add at least one, {rule.meaning}")
 

@@ -197,7 +197,7 @@ def _find_file(name: str | Path, folder: str | Path | None, subfolder: str) -> P
     for candidate in folders:
         if (candidate / f"{name}.yaml").is_file():
             return candidate / f"{name}.yaml"
-    available = sorted({p.stem for f in folders if f.is_dir() for p in f.glob("*.yaml")} - {"axle_patterns"})
+    available = sorted({p.stem for f in folders if f.is_dir() for p in f.glob("[!.]*.yaml")} - {"axle_patterns"})
     raise SimulationError(f"no file config/{subfolder}/{name}.yaml. Write one of {', '.join(available) or 'none'}.")
 
 

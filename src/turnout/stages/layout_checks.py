@@ -68,7 +68,7 @@ def faults_of_tracks(configuration: Configuration) -> Iterator[str]:
         One fault, as a sentence.
     """
     tracks = {}
-    for path in sorted((configuration.folder / "tracks").glob("*.yaml")):
+    for path in sorted((configuration.folder / "tracks").glob("[!.]*.yaml")):
         try:
             tracks[path] = load_track(str(path), folder=path.parent)
             yield from improbable_in_files([path])
@@ -108,7 +108,7 @@ def faults_of_vehicles(configuration: Configuration) -> Iterator[str]:
     """
     from turnout.stages.passage_context import known_patterns  # it loads parts of scipy
 
-    for path in sorted((configuration.folder / "vehicles").glob("*.yaml")):
+    for path in sorted((configuration.folder / "vehicles").glob("[!.]*.yaml")):
         try:
             if path.name == Path(PassageSettings().axle_patterns).name:
                 known_patterns(str(path))

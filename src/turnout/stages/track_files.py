@@ -96,8 +96,8 @@ def digest_of_model(turnout: TurnoutConfig, name: str | None = None) -> str:
     except SimulationError:
         return ""
     paths = [*files_of_track(own_file), *sorted((folder / "tracks").glob(f"{turnout.layout}.yaml"))]
-    paths += sorted((folder / "vehicles").glob("*"))
-    paths += sorted(own_file.parent.glob("*.y*ml")) if name else []
+    paths += sorted((folder / "vehicles").glob("[!.]*"))
+    paths += sorted(own_file.parent.glob("[!.]*.y*ml")) if name else []
     digests = [[path.name, sha256_of(path)] for path in dict.fromkeys(paths) if path.is_file()]
     return hashlib.sha256(json.dumps(digests).encode()).hexdigest()[:16]
 
@@ -122,7 +122,7 @@ def improbable_entries(turnout: TurnoutConfig, name: str | None = None) -> list[
     SimulationError
         There is no track file.
     """
-    vehicles = sorted((Path(turnout.folder) / "vehicles").glob("*.yaml"))
+    vehicles = sorted((Path(turnout.folder) / "vehicles").glob("[!.]*.yaml"))
     return improbable_in_files([*files_of_track(track_file(turnout, name)), *vehicles])
 
 

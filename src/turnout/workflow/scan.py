@@ -1,6 +1,7 @@
 """Scan the raw folder of one turnout: group files into units, and report files that match no pattern."""
 
 import os
+import re
 import unicodedata
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from stat import S_ISREG
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import NOTE_FILES
 from turnout.config.events import MAX_LEAD_TIME, now
+from turnout.config.file_names import file_key
 from turnout.config.filename_pattern import compile_pattern, wrong_field
 from turnout.errors import ReadError, reason_of_access, remedy_of_access
 from turnout.files import MIN_SPARSE_SIZE, sparse_size, special_kind
@@ -29,13 +31,16 @@ FIRST_YEAR = 1990  # of a digital recording; the readers take an earlier start f
 MIN_LIKENESS = 0.8  # of the name of a file to that of a table, from which it is taken for a misspelt one
 READABLE = 0o444  # mode of a file that everybody may read
 
+LINE_BREAKER = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")  # characters that end a line or move the cursor
+
 _name = attrgetter("name")
 
 
 class RawFolder:
     """All files below a raw folder: ``files`` are (path below it, entry), sorted; ``problems`` are excluded entries.
 
-    ``folders`` are the paths of the folders below it, ``tables`` the names of its tables of notes.
+    ``folders`` are the paths of the folders below it, ``tables`` the names of its tables of notes. ``exists`` says
+    whether there is such a folder.
 
     Parameters
     ----------
@@ -50,6 +55,7 @@ class RawFolder:
         self.files: list[tuple[str, os.DirEntry]] = []
         self.folders: list[str] = []
         self.tables: list[str] = []
+        self.exists = True
         self.problems: list[ReadError] = []
         top = os.path.join(raw_root, raw)
         self._collect(top, "", (os.path.realpath(top),))
@@ -100,6 +106,7 @@ class RawFolder:
             with os.scandir(folder) as listing:
                 entries = sorted(listing, key=_name)
         except FileNotFoundError:
+            self.exists = self.exists and bool(inside)
             return
         except OSError as error:
             self._note_unreadable(inside, "folder", error)
@@ -140,8 +147,17 @@ class RawFolder:
         self._leave_out(inside, where, str(error.strerror or error), remedy, reason_of_access(error))
 
     def _leave_out(self, inside: str, where: str, finding: str, remedy: str, reason: str = "unreadable") -> None:
-        path = os.fsencode(f"{self.raw}/{inside}".rstrip("/")).decode(errors="backslashreplace")
-        self.problems.append(ReadError(path, where, finding, remedy, reason))
+        self.problems.append(ReadError(_path_text(self.raw, inside), where, finding, remedy, reason))
+
+
+def _path_text(raw: str, inside: str) -> str:
+    r"""A path below the raw root in one line of text: bytes that are not UTF-8, and control characters, as escapes.
+
+    >>> _path_text("t1", "A7_1\n.csv")
+    't1/A7_1\\n.csv'
+    """
+    text = os.fsencode(f"{raw}/{inside}".rstrip("/")).decode(errors="backslashreplace")
+    return LINE_BREAKER.sub(lambda match: repr(match[0])[1:-1], text)
 
 
 def _is_text(name: str) -> bool:
@@ -190,7 +206,9 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
             if match := expression.fullmatch(composed):
                 matched.add(kind)
                 if wrong := _time_problem(match):
-                    result.problems.append(ReadError(f"{turnout.raw}/{inside}", "file name", *wrong, "name_unknown"))
+                    result.problems.append(
+                        ReadError(_path_text(turnout.raw, inside), "file name", *wrong, "name_unknown")
+                    )
                     break
                 by_unit.setdefault(_label(kind, match, inside, turnout), []).append((inside, entry))
                 break
@@ -203,8 +221,11 @@ def scan(turnout: TurnoutConfig, raw_root: Path) -> Scan:
     for inside in folder.folders:
         if any(expression.fullmatch(inside) for _, expression in names):
             finding = "is a folder with the name of a recording", "Put the file itself there, or rename the folder"
-            result.problems.append(ReadError(f"{turnout.raw}/{inside}", "folder", *finding, "no_file"))
-    result.problems += [*folder.problems, *_unmatched_files(turnout, unmatched, matched, folder.tables)]
+            result.problems.append(ReadError(_path_text(turnout.raw, inside), "folder", *finding, "no_file"))
+    result.problems += [
+        *folder.problems,
+        *_unmatched_files(turnout, raw_root, unmatched, matched, folder.tables, folder.exists),
+    ]
     return result
 
 
@@ -283,9 +304,17 @@ def _calendar_problem(text: str, form: str, quantity: str, today: date) -> str:
 
 
 def _unmatched_files(
-    turnout: TurnoutConfig, unmatched: list[str], matched: set[str], tables: Container[str]
+    turnout: TurnoutConfig,
+    raw_root: Path,
+    unmatched: list[str],
+    matched: set[str],
+    tables: Container[str],
+    exists: bool,
 ) -> Iterator[ReadError]:
-    """Files whose names match no pattern; ``tables`` are the tables of notes in the folder of the turnout."""
+    """Files whose names match no pattern; ``tables`` are the tables of notes in the folder of the turnout.
+
+    ``exists`` says whether there is such a folder.
+    """
     pattern_words = " or ".join(repr(kind.files) for kind in (turnout.hammer, turnout.passages) if kind)
     for inside in unmatched:
         field, problem = _wrong_field(inside, turnout)
@@ -301,12 +330,30 @@ def _unmatched_files(
             finding, remedy = "no file of this name is read", f"If it is the table {likest[0]}, rename it to that"
             if likest[0] in tables:
                 remedy = f"Remove it, or copy what it adds into {likest[0]}, which is read"
-        yield ReadError(f"{turnout.raw}/{inside}", "file name", finding, remedy, "name_unknown")
-    if not matched:
+        yield ReadError(_path_text(turnout.raw, inside), "file name", finding, remedy, "name_unknown")
+    if not exists:
+        yield ReadError(turnout.raw, "folder", *_missing_folder(raw_root, turnout.raw), "nothing_found")
+    elif not matched:
         remedy = (
             f"Put files named like {pattern_words} there, or correct 'raw' in turnouts.tsv or 'files' in the layout"
         )
         yield ReadError(turnout.raw, "folder", "no file matches a pattern of the layout", remedy, "nothing_found")
+
+
+def _missing_folder(raw_root: Path, raw: str) -> tuple[str, str]:
+    """Problem and remedy of a raw folder that does not exist; one of nearly the same name is named."""
+    path = Path(raw_root) / raw
+    try:
+        others = [other.name for other in path.parent.iterdir() if file_key(other.name) == file_key(path.name)]
+    except OSError:
+        others = []
+    if not others:
+        return "there is no such folder", "Put the recordings there, or correct 'raw' in turnouts.tsv"
+    kind = (
+        "capitals" if others[0].casefold() == path.name.casefold() else "the form of an accented letter, dots or blanks"
+    )
+    problem = f"there is no such folder, but {_path_text('', others[0])[1:]!r} differs from it only in {kind}"
+    return problem, "Rename that folder, or write its name as 'raw' in turnouts.tsv"
 
 
 def _missing_branches(turnout: TurnoutConfig) -> list[str]:
