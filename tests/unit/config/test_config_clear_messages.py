@@ -53,7 +53,7 @@ def message(folder, settings="", layout=LAYOUT):
         ("receptance:\n  gate_level: true\n", "gate_level is true. Write a number"),
         ("identify:\n  gate_level: 0.9\n", "'gate_level'. It belongs below 'receptance': move it there"),
         ("gate_level: 0.9\n", "line 1, column 1: unknown key 'gate_level'. It belongs below 'receptance'"),
-        ("receptance: &a\n  gate_level: 0.9\nidentify:\n  <<: *a\n", "line 4, column 3: the merge key '<<', which is not"),
+        ("receptance: &a\n  gate_level: 0.9\nidentify:\n  <<: *a\n", "line 4, column 3: the merge key '<<'"),
         ("? [a, b]\n: 1\n", "line 1, column 3: a list in place of a name. Write 'name: value'"),
         ("? {a: b}\n: 1\n", "line 1, column 3: a mapping in place of a name"),
         ("receptance:\n  window: 'abc\nidentify:\n", "line 2, column 11: a quote that is not closed"),
