@@ -137,7 +137,9 @@ def _main(words: Sequence[str]) -> int:
 
 
 def _prepare_output() -> None:
-    """Write characters that the encoding of the terminal lacks as escapes; output to a closed stream goes nowhere."""
+    """Write characters that the encoding of the terminal lacks as escapes; a closed stream is an empty one."""
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull, encoding="utf-8")
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

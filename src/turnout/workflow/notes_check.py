@@ -69,8 +69,8 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
     for day in sorted(n_files.keys() - days_in_notes):
         files = f"{n_files[day]} file{'s' * (n_files[day] > 1)}"
         finding = (
-            f"no row for campaign {day}, of which there are {files}: it counts as measured at noon, without a rail "
-            "temperature"
+            f"no row for campaign {day}, of which there {'is' if n_files[day] == 1 else 'are'} {files}: "
+            "it counts as measured at noon, without a rail temperature"
         )
         remedy = f"Add a line '{table.separator.join((day, '<start in UTC>', '<rail temperature in °C>'))}'"
         yield ReadError(name, "line 1", finding, remedy)

@@ -64,6 +64,12 @@ def test_a_closed_standard_output_is_no_fault(registry):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+def test_a_closed_standard_input_is_an_empty_query(registry):
+    command = f"{sys.executable} -m turnout query - --registry '{registry}' <&-"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "Traceback" not in done.stderr and done.stderr.startswith("turnout query: ")
+
+
 def test_a_query_that_is_not_utf8_is_reported(registry):
     done = run(["query", b"select '\xfc' as x"], registry, stdout=subprocess.PIPE)
     assert done.returncode == 2 and b"contains a byte that is not UTF-8" in done.stderr
