@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     configuration = load_configuration(args.configuration, FORMATS, to_si)
     ids = [configuration.turnout(args.turnout).id] if args.turnout else list(configuration.ids)
-    faults = [*_faults(configuration, FORMATS, to_si)]
+    faults = [*dict.fromkeys(_faults(configuration, FORMATS, to_si))]  # a train repeats those of its vehicles
     add_result(args, {"turnouts": list(configuration.ids), "faults": faults})
     layouts = {row.values["layout"] for row in configuration.rows.values()}
     n_events = len(configuration.events)

@@ -32,9 +32,13 @@ RANGES = {
     ("contact", "N/m^1.5"): (1e9, 1e13),
     ("mass", "kg"): (100.0, 300000.0),
     ("wheelset_mass", "kg"): (100.0, 10000.0),
-    ("primary_stiffness", "N/m"): (1e4, 1e10),
-    ("secondary_stiffness", "N/m"): (1e4, 1e10),
-    ("suspension_stiffness", "N/m"): (1e4, 1e10),
+    # the softest secondary springs have 0.1 MN/m, a nearly rigid centre plate with side bearers 40 MN/m
+    ("primary_stiffness", "N/m"): (1e4, 5e8),
+    ("secondary_stiffness", "N/m"): (1e4, 5e8),
+    ("suspension_stiffness", "N/m"): (1e4, 5e8),
+    ("primary_damping", "N s/m"): (1e2, 2e6),
+    ("secondary_damping", "N s/m"): (1e2, 2e6),
+    ("suspension_damping", "N s/m"): (1e2, 2e6),
     ("base", "m"): (0.5, 10.0),
     ("payload", "kg"): (1.0, 500000.0),
     ("shear_coefficient", "-"): (0.05, 1.0),
@@ -100,6 +104,7 @@ def improbable_values(parameters: ParameterSet) -> Iterator[ConfigError]:
 def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
     """Errors of numbers that do not go together: mass and inertia, the ends of the track, those of a rail."""
     yield from _errors_of_rail(parameters)
+    yield from _errors_of_axles(parameters)
     mass, inertia = (_number_at(parameters, key, unit) for key, unit in (("mass", "kg"), ("inertia", "kg m²")))
     lightest, heaviest = RANGES["mass", "kg"]
     low, high = GYRATION_RADII
@@ -112,6 +117,23 @@ def _errors_of_pairs(parameters: ParameterSet) -> Iterator[ConfigError]:
     if last - first > MAX_TRACK_LENGTH:
         problem = f"from {first:g} to {last:g} m are more than {MAX_TRACK_LENGTH:g} m"
         yield parameters.error("from" if -first > last else "to", problem, "Correct the number or its unit")
+
+
+def _errors_of_axles(parameters: ParameterSet) -> Iterator[ConfigError]:
+    """Errors of axles of which the wheels would touch each other, or stand out of an end of the vehicle."""
+    wheel = parameters.get("wheel")
+    radius = _number_at(wheel, "radius", "m") if isinstance(wheel, ParameterSet) else 0.0
+    axles = [(_number_at(axle, "centre", "m"), axle) for axle in _mappings(parameters.get("axles"))]
+    length, remedy = _number_at(parameters, "length", "m"), "Correct the number or its unit"
+    before = -radius
+    for centre, axle in sorted(axles, key=lambda item: item[0]):
+        if centre < radius or centre + radius > length > 0.0:
+            problem = f"a wheel at {centre:g} m, of a radius of {radius:g} m, reaches beyond the end of {length:g} m"
+            yield axle.error("centre", problem, remedy)
+        elif 0.0 < centre - before < 2.0 * radius:
+            problem = f"{centre:g} m is {centre - before:.3g} m behind another axle: their wheels would touch"
+            yield axle.error("centre", problem, remedy)
+        before = centre
 
 
 def _errors_of_rail(parameters: ParameterSet) -> Iterator[ConfigError]:

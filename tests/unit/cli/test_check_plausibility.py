@@ -12,7 +12,7 @@ from turnout.readers.repeated_blocks import is_noisy
 from turnout.workflow.project import create_project
 
 LAYOUT, TRACK, COACH = "config/layouts/tommerup.yaml", "config/tracks/tommerup.yaml", "config/vehicles/coach.yaml"
-PATTERNS = "config/vehicles/axle_patterns.yaml"
+PATTERNS, WAGON = "config/vehicles/axle_patterns.yaml", "config/vehicles/wagon_two_axles.yaml"
 
 
 @pytest.fixture
@@ -80,6 +80,27 @@ FAULTS = {
     ),
     "shear coefficient": (TRACK, "{value: 0.393,", "{value: 39.3,", "39.3 - is outside 0.05 to 1"),
     "inertia in kg m²": (COACH, "unit: t m²", "unit: kg m²", "a radius of gyration of 0.248 m"),
+    "axle in mm": (
+        WAGON,
+        "centre: {value: 3.25, unit: m",
+        "centre: {value: 3.25, unit: mm",
+        "line 24, axles[0].centre: a wheel at 0.00325 m, of a radius of 0.46 m, reaches beyond the end of 15.5 m",
+    ),
+    "axle beyond the end": (
+        WAGON,
+        "centre: {value: 12.25",
+        "centre: {value: 15.25",
+        "reaches beyond the end of 15.5 m",
+    ),
+    "axle at another": (WAGON, "centre: {value: 12.25", "centre: {value: 3.5", "3.5 m is 0.25 m behind another axle"),
+    "suspension times 1000": (WAGON, "value: 2.0, unit: MN/m", "value: 2000, unit: MN/m", "2e+09 N/m is outside"),
+    "damping times 1000": (WAGON, "value: 50, unit: kN s/m", "value: 50000, unit: kN s/m", "5e+07 N s/m is outside"),
+    "primary stiffness times 1000": (
+        COACH,
+        "primary_stiffness: {value: ",
+        "primary_stiffness: {value: 100",
+        "N/m is outside",
+    ),
     "negative payload": (COACH, "payload: {value: 7.5", "payload: {value: -7.5", "-7500 kg is outside 1 to 500000 kg"),
     "length of a vehicle in mm": (
         PATTERNS,
@@ -111,12 +132,18 @@ def test_a_value_that_no_turnout_has_is_a_fault(checked, fault, tmp_path):
         (tmp_path / TRACK).unlink()
     code, text = checked(edit)
     assert code == 1 and expected in text and "no fault" not in text
+    assert len(set(text.splitlines())) == len(text.splitlines())  # of a train and of its vehicles alike
 
 
 RIGHT = {
     "hump": (TRACK, "depth: {value: 0.8, unit: mm", "depth: {value: -0.8, unit: mm"),
     "depth in other units": (TRACK, "depth: {value: 0.8, unit: mm", "depth: {value: 0.08, unit: cm"),
     "offset": (LAYOUT, "mounting: rail web, section: SP", "offset: -0.3, section: SP"),
+    "axles in another order": (
+        WAGON,
+        "label: a1, type: axle, centre: {value: 3.25",
+        "label: a1, type: axle, centre: {value: 13.5",
+    ),
     "single vehicles": (PATTERNS, "coupled: 5", "coupled: 1"),
     "optional vehicles": (PATTERNS, "count: [1, 16]", "count: [0, 16]"),
 }
