@@ -185,9 +185,9 @@ class _ConfigurationReader:
 
     def can_leave_out(self, rows: Iterable[Row]) -> bool:
         """Whether every error concerns single turnouts or unused files, and any turnout is left."""
-        noted = {id(error) for errors in (self.unused, *self.faulty.values()) for error in errors}
+        ids_of_errors = {id(error) for errors in (self.unused, *self.faulty.values()) for error in errors}
         has_rest = any(row.id not in self.faulty for row in rows)
-        return has_rest and all(id(error) in noted for error in self.errors)
+        return has_rest and all(id(error) in ids_of_errors for error in self.errors)
 
     def note_misnamed(self, rows: Iterable[Row]) -> None:
         """Note which turnouts the errors in the names of layouts and overrides concern; those of others are unused."""

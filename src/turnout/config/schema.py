@@ -142,7 +142,7 @@ def suggestion(name: str, allowed: Iterable[Any], none: str = "There is none to 
     allowed = sorted(map(str, allowed))
     if not allowed:
         return none
-    by_letters = {_letters(other): other for other in allowed}
+    by_letters = {_letters(allowed_name): allowed_name for allowed_name in allowed}
     close = [by_letters[letters] for letters in get_close_matches(_letters(name), by_letters, n=1, cutoff=0.6)]
     listed = ", ".join(allowed) if len(allowed) <= 24 else f"{len(allowed)} names, as in docs/settings.md"
     return (f"Did you mean {close[0]!r}? " if close else "") + f"Allowed: {listed}"

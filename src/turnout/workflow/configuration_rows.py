@@ -192,19 +192,19 @@ def keep_rows(tables: dict[str, list[dict]], configuration: Configuration, regis
     """
     if not configuration.faulty:
         return
-    known = {row["turnout_id"] for row in tables["turnouts"]}
+    turnout_ids = {row["turnout_id"] for row in tables["turnouts"]}
     if (registry / GENERATION_FILE).exists():
         with open_registry(registry) as connection:
             for name, columns in KEPT_COLUMNS.items():
                 in_use = "where panel is not null and not coalesce(left_layout, false)" if name == "sections" else ""
                 cursor = connection.execute(f"select {', '.join(columns)} from {name} {in_use}")
                 rows = [dict(zip(columns, row)) for row in cursor.fetchall()]
-                kept = [row for row in rows if _is_kept(row, name, configuration)]
+                rows_before = [row for row in rows if _is_kept(row, name, configuration)]
                 new = {row[columns[0]] for row in tables[name]}
-                tables[name] += [row for row in kept if row[columns[0]] not in new]
-        known = {row["turnout_id"] for row in tables["turnouts"]}
+                tables[name] += [row for row in rows_before if row[columns[0]] not in new]
+        turnout_ids = {row["turnout_id"] for row in tables["turnouts"]}
     tables["quarantine"] += [
-        _error_row(error, turnout if turnout in known else None, FAULTY)
+        _error_row(error, turnout if turnout in turnout_ids else None, FAULTY)
         for turnout, errors in configuration.faulty.items()
         for error in {str(e): e for e in errors}.values()
     ]

@@ -275,9 +275,11 @@ def _scan_turnouts(
     for name in names:
         path = Path(folder) / f"{name}.json"
         before = path.read_text(encoding="utf-8") if path.exists() and not is_cut_plan(path) else ""
-        kept = [e for e in json.loads(before)["turnouts"] if is_left_out(e["turnout"])] if before and faulty else []
+        unchanged = (
+            [e for e in json.loads(before)["turnouts"] if is_left_out(e["turnout"])] if before and faulty else []
+        )
         entries = [_entry(configuration.turnout(t), Path(raw_root)) for t in members[name]]
-        texts[path] = _text(name, sorted(entries + kept, key=itemgetter("turnout")))
+        texts[path] = _text(name, sorted(entries + unchanged, key=itemgetter("turnout")))
         if before and before != texts[path]:
             # files of a turnout that was removed or renamed in the configuration do not count as missing
             files = _paths(e for e in json.loads(before)["turnouts"] if e["turnout"] in configuration.rows)

@@ -344,15 +344,17 @@ def _missing_folder(raw_root: Path, raw: str) -> tuple[str, str]:
     """Problem and remedy of a raw folder that does not exist; one of nearly the same name is named."""
     path = Path(raw_root) / raw
     try:
-        others = [other.name for other in path.parent.iterdir() if file_key(other.name) == file_key(path.name)]
+        similar = [entry.name for entry in path.parent.iterdir() if file_key(entry.name) == file_key(path.name)]
     except OSError:
-        others = []
-    if not others:
+        similar = []
+    if not similar:
         return "there is no such folder", "Put the recordings there, or correct 'raw' in turnouts.tsv"
-    kind = (
-        "capitals" if others[0].casefold() == path.name.casefold() else "the form of an accented letter, dots or blanks"
+    difference = (
+        "capitals"
+        if similar[0].casefold() == path.name.casefold()
+        else "the form of an accented letter, dots or blanks"
     )
-    problem = f"there is no such folder, but {_path_text('', others[0])[1:]!r} differs from it only in {kind}"
+    problem = f"there is no such folder, but {_path_text('', similar[0])[1:]!r} differs from it only in {difference}"
     return problem, "Rename that folder, or write its name as 'raw' in turnouts.tsv"
 
 
