@@ -33,6 +33,7 @@ RESETS = {
 }
 FIRST_YEAR = 1900  # an earlier date of work is taken for a mistake
 MAX_LEAD_TIME = timedelta(days=366)  # how far ahead work may be planned; a later date is taken for a mistake
+NOON = 12  # h
 DAY_LENGTH = len("2026-04-02")
 UTC_MARK = re.compile(r"\s*(?:z|utc|gmt)$", re.IGNORECASE | re.ASCII)
 BLANK_BEFORE_OFFSET = re.compile(r"\s+(?=[+-]\d{2}:?\d{2}$)", re.ASCII)
@@ -54,6 +55,11 @@ class Event:
     def work(self) -> tuple[str, str | None, datetime, str]:
         """What identifies the work: turnout, section, time and kind."""
         return self.turnout, self.section, self.at, self.kind
+
+    @property
+    def first_day_after(self) -> date:
+        """First day whose measurements lie after the work: of work from noon on it is the next day."""
+        return self.at.date() + timedelta(days=self.at.hour >= NOON)
 
 
 def read_events(

@@ -24,7 +24,8 @@ A range includes its ends. A unit is in square brackets. `turnout check` tests e
 RESETS_NOTE = """An empty `section` is the whole turnout. `resets` overrules the kind: `ballast`, `railpad`,
 `ballast railpad` or `none`. Crossing or blade renewed: `rail_change`; bearers: `sleeper_change`; deposit welding:
 `grinding`; clips tightened: `other` with `railpad`; the whole turnout rebuilt: `renewal` without a section. The
-calibrated model and the diagnosis of an alarm then use no visit before that day.
+calibrated model and the diagnosis of an alarm then use no visit before that day. In both, work from 12:00 UTC on lies
+after the visit of its day.
 """
 LAYOUT_NOTE = """A layout and an override have the same keys. An override, and `hammer` within a section, hold only
 what differs: no key is needed there. `settings:` takes the settings below, except those of the whole fleet:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.config.events import RENEWAL, read_events
+from turnout.config.events import RENEWAL, RESETS, read_events
 from turnout.constants import DAYS_PER_YEAR
 from turnout.mismatch.calibrated import Event, StateParameter, VisitInformation, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
@@ -35,6 +35,9 @@ OPENED_COMMON = {
     "pad_exchange": PADS,
     "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
 }
+# The same of a resonance that a row resets beside those of its kind, as "other" with "railpad" for tightened clips
+OF_RESONANCE = {"ballast": ("ballast", "ballast_damper"), "railpad": ("pad", "pad_damper")}
+COMMON_OF_RESONANCE = {"ballast": BALLAST, "railpad": PADS}
 EVENT_REACH = 6.0  # m from a section that work there may touch
 
 
@@ -45,6 +48,8 @@ def events_of(
     visits_used: Sequence[VisitInformation] = (),
 ) -> list[Event]:
     """Recorded work on the turnout, as parameters that it makes as uncertain as the file, and accepted changes.
+
+    Work of one day is one event, whether it is entered once or section by section.
 
     Parameters
     ----------
@@ -58,24 +63,28 @@ def events_of(
     Returns
     -------
     list of Event
+        In the order of time, then accepted changes.
     """
     recorded, _, _ = read_events(Path(turnout.folder) / "events.csv", "events.csv", None, {})
     positions = {s.label: s.position for s in turnout.sections}
-    events = []
+    by_day: dict[int, dict[str, float]] = {}
     for event in recorded:
-        if event.turnout != turnout.id or event.kind not in OPENED:
+        further = [resonance for resonance in event.resets if resonance not in RESETS[event.kind]]
+        groups = {*OPENED.get(event.kind, ()), *(g for r in further for g in OF_RESONANCE[r])}
+        if event.turnout != turnout.id or not groups:
             continue
         if event.section is not None and event.section not in positions:  # misspelt, as ``turnout check`` reports
             continue
         at = None if event.section is None else positions[event.section]
-        opened = {
+        opened = by_day.setdefault(event.first_day_after.toordinal(), {})
+        opened |= {
             p.name: p.sd
             for p in parameters
-            if p.group in OPENED[event.kind]
-            and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
+            if p.group in groups and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
         }
-        common = OPENED_COMMON.get(event.kind, ()) if at is None else ()
-        opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
-        events.append(Event(event.at.date().toordinal() / DAYS_PER_YEAR, opened))
+        if at is None:
+            common = {*OPENED_COMMON.get(event.kind, ()), *(g for r in further for g in COMMON_OF_RESONANCE[r])}
+            opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
+    events = [Event(day / DAYS_PER_YEAR, opened) for day, opened in sorted(by_day.items())]
     candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []
     return events + change_events(changes, parameters, candidates, visits_used)

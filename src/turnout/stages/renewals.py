@@ -31,7 +31,7 @@ def renewal_of(turnout: TurnoutConfig) -> float | None:
     """
     path = Path(turnout.folder) / "events.csv"
     days = [
-        e.at.date().toordinal() / DAYS_PER_YEAR
+        e.first_day_after.toordinal() / DAYS_PER_YEAR
         for e in _renewals_in(path, _state_of(path))
         if e.turnout == turnout.id and e.at <= now()
     ]

@@ -332,7 +332,8 @@ def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
     visits_used = []
     for visit, parts in members.items():
         information = tuple(g for s in parts for g in s.groups)
-        visits_used.append(VisitInformation(visit, years_of(visit), information))
+        own_sds = {p.name: p.visit_sd for s in parts for p in s.parameters}
+        visits_used.append(VisitInformation(visit, years_of(visit), information, own_sds))
     return visits_used
 
 
@@ -370,6 +371,9 @@ def without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
 def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
     """All parameters of these visits, each once.
 
+    A support that is an outer one at a visit with fewer sensors may change if it is none at another visit. What it
+    absorbs at the first one is among the ``own_sds`` of that visit.
+
     Parameters
     ----------
     stored : iterable of StoredVisit
@@ -381,5 +385,7 @@ def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
     by_name: dict[str, StateParameter] = {}
     for s in stored:
         for p in s.parameters:
-            by_name.setdefault(p.name, p)
+            known = by_name.setdefault(p.name, p)
+            if (p.may_change, not p.is_beyond_sensors) > (known.may_change, not known.is_beyond_sensors):
+                by_name[p.name] = p
     return tuple(by_name.values())

@@ -220,6 +220,25 @@ def test_deviations_of_a_visit_add_to_the_covariance_of_its_data():
     assert_allclose(vector, rows.T @ precision @ y, atol=1e-12)
 
 
+def test_a_visit_may_have_deviations_of_its_own_that_others_do_not_have():
+    """As a support that only the first visit has at the edge. Against the covariance of all data in one matrix."""
+    rng = np.random.default_rng(8)
+    parameters = tuple(StateParameter(f"x{k}", 0.0, 1.0) for k in range(3))
+    rows, data = rng.normal(size=(2, 5, 3)), rng.normal(size=(2, 5))
+    own = {"x1": 0.8}
+    visits = [
+        VisitInformation(f"v{k}", 0.1 * k, (information_of(parameters, rows[k], data[k], 1.0, f"g{k}"),), given)
+        for k, given in enumerate((own, {}))
+    ]
+    belief = estimate_history(parameters, visits, repeats_between_visits=False, accepted=None).belief
+    deviations = np.array([own.get(p.name, 0.0) ** 2 for p in parameters])
+    noise = [np.eye(5) + rows[0] @ np.diag(deviations) @ rows[0].T, np.eye(5)]
+    precision = np.eye(3) + sum(h.T @ np.linalg.solve(r, h) for h, r in zip(rows, noise))
+    mean = np.linalg.solve(precision, sum(h.T @ np.linalg.solve(r, y) for h, r, y in zip(rows, noise, data)))
+    assert_allclose(belief.covariance, np.linalg.inv(precision), rtol=1e-9, atol=1e-12)
+    assert_allclose(belief.mean, mean, rtol=1e-9, atol=1e-12)
+
+
 def test_innovations_of_intact_visits_are_chi_squared_and_a_jump_is_named():
     rng = np.random.default_rng(6)
     truth = rng.normal([p.mean for p in CHAIN], [p.sd for p in CHAIN])

@@ -16,6 +16,7 @@ import small_turnout as small
 from turnout.cli.main import main
 from turnout.cli.twin import model_text
 from turnout.config import load_configuration, with_raw
+from turnout.constants import DAYS_PER_YEAR
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import StateParameter, VisitInformation, estimate_history
 from turnout.mismatch.engine.diagnose import fit_base
@@ -31,6 +32,7 @@ from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_results import diagnose_turnout
 from turnout.stages.recorded_work import events_of
+from turnout.stages.renewals import since_renewal
 from turnout.stages.stored_visits import read_visits
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_time import years_of
@@ -263,6 +265,46 @@ def test_maintenance_makes_the_affected_parameters_uncertain(turnout):
 
 def write_events(text):
     Path("config/events.csv").write_text(f"turnout,section,date,kind,resets,note\n{text}")
+
+
+def opened_by(rows):
+    """Work in the rows of events.csv: time in days from 2026-01-10 -> parameters that it makes uncertain, their sd."""
+    parameters = [
+        StateParameter("ballast@18.00", 0.0, 0.1, 0.0, "ballast", 30, 18.0),
+        StateParameter("pad@18.00", 0.0, 0.2, 0.0, "pad", 30, 18.0),
+        StateParameter("pad_stiffness", 0.0, 0.3),
+    ]
+    write_events(rows)
+    events = events_of(load_configuration("config").turnout("t1"), parameters)
+    return {round((e.time - years_of("2026-01-10")) * DAYS_PER_YEAR): dict(e.opened) for e in events}
+
+
+def test_work_of_one_day_counts_once_whether_entered_once_or_section_by_section(turnout):
+    whole = opened_by("t1,,2026-01-10,tamping,,\n")
+    assert opened_by("t1,A,2026-01-10,tamping,,\nt1,B,2026-01-10,tamping,,\n") == whole == {0: {"ballast@18.00": 0.1}}
+    assert opened_by("t1,,2026-01-10,tamping,,\nt1,,2026-01-10,ballast_cleaning,,\n") == whole
+    both = opened_by("t1,,2026-01-10,tamping,,\nt1,A,2026-01-10,pad_exchange,,\n")
+    assert both == {0: {"ballast@18.00": 0.1, "pad@18.00": 0.2}}
+    assert list(opened_by("t1,A,2026-01-10,tamping,,\nt1,B,2026-01-12,tamping,,\n")) == [0, 2]
+
+
+def test_work_in_the_evening_of_a_day_of_measurement_lies_after_it(turnout):
+    """One measures by day and works at night. Work of the whole turnout that renews it is no exception."""
+    assert list(opened_by("t1,A,2026-01-10T02:30,tamping,,\nt1,A,2026-01-10T22:00,pad_exchange,,\n")) == [0, 1]
+    t1 = load_configuration("config").turnout("t1")
+    write_events(f"t1,,{DAYS[1]}T23:00,renewal,,\n")
+    assert list(since_renewal(t1, dict.fromkeys(DAYS))) == list(DAYS[2:])
+    write_events(f"t1,,{DAYS[1]}T01:00,renewal,,\n")
+    assert list(since_renewal(t1, dict.fromkeys(DAYS))) == list(DAYS[1:])
+
+
+def test_resonances_that_a_row_resets_beside_those_of_its_kind_are_uncertain_too(turnout):
+    """Tightened clips are entered as "other" with "railpad"."""
+    assert opened_by("t1,A,2026-01-10,other,railpad,clips\n") == {0: {"pad@18.00": 0.2}}
+    assert opened_by("t1,,2026-01-10,other,railpad,clips\n") == {0: {"pad@18.00": 0.2, "pad_stiffness": 0.3}}
+    assert set(opened_by("t1,A,2026-01-10,tamping,ballast railpad,\n")[0]) == {"ballast@18.00", "pad@18.00"}
+    assert opened_by("t1,A,2026-01-10,sensor_change,,\n") == {0: {}}  # its resonances are those of the measurement
+    assert opened_by("t1,A,2026-01-10,other,,\nt1,A,2026-01-10,method_change,,\n") == {}
 
 
 def test_the_model_of_a_renewed_turnout_uses_no_recording_from_before_the_renewal(turnout, model):

@@ -1,14 +1,15 @@
 """Stored files of visits: only those that are no longer needed are removed."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from turnout.mismatch.calibrated import StateParameter
+from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.turnout import TrackCase
 from turnout.stages import stored_visits
-from turnout.stages.stored_visits import remove_other_visits
+from turnout.stages.stored_visits import StoredVisit, parameters_of, remove_other_visits, visits_of
 
 
 def test_only_files_of_other_visits_of_the_same_turnout_are_removed(tmp_path):
@@ -61,6 +62,23 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
     stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")
     assert written["levels"] == {"channel A1 in the passages": 0.5}
+
+
+def of_one_visit(visit, *parameters):
+    return StoredVisit(visit, "A", "", (GroupInformation(visit, 1, ("pad",), np.eye(1), np.zeros(1)),), parameters)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_support_is_an_outer_one_only_at_visits_where_it_is(order):
+    """In whatever order: a first visit with fewer sensors does not hide later changes, and later ones add no false."""
+    inner = StateParameter("pad", 0.0, 0.1, 0.02, "pad", 30, 18.0)
+    outer = replace(inner, may_change=False, is_beyond_sensors=True, visit_sd=0.5)
+    other = StateParameter("gain_A", 0.0, 0.02)
+    roles = [outer, inner]
+    stored = [of_one_visit(f"2026-0{k + 1}-01", roles[role], other) for k, role in enumerate(order)]
+    assert parameters_of(stored) == (inner, other)
+    assert [v.own_sds["pad"] for v in visits_of(stored)] == [roles[role].visit_sd for role in order]
+    assert parameters_of(stored[:1]) == (roles[order[0]], other)
 
 
 def test_a_fit_begins_at_the_means_of_a_belief_by_the_names_of_the_turnout(monkeypatch):

@@ -131,19 +131,18 @@ def estimate_history(
         tested = {s.visit: s for s in alone.steps}
         weights = repeated_error_weights([v for v in ordered if tested[v.visit].is_used], repeated_share)
     names = tuple(p.name for p in parameters)
-    own_sds = np.array([p.visit_sd for p in parameters])
     noise, steps = _ProcessNoise(parameters, events), list[Step]()
     prior = Belief.of_file(parameters).with_noise(noise.before_all())
     if constant_errors and ordered:
         of_first = ordered[0].total(names, repeated_error_weights(ordered[:1], repeated_share))
-        prior = prior.with_constant_error(with_visit_deviations(*of_first, own_sds)[0])
+        prior = prior.with_constant_error(with_visit_deviations(*of_first, _own_sds(ordered[0], parameters))[0])
     belief, time = prior, ordered[0].time if ordered else 0.0
     for visit in ordered:
         predicted = belief.with_noise(noise.covariance(time, visit.time)) if steps else belief
         own_weights = repeated_error_weights([visit], repeated_share)
         repeated = {g.group: own_weights[g.group] / (levels or {}).get(g.group, 1.0) for g in visit.groups}
         total = visit.total(names, {**repeated, **(weights or {})})
-        matrix, vector = with_visit_deviations(*total, own_sds)
+        matrix, vector = with_visit_deviations(*total, _own_sds(visit, parameters))
         test = tested.get(visit.visit)
         innovation = test.innovation if test else predicted.innovation(matrix, vector)
         is_used = test.is_used if test else accepted is None or visit.visit in accepted or innovation.is_expected
@@ -151,6 +150,11 @@ def estimate_history(
         n = visit.n_recordings
         steps.append(Step(visit.visit, time, matrix, vector, predicted, belief, innovation, is_used, n))
     return History(tuple(parameters), tuple(steps), prior)
+
+
+def _own_sds(visit: VisitInformation, parameters: Sequence[StateParameter]) -> np.ndarray:
+    """(n_parameter,) standard deviations of what a visit adds of its own."""
+    return np.array([visit.own_sds.get(p.name, p.visit_sd) for p in parameters])
 
 
 def _in_order(visits: Iterable[VisitInformation]) -> list[VisitInformation]:

@@ -8,7 +8,7 @@ The log likelihood of a visit is :math:`-\frac12 x^T \Lambda x + \eta^T x` up to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -136,11 +136,16 @@ class GroupInformation:
 
 @dataclass(frozen=True)
 class VisitInformation:
-    """Information of one ``visit``, by group; ``time`` is that of the visit in years."""
+    """Information of one ``visit``, by group; ``time`` is that of the visit in years.
+
+    ``own_sds``: parameter -> standard deviation of what this visit adds of its own, where it is not the ``visit_sd`` of
+    the parameter. A support may be an outer one at a visit with fewer sensors, and absorb there what lies beyond.
+    """
 
     visit: str
     time: float
     groups: tuple[GroupInformation, ...]
+    own_sds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def n_recordings(self) -> int:
