@@ -12,7 +12,8 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.bar import Bar, stopwatch
-from turnout.stages.calibrated_model import MAX_PASSAGES_AND_AXLES, calibrate_turnout
+from turnout.stages.calibrated_model import calibrate_turnout
+from turnout.stages.visit_fits import MAX_PASSAGES_AND_AXLES
 from turnout_blind.effect import load_effects
 from turnout_blind.history import NONE, HistoryPlan, make_history
 

@@ -32,6 +32,7 @@ from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import changes_of, further_candidates
 from turnout.stages.change_finding import finding_of_change
 from turnout.stages.change_trains import case_of, trains_of_change
+from turnout.stages.combined_visits import parameters_of, visits_of
 from turnout.stages.copied_files import without_copies
 from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, unit_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs
@@ -40,12 +41,11 @@ from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.stored_visits import (
     MAX_FITTED_AXLES,
     StoredVisit,
-    parameters_of,
+    by_content,
     read_visits,
     remove_other_visits,
     store_visit,
     version_of,
-    visits_of,
 )
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_time import day_of, years_of
@@ -172,7 +172,7 @@ def _fitted_visits(
     """Information of the recordings of each visit at these sections, fitted once; and why one could not be fitted."""
     units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in by_visit.items()}
     versions = {v: version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
-    complete = {s.visit for s in read_visits(folder, turnout.id, versions)}
+    complete = {s.visit for s in read_visits(folder, turnout.id, by_content(versions))}
     notes = []
     for label, of in by_visit.items():
         if label in complete:
@@ -187,7 +187,7 @@ def _fitted_visits(
                 store_visit(folder, group, case_of(group, campaign, turnout, accepted), "", about)
             except (SimulationError, np.linalg.LinAlgError) as error:
                 notes.append(f"visit {label}: {error}")
-    return read_visits(folder, turnout.id, versions), notes
+    return read_visits(folder, turnout.id, by_content(versions)), notes
 
 
 def _first_and_newest_with_trains(by_visit: Mapping[str, Sequence[Unit]]) -> dict[str, Sequence[Unit]]:

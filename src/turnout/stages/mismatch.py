@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,15 +16,17 @@ from turnout.errors import ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
-from turnout.stages import calibrated_model, stored_visits
+from turnout.stages import stored_visits
 from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
 from turnout.stages.checkpoint import Checkpoint, Replay
-from turnout.stages.mismatch_groups import Group, groups, members_of
+from turnout.stages.mismatch_groups import Group, groups, members_of, unit_of, visits
 from turnout.stages.mismatch_inputs import Note, gather_inputs
 from turnout.stages.mismatch_rows import finding_tables
 from turnout.stages.raw_files import quarantine_row
+from turnout.stages.renewals import since_renewal
+from turnout.stages.state_rows import state_rows
 from turnout.stages.track_files import digest_of_model, improbable_entries, track_of
 from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of
@@ -137,7 +139,8 @@ def diagnose_visit(
     """
     options = options or Options()
     track, accepted = track_of(turnout, options.track)
-    units = members_of(unit, scan(turnout, Path(raw_root)).units)
+    scanned = scan(turnout, Path(raw_root)).units
+    units = members_of(unit, scanned)
     inputs = gather_inputs(units, turnout, raw_root, track, passage_tables)
     inputs.notes += [Note(entry) for entry in improbable_entries(turnout, options.track)]
     contents = [[path, _content_hash(Path(raw_root) / path)] for path, *_ in unit.files]
@@ -147,8 +150,13 @@ def diagnose_visit(
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
     about["changes"] = changes_of(track.terms)
     about["version"] = stored_visits.version_of(unit, turnout, raw_root, options.track, algo)
+    about["earlier"] = _earlier_versions(unit, scanned, turnout, raw_root, options, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
+    # Sections that were chosen, or several visits in one case, are no visit of the calibrated model
+    every = groups(turnout, track, replace(inputs, notes=[])) if options.sections else members
+    is_visit = set(visits(units)) <= {unit.label}
+    about["every_group"] = [", ".join(g.neighbours) for g in every] if is_visit else []
     for k, group in enumerate(members):
         try:
             group_tables = _diagnose_group(group, turnout, accepted, about, options, (k, len(members)))
@@ -189,8 +197,10 @@ def _diagnose_group(
     """Rows of one group, read from the store if an earlier run computed them."""
     name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
-    if "rows" in store:
-        return store["rows"]
+    folder = stored_visits.folder_of(options.fits)
+    is_in_model = ", ".join(group.neighbours) in about["every_group"]
+    if "rows" in store and (not is_in_model or stored_visits.is_stored(folder, group, about)):
+        return _with_states(store["rows"], folder, turnout, group, about, is_in_model)
     replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
     report_progress = options.progress(group, *number) if options.progress else None
     try:
@@ -201,25 +211,54 @@ def _diagnose_group(
         case = TrackCase(group.campaign, settings, accepted=(*accepted, *changed), cache=budget)
         diagnosis = diagnose(case, settings, report_progress, store)
         rows = finding_tables(diagnosis, case, group, about)
-        folder, answer = stored_visits.folder_of(options.fits), diagnosis.verdict.answer
+        answer = diagnosis.verdict.answer
         fits: Checkpoint | None = store
         if changed:  # the calibrated model has accepted changes as noise of its process, not as effects of a visit
             case, fits = TrackCase(group.campaign, settings, accepted=accepted, cache=budget), None
         stored_about = {**about, "notes": notes_in_words(about["visit"], about["notes"])}
-        if answer in stored_visits.USED_ANSWERS:
+        if is_in_model and answer in stored_visits.USED_ANSWERS:
             stored_visits.store_visit(folder, group, case, answer, stored_about, fits)
-        else:  # such a visit does not change the belief
+        elif is_in_model:  # such a visit does not change the belief
             stored_visits.store_answer(folder, group, case, answer, stored_about)
-        rows["twin_states"] = calibrated_model.state_rows(
-            folder, turnout, group, case, rows["mismatch_findings"][0], about
-        )
     except (SimulationError, np.linalg.LinAlgError) as error:
         reasons = [f"sections {', '.join(group.labels)}: {error}", *map(str, about["notes"])]
         return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join(reasons)[:1000], group)]}
     replay.discard()
     store.discard()
     store["rows"] = rows
-    return rows
+    return _with_states(rows, folder, turnout, group, about, is_in_model)
+
+
+def _with_states(
+    rows: Mapping[str, list[dict]],
+    folder: Path,
+    turnout: TurnoutConfig,
+    group: Group,
+    about: Mapping[str, Any],
+    is_in_model: bool,
+) -> dict[str, list[dict]]:
+    """Rows of a group with those of the calibrated model, which other visits and recorded work may change."""
+    if not is_in_model:
+        return {**rows}
+    return {**rows, "twin_states": state_rows(folder, turnout, group, rows["mismatch_findings"][0], about)}
+
+
+def _earlier_versions(
+    unit: Unit,
+    scanned: Sequence[Unit],
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    options: Options,
+    code: str,
+) -> dict[str, dict[str, str]]:
+    """Versions of the stored visits before that of the unit, as ``present_versions``."""
+    before = {
+        visit: unit_of(turnout.id, visit, units, turnout.hashes["mismatch"])
+        for visit, units in since_renewal(turnout, visits(scanned)).items()
+        if visit != unit.label and years_of(visit) <= years_of(unit.label)
+    }
+    folder = stored_visits.folder_of(options.fits)
+    return stored_visits.present_versions(folder, before, turnout, raw_root, options.track, code)
 
 
 def _changed_effects(group: Group, about: Mapping[str, Any]) -> tuple[AcceptedEffect, ...]:

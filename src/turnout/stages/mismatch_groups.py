@@ -41,11 +41,15 @@ MAX_SECTION_GAP = 6.0  # m: sections further apart do not respond to the same sl
 
 @dataclass(frozen=True)
 class Group:
-    """Sections ``labels`` on ``route`` with their ``campaign``."""
+    """Sections ``labels`` on ``route`` with their ``campaign``.
+
+    ``neighbours`` are these sections and those beside them without a recording.
+    """
 
     labels: tuple[str, ...]
     route: str
     campaign: CampaignInput
+    neighbours: tuple[str, ...] = ()
 
 
 def groups(
@@ -81,7 +85,7 @@ def groups(
         if campaign is not None and route not in ("main", *track.routes):
             inputs.notes.append(Note(f"sections {', '.join(labels)}: the track's file has no route {route}; not used"))
         elif campaign is not None:
-            yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign)
+            yield Group(_measured_labels(turnout, inputs, campaign, labels), route, campaign, tuple(labels))
 
 
 def neighbours_of(turnout: TurnoutConfig, only: Sequence[str] = ()) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from turnout.content import sha256_of
 from turnout.errors import SimulationError
-from turnout.mismatch.calibrated import GroupInformation, StateParameter, VisitInformation
+from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.model_answer import NAMES
 from turnout.mismatch.engine.diagnose import fit_base
@@ -34,7 +34,6 @@ from turnout.mismatch.turnout.relinearization import fit_again
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.track_files import digest_of_model
-from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -55,7 +54,8 @@ class StoredVisit:
     """Information of one group of sections at one visit: ``answer`` of its diagnosis, "" without one.
 
     ``notes`` are those of ``notes_in_words`` on the recordings of the visit, ``levels`` those of ``channel_levels``.
-    Of a visit that is not ``fitted`` yet only the answer is known.
+    Of a visit that is not ``fitted`` yet only the answer is known. ``neighbours`` are its sections and those beside
+    them without a recording, ``every_group`` those of all groups of the visit.
     """
 
     visit: str
@@ -66,6 +66,8 @@ class StoredVisit:
     notes: tuple[tuple[str, str, bool], ...] = ()
     fitted: bool = True
     levels: Mapping[str, float] = field(default_factory=dict)
+    neighbours: str = ""
+    every_group: tuple[str, ...] = ()
 
 
 def folder_of(fits: str | Path) -> Path:
@@ -101,12 +103,64 @@ def version_of(
     Returns
     -------
     dict
-        "code", "model" (track, vehicles and settings) and "recordings" -> digest.
+        "code", "model" (track, vehicles and settings), "recordings" (content, without copies) and "files" (names, sizes
+        and times of change) -> digest.
     """
-    contents = [[path, sha256_of(file) if (file := Path(raw_root) / path).is_file() else ""] for path, *_ in unit.files]
-    recordings = hashlib.sha256(json.dumps(contents).encode()).hexdigest()[:16]
+    paths: dict[str, str] = {}  # of each content the first path
+    for path, *_ in unit.files:
+        content = sha256_of(file) if (file := Path(raw_root) / path).is_file() else f"no file {path}"
+        paths.setdefault(content, path)
     model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
-    return {"code": code, "model": model, "recordings": recordings}
+    contents = [[path, content] for content, path in paths.items()]
+    return {"code": code, "model": model, "recordings": _digest(contents), "files": _digest(unit.files)}
+
+
+def _digest(value: Sequence[Any]) -> str:
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]
+
+
+def by_content(versions: Mapping[str, Mapping[str, str]]) -> dict[str, dict[str, str]]:
+    """Versions without names, sizes and times of files: a copied folder is not fitted again.
+
+    Parameters
+    ----------
+    versions : mapping
+        Visit -> as ``version_of``.
+
+    Returns
+    -------
+    dict
+    """
+    return {visit: {k: v for k, v in version.items() if k != "files"} for visit, version in versions.items()}
+
+
+def present_versions(
+    folder: Path, units: Mapping[str, Unit], turnout: TurnoutConfig, raw_root: str | Path, track: str | None, code: str
+) -> dict[str, dict[str, str]]:
+    """Versions of those stored visits whose recordings are as they were.
+
+    Only files that were changed or copied since are read.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``folder_of``.
+    units : mapping
+        Visit -> its files now.
+    turnout, raw_root, track, code
+        As ``version_of``.
+
+    Returns
+    -------
+    dict
+        Visit -> its versions, for ``read_visits``.
+    """
+    model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
+    by_files = {v: {"code": code, "model": model, "files": _digest(unit.files)} for v, unit in units.items()}
+    unchanged = {s.visit for s in read_visits(folder, turnout.id, by_files)}
+    stored = {path.stem.rpartition("-")[0] for path in (folder / turnout.id).glob(f"*{SUFFIX}")}
+    changed = {v: version_of(u, turnout, raw_root, track, code) for v, u in units.items() if v in stored - unchanged}
+    return {v: by_files[v] for v in units if v in unchanged} | by_content(changed)
 
 
 def fit_group(
@@ -185,7 +239,8 @@ def store_visit(
     answer : str
         Of the diagnosis, "" without one.
     about : mapping
-        turnout, visit, version (as ``version_of``), and notes (as ``notes_in_words``) if there are any.
+        turnout, visit, version (as ``version_of``), notes (as ``notes_in_words``) if there are any, and ``every_group``
+        (as ``StoredVisit``) if the visit has several.
     store : mapping or None
         Fits of the diagnosis, which has the base fit.
 
@@ -220,6 +275,20 @@ def store_answer(folder: Path, group: Group, case: TrackCase, answer: str, about
     _write_visit(folder, group, calibrated_parameters(case, group.route), answer, about, None)
 
 
+def store_failure(folder: Path, group: Group, words: str, about: Mapping[str, Any]) -> None:
+    """Write why a group of sections cannot be fitted at one visit: it counts as fitted, without information.
+
+    Parameters
+    ----------
+    folder, group, about
+        As ``store_visit``.
+    words : str
+        The reason, one more of the notes.
+    """
+    notes = [*about.get("notes", ()), (about["visit"], f"sections {', '.join(group.labels)}: {words}", False)]
+    _write_visit(folder, group, {}, "", {**about, "notes": notes}, ())
+
+
 def _write_visit(
     folder: Path,
     group: Group,
@@ -234,8 +303,10 @@ def _write_visit(
         "answer": answer, "notes": [list(note) for note in about.get("notes", ())],
         "parameters": [asdict(p) for p in parameters.values()], "fitted": information is not None,
         "groups": packed_groups(information or ()), "levels": dict(levels or {}),
+        "neighbours": ", ".join(group.neighbours),
+        "every_group": list(about.get("every_group", [", ".join(group.neighbours)])),
     }  # fmt: skip
-    path = _path(folder, about["turnout"].id, about["visit"], group.labels)
+    path = _path(folder, about["turnout"].id, about["visit"], group.neighbours)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_value(path, value)
 
@@ -260,6 +331,23 @@ def _damper_key(spring: StateParameter) -> str:
 def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> Path:
     digest = hashlib.sha256("+".join(labels).encode()).hexdigest()[:12]
     return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
+
+
+def is_stored(folder: Path, group: Group, about: Mapping[str, Any]) -> bool:
+    """Whether a group of sections is stored at a visit, of these versions.
+
+    Parameters
+    ----------
+    folder, group, about
+        As ``store_visit``.
+
+    Returns
+    -------
+    bool
+    """
+    turnout, visit = about["turnout"], about["visit"]
+    stored = read_visits(folder, turnout.id, by_content({visit: about["version"]}))
+    return any(s.neighbours == ", ".join(group.neighbours) for s in stored)
 
 
 def remove_other_visits(folder: Path, turnout_id: str, visits: Collection[str]) -> None:
@@ -308,84 +396,7 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         parameters = tuple(StateParameter(**p) for p in value["parameters"])
         notes = tuple((visit, words, of_passage) for visit, words, of_passage in value.get("notes", ()))
         about = value["visit"], value["sections"], value["answer"]
+        neighbours, every_group = value.get("neighbours", ""), tuple(value.get("every_group", ()))
         fitted, levels = value.get("fitted", True), value.get("levels", {})
-        stored.append(StoredVisit(*about, information, parameters, notes, fitted, levels))
+        stored.append(StoredVisit(*about, information, parameters, notes, fitted, levels, neighbours, every_group))
     return sorted(stored, key=lambda s: (s.visit, s.sections))
-
-
-def visits_of(stored: Iterable[StoredVisit]) -> list[VisitInformation]:
-    """One ``VisitInformation`` per visit, of all of its groups of sections.
-
-    Parameters
-    ----------
-    stored : iterable of StoredVisit
-        Groups of sections of all visits.
-
-    Returns
-    -------
-    list of VisitInformation
-        In the order in which the visits first appear.
-    """
-    members: dict[str, list[StoredVisit]] = {}
-    for s in stored:
-        members.setdefault(s.visit, []).append(s)
-    visits_used = []
-    for visit, parts in members.items():
-        information = tuple(g for s in parts for g in s.groups)
-        own_sds = {p.name: p.visit_sd for s in parts for p in s.parameters}
-        visits_used.append(VisitInformation(visit, years_of(visit), information, own_sds))
-    return visits_used
-
-
-def with_information(stored: Iterable[StoredVisit], visits_used: Iterable[VisitInformation]) -> list[StoredVisit]:
-    """Stored visits with the information of ``visits_used`` in place of their own.
-
-    Parameters
-    ----------
-    stored : iterable of StoredVisit
-    visits_used : iterable of VisitInformation
-        Of all of these visits.
-
-    Returns
-    -------
-    list of StoredVisit
-    """
-    by_group = {(v.visit, g.group): g for v in visits_used for g in v.groups}
-    return [replace(s, groups=tuple(by_group.get((s.visit, g.group), g) for g in s.groups)) for s in stored]
-
-
-def without_findings(stored: Iterable[StoredVisit]) -> list[StoredVisit]:
-    """Stored visits without an open finding: only these change the belief.
-
-    Parameters
-    ----------
-    stored : iterable of StoredVisit
-
-    Returns
-    -------
-    list of StoredVisit
-    """
-    return [s for s in stored if s.answer in USED_ANSWERS]
-
-
-def parameters_of(stored: Iterable[StoredVisit]) -> tuple[StateParameter, ...]:
-    """All parameters of these visits, each once.
-
-    A support that is an outer one at a visit with fewer sensors may change if it is none at another visit. What it
-    absorbs at the first one is among the ``own_sds`` of that visit.
-
-    Parameters
-    ----------
-    stored : iterable of StoredVisit
-
-    Returns
-    -------
-    tuple of StateParameter
-    """
-    by_name: dict[str, StateParameter] = {}
-    for s in stored:
-        for p in s.parameters:
-            known = by_name.setdefault(p.name, p)
-            if (p.may_change, not p.is_beyond_sensors) > (known.may_change, not known.is_beyond_sensors):
-                by_name[p.name] = p
-    return tuple(by_name.values())

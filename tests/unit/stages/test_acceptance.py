@@ -135,7 +135,7 @@ def test_a_diagnosis_does_not_use_effects_that_were_accepted_on_the_other_route(
     already_accepted = [
         AcceptedEffect("local_pad", {"sleeper": 18.0}, {}, route) for route in ("main", "", "diverging")
     ]
-    description = {"visit": "2026-07-25", "identity": "one", "notes": [], "changes": ()}
+    description = {"visit": "2026-07-25", "identity": "one", "notes": [], "changes": (), "every_group": []}
     options = mismatch.Options(fits=tmp_path)
     rows = mismatch._diagnose_group(
         Group(("B",), "diverging", None), turnout, already_accepted, description, options, (0, 1)

@@ -27,7 +27,7 @@ from turnout.mismatch.turnout.further_passages import names_beyond, with_reserve
 from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
-from turnout.stages import mismatch, mismatch_results
+from turnout.stages import mismatch, mismatch_results, visit_fits
 from turnout.stages.mismatch_groups import groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_results import diagnose_turnout
@@ -244,6 +244,67 @@ def test_a_visit_with_a_finding_is_fitted_later_with_the_same_result_as_at_once(
         np.testing.assert_allclose(group.matrix, of_expected.matrix, rtol=1e-9)
         np.testing.assert_allclose(group.vector, of_expected.vector, rtol=1e-9)
     assert calibrated.calibrate_turnout("t1").computed == ()
+
+
+def states_of(tables):
+    return {r["parameter"]: (r["value"], r["sd"], r["n_visits"], r["n_recordings"]) for r in tables["twin_states"]}
+
+
+def test_a_diagnosis_of_chosen_sections_or_of_all_visits_is_no_visit_of_the_model(turnout, model):
+    """Formerly, the recordings of one section counted twice, or those of the other not at all."""
+    shutil.copytree(model[1], "work")
+    for visit, sections in ((DAYS[1], ("A",)), ("all", ())):
+        assert diagnose_turnout("t1", visit=visit, sections=sections)["twin_states"] == []
+        again = calibrated.calibrate_turnout("t1")
+        assert again.computed == () and again.history.belief.mean.tobytes() == model[0].history.belief.mean.tobytes()
+    shutil.rmtree("work")
+    diagnose_turnout("t1", visit=DAYS[1], sections=("A",))
+    fresh = calibrated.calibrate_turnout("t1")
+    assert fresh.history.belief.mean.tobytes() == model[0].history.belief.mean.tobytes()
+    assert [s.n_recordings for s in fresh.history.steps] == [4, 2, 2, 2]
+
+
+def test_the_state_after_a_visit_is_that_of_the_recordings_and_the_recorded_work_of_now(turnout):
+    """Bit by bit: a withdrawn visit or section, and work that is entered later, are as if it had always been so."""
+
+    def after(visit, work):
+        return states_of(diagnose_turnout("t1", visit=visit, work=work))
+
+    shutil.rmtree("raw/t1/passages")
+    for day in DAYS[:3]:
+        states = after(day, "work")
+    assert states["pad@18.00"][2:] == (3, 6) and after(DAYS[2], "work") == states  # from the stored rows
+    shutil.rmtree(Path("raw/t1/hammer") / DAYS[1])
+    after(DAYS[0], "never")
+    never = after(DAYS[2], "never")
+    assert never["pad@18.00"][2:] == (2, 4) and after(DAYS[2], "work") == never
+    write_events(f"t1,A,{DAYS[1]},tamping,,\n")
+    shutil.copytree("never/mismatch-fits", "fresh/mismatch-fits")
+    shutil.copytree("never/calibrated-model", "fresh/calibrated-model")
+    tamped = after(DAYS[2], "work")
+    assert tamped == after(DAYS[2], "fresh") and tamped["ballast@18.00"][1] > never["ballast@18.00"][1]
+    write_events("")
+    for path in Path("raw/t1/hammer").rglob("*.h5"):
+        path.touch()  # a copied folder
+    assert after(DAYS[2], "work") == never
+    (Path("raw/t1/hammer") / DAYS[0] / "B_1.h5").unlink()
+    assert after(DAYS[2], "work")["pad@18.00"][2:] == (1, 2)  # the first visit is not diagnosed as it is now
+    after(DAYS[0], "work")
+    assert after(DAYS[2], "work")["pad@18.00"][2:] == (2, 3)
+
+
+def test_the_reason_why_a_visit_cannot_be_fitted_is_stated_by_every_call(turnout, model, monkeypatch):
+    shutil.copytree(model[1], "work")
+    for path in Path("work/calibrated-model/t1").glob(f"{DAYS[1]}*"):
+        path.unlink()
+    with monkeypatch.context() as broken:
+        broken.setattr(visit_fits, "TrackCase", MagicMock(side_effect=SimulationError("the wheel leaves the track")))
+        first = calibrated.calibrate_turnout("t1")
+    again = calibrated.calibrate_turnout("t1")
+    assert (first.computed, again.computed) == ((DAYS[1],), ())
+    for of_call in (first, again):
+        assert [s.visit for s in of_call.history.steps] == [DAYS[0], *DAYS[2:]]
+        assert of_call.notes == (f"visit {DAYS[1]}: sections A, B: the wheel leaves the track",)
 
 
 def test_maintenance_makes_the_affected_parameters_uncertain(turnout):

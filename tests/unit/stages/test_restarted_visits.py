@@ -13,10 +13,11 @@ from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
-from turnout.stages import calibrated_model
 from turnout.stages import restarted_visits as restarted
+from turnout.stages import visit_fits
 from turnout.stages.agreeing_visits import FittedGroup, KeyedInformation
 from turnout.stages.restarted_visits import restarted_visits
+from turnout.stages.visit_fits import VisitFits
 
 ERROR = 0.1
 FILE, OWN = 0.0, 1.0  # where fits begin: from 0 they end at the maximum of the cosine at 0.03 if the length is 1.3
@@ -125,9 +126,9 @@ def test_stored_fits_are_used_until_an_earlier_visit_changes(history, tmp_path):
 
 def test_what_could_not_be_fitted_is_stated_once_and_not_for_a_second_fit_of_a_visit(monkeypatch):
     reasons = iter((["layout"], ["layout", "the wheel leaves the track"], ["the second fit ends in an error"]))
-    monkeypatch.setattr(calibrated_model, "_fit_visit", lambda *_: ([], next(reasons)))
+    monkeypatch.setattr(visit_fits, "_fit_visit", lambda *_: ([], next(reasons)))
     files = {"units": {"v": ()}, "versions": {"v": {}}, "answers": {}, "raw_root": "", "work": "", "track": None}
-    fits = calibrated_model._VisitFits(SimpleNamespace(id="t1"), Path(), **files, without=(), notes=[])
+    fits = VisitFits(SimpleNamespace(id="t1"), Path(), **files, without=(), notes=[])
     fits.fit_all(["v"])
     fits.of_visit("v")
     fits.from_belief("v", SimpleNamespace())

@@ -9,7 +9,8 @@ import pytest
 from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.turnout import TrackCase
 from turnout.stages import stored_visits
-from turnout.stages.stored_visits import StoredVisit, parameters_of, remove_other_visits, visits_of
+from turnout.stages.combined_visits import complete_visits, parameters_of, visits_of
+from turnout.stages.stored_visits import StoredVisit, remove_other_visits
 
 
 def test_only_files_of_other_visits_of_the_same_turnout_are_removed(tmp_path):
@@ -58,7 +59,7 @@ def test_a_visit_is_fitted_again_with_all_trains_if_the_file_has_a_nose(monkeypa
     monkeypatch.setattr(stored_visits.Search, "of", lambda *_: None)
     turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
     description = {"turnout": turnout, "visit": "2026-01-01", "version": {}}
-    group = SimpleNamespace(labels=("A",), route="main")
+    group = SimpleNamespace(labels=("A",), route="main", neighbours=("A",))
     stored = stored_visits.store_visit(tmp_path, group, case, "", description)
     assert written["groups"] == stored.fit.name == ("again" if expected else "first")
     assert written["levels"] == {"channel A1 in the passages": 0.5}
@@ -79,6 +80,19 @@ def test_a_support_is_an_outer_one_only_at_visits_where_it_is(order):
     assert parameters_of(stored) == (inner, other)
     assert [v.own_sds["pad"] for v in visits_of(stored)] == [roles[role].visit_sd for role in order]
     assert parameters_of(stored[:1]) == (roles[order[0]], other)
+
+
+def test_a_visit_is_complete_with_all_of_its_groups():
+    """A diagnosis that is ended before its last group leaves the others to the calibrated model."""
+    every = {"every_group": ("A, B", "C"), "levels": {}}
+    stored = {
+        name: StoredVisit("2026-01-01", name, "", (), (), (), fitted, neighbours=name, **every)
+        for name, fitted in (("A, B", True), ("C", True))
+    }
+    unfitted = replace(stored["C"], fitted=False)
+    assert complete_visits(stored.values()) == {"2026-01-01"}
+    assert complete_visits([stored["A, B"]]) == complete_visits([stored["A, B"], unfitted]) == set()
+    assert visits_of(stored.values()) == []  # without information there is no visit
 
 
 def test_a_fit_begins_at_the_means_of_a_belief_by_the_names_of_the_turnout(monkeypatch):
@@ -102,7 +116,7 @@ def test_a_fit_begins_at_the_means_of_a_belief_by_the_names_of_the_turnout(monke
     for name, function in replaced.items():
         monkeypatch.setattr(stored_visits, name, function)
     monkeypatch.setattr(stored_visits.Search, "of", lambda *_: None)
-    group = SimpleNamespace(labels=("A",), route="main")
+    group = SimpleNamespace(labels=("A",), route="main", neighbours=("A",))
     belief = SimpleNamespace(names=("gain B7", "pad 3"), mean=np.array([0.7, 0.3]))
     fits = [stored_visits.fit_group(group, case, None, start=start).fit for start in (None, belief)]
     assert begun == [{}, {"a": 0.3}]
