@@ -270,8 +270,11 @@ def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUni
     for turnout, members in by_turnout.items():
         notes = {id(p.unit): p.note for p in members}
         model = digest_of_model(configuration.turnout(turnout))
-        for label, units in list(visits(p.unit for p in members).items())[-N_NEWEST_VISITS:]:
-            note = digest([model, *(notes[id(u)] for u in units)])[:16]
+        work = [[e.at.isoformat(), e.kind, e.section, e.resets] for e in configuration.events if e.turnout == turnout]
+        by_visit = visits(p.unit for p in members)
+        for label, units in list(by_visit.items())[-N_NEWEST_VISITS:]:
+            earlier = sorted(f for visit, of in by_visit.items() if visit < label for u in of for f in u.files)
+            note = digest([model, work, earlier, *(notes[id(u)] for u in units)])[:16]
             yield PlannedUnit(unit_of(turnout, label, units, hashes[turnout].get("mismatch", "")), note)
 
 

@@ -1,5 +1,6 @@
 """The calibrated model of a small turnout from its files: the joint result of visits, and repeated computations."""
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -28,7 +29,7 @@ from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages import mismatch, mismatch_results, visit_fits
-from turnout.stages.mismatch_groups import groups, visits
+from turnout.stages.mismatch_groups import every_visit, groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_results import diagnose_turnout
 from turnout.stages.recorded_work import events_of
@@ -291,6 +292,28 @@ def test_the_state_after_a_visit_is_that_of_the_recordings_and_the_recorded_work
     assert after(DAYS[2], "work")["pad@18.00"][2:] == (1, 2)  # the first visit is not diagnosed as it is now
     after(DAYS[0], "work")
     assert after(DAYS[2], "work")["pad@18.00"][2:] == (2, 3)
+
+
+def test_recorded_work_and_files_of_earlier_visits_start_the_diagnosis_of_the_newest_visit_again(turnout):
+    """Its states rest on them. Work on other turnouts does not matter."""
+    files = [[f"hammer/{day}/A_1.h5", 100, 1] for day in DAYS[:2]]
+    units = [["hammer", f"A/{day}", "A", day, "", [file]] for day, file in zip(DAYS, files)]
+    entry = {"turnout": "t1", "raw": "t1", "units": units, "hashes": {"hammer": "h", "mismatch": "m"}}
+
+    def planned():
+        Path("plan.json").write_text(json.dumps({"turnouts": [entry]}))
+        (unit,) = every_visit(Path("plan.json"), load_configuration("config"))
+        return unit
+
+    first = planned()
+    assert first.unit.label == DAYS[1] and planned() == first
+    write_events("t2,,2025-09-01,tamping,,\n")
+    assert planned() == first
+    write_events("t1,,2025-09-01,tamping,,\n")
+    worked = planned()
+    assert worked.unit == first.unit and worked.note != first.note
+    files[0][2] = 2  # corrected
+    assert planned().unit == first.unit and planned().note not in (first.note, worked.note)
 
 
 def test_the_reason_why_a_visit_cannot_be_fitted_is_stated_by_every_call(turnout, model, monkeypatch):
