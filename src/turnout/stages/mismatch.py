@@ -157,17 +157,18 @@ def diagnose_visit(
     every = groups(turnout, track, replace(inputs, notes=[])) if options.sections else members
     is_visit = set(visits(units)) <= {unit.label}
     about["every_group"] = [", ".join(g.neighbours) for g in every] if is_visit else []
+    diagnosed: list[tuple[Group, dict[str, list[dict]]]] = []
     for k, group in enumerate(members):
         try:
-            group_tables = _diagnose_group(group, turnout, accepted, about, options, (k, len(members)))
+            diagnosed.append((group, _diagnose_group(group, turnout, accepted, about, options, (k, len(members)))))
         except BudgetSpentError:
             reason = BUDGET_SPENT.format(k, len(members))
             unfinished = [_undiagnosed_row(unit, turnout, reason, g, BUDGET_REMEDY) for g in members[k:]]
+            _add_rows(rows, diagnosed, about, options)
             raise BudgetSpentError(
                 k, len(members), _sort_by_severity(rows | {"quarantine": rows["quarantine"] + unfinished})
             ) from None
-        for table, group_rows in group_tables.items():
-            rows[table] += group_rows
+    _add_rows(rows, diagnosed, about, options)
     if not members:
         reasons = "; ".join(map(str, inputs.notes)) or "neither a hammer test nor a passage"
         rows["quarantine"].append(_undiagnosed_row(unit, turnout, f"no section can be diagnosed: {reasons}"[:1000]))
@@ -198,9 +199,9 @@ def _diagnose_group(
     name = f"{turnout.id}-{about['visit']}-{'+'.join(group.labels)}"
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
     folder = stored_visits.folder_of(options.fits)
-    is_in_model = ", ".join(group.neighbours) in about["every_group"]
+    is_in_model = _is_in_model(group, about)
     if "rows" in store and (not is_in_model or stored_visits.is_stored(folder, group, about)):
-        return _with_states(store["rows"], folder, turnout, group, about, is_in_model)
+        return store["rows"]
     replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
     report_progress = options.progress(group, *number) if options.progress else None
     try:
@@ -226,21 +227,33 @@ def _diagnose_group(
     replay.discard()
     store.discard()
     store["rows"] = rows
-    return _with_states(rows, folder, turnout, group, about, is_in_model)
+    return rows
 
 
-def _with_states(
-    rows: Mapping[str, list[dict]],
-    folder: Path,
-    turnout: TurnoutConfig,
-    group: Group,
+def _add_rows(
+    rows: dict[str, list[dict]],
+    diagnosed: Sequence[tuple[Group, dict[str, list[dict]]]],
     about: Mapping[str, Any],
-    is_in_model: bool,
-) -> dict[str, list[dict]]:
-    """Rows of a group with those of the calibrated model, which other visits and recorded work may change."""
-    if not is_in_model:
-        return {**rows}
-    return {**rows, "twin_states": state_rows(folder, turnout, group, rows["mismatch_findings"][0], about)}
+    options: Options,
+) -> None:
+    """Add the rows of all groups, and those of the calibrated model: its state rests on all groups of the visit."""
+    folder = stored_visits.folder_of(options.fits)
+    for group, tables in diagnosed:
+        for table, group_rows in tables.items():
+            rows[table] += group_rows
+        findings = tables.get("mismatch_findings", [])
+        if not findings or not _is_in_model(group, about):
+            continue
+        try:
+            rows["twin_states"] += state_rows(folder, about["turnout"], group, findings[0], about)
+        except np.linalg.LinAlgError as error:
+            reason = f"state of the calibrated model, sections {', '.join(group.labels)}: {error}"
+            rows["quarantine"].append(_undiagnosed_row(None, about["turnout"], reason, group))
+
+
+def _is_in_model(group: Group, about: Mapping[str, Any]) -> bool:
+    """Whether the calibrated model has the group: not chosen sections, nor several visits in one case."""
+    return ", ".join(group.neighbours) in about["every_group"]
 
 
 def _earlier_versions(

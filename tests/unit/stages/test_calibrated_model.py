@@ -28,7 +28,7 @@ from turnout.mismatch.turnout.further_passages import names_beyond, with_reserve
 from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
-from turnout.stages import mismatch, mismatch_results, visit_fits
+from turnout.stages import mismatch, mismatch_groups, mismatch_results, visit_fits
 from turnout.stages.mismatch_groups import every_visit, groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.mismatch_results import diagnose_turnout
@@ -292,6 +292,16 @@ def test_the_state_after_a_visit_is_that_of_the_recordings_and_the_recorded_work
     assert after(DAYS[2], "work")["pad@18.00"][2:] == (1, 2)  # the first visit is not diagnosed as it is now
     after(DAYS[0], "work")
     assert after(DAYS[2], "work")["pad@18.00"][2:] == (2, 3)
+
+
+def test_the_state_after_a_visit_rests_on_all_of_its_groups_of_sections(turnout, monkeypatch):
+    """Formerly, the state of the first group did not have the recordings of the second until the next diagnosis."""
+    monkeypatch.setattr(mismatch_groups, "MAX_SECTION_GAP", 0.5)
+    shutil.rmtree("raw/t1/passages")
+    first, again = (diagnose_turnout("t1", visit=DAYS[0]) for _ in range(2))
+    assert {r["sections"] for r in first["mismatch_findings"]} == {"A", "B"}
+    assert {(r["n_visits"], r["n_recordings"]) for r in first["twin_states"]} == {(1, 2)}
+    assert again["twin_states"] == first["twin_states"]
 
 
 def test_recorded_work_and_files_of_earlier_visits_start_the_diagnosis_of_the_newest_visit_again(turnout):
