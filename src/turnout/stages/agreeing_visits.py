@@ -24,7 +24,6 @@ from turnout.mismatch.calibrated import (
     estimate_history,
 )
 from turnout.mismatch.calibrated.constants import CALIBRATION
-from turnout.mismatch.calibrated.levels import TRAINS, kind_of
 from turnout.mismatch.turnout.calibration import visit_groups
 from turnout.mismatch.turnout.relinearization import fit_given_belief
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
@@ -159,12 +158,7 @@ def agreeing_visits(
     n_done = 1
     while True:
         steps = estimate_history(parameters, current, events, repeats_between_visits=False, accepted=None).steps
-        differing = (
-            k
-            for k in range(n_done, len(steps))
-            if not steps[k].innovation.is_expected and any(kind_of(g.group) == TRAINS for g in current[k].groups)
-        )
-        k = next(differing, None)
+        k = next((k for k in range(n_done, len(steps)) if not steps[k].innovation.is_expected), None)
         if k is None:
             return current
         key = key_of(current[k], steps[k].predicted)
