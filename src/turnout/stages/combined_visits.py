@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.calibrated import StateParameter, VisitInformation
-from turnout.stages.stored_visits import USED_ANSWERS
+from turnout.stages.stored_visits import USED_ANSWERS, by_content, read_visits
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
+    from turnout.stages.mismatch_groups import Group
     from turnout.stages.stored_visits import StoredVisit
+
+
+def is_stored(folder: Path, group: Group, about: Mapping[str, Any]) -> bool:
+    """Whether a group of sections is stored at a visit, of these versions.
+
+    Parameters
+    ----------
+    folder, group, about
+        As ``store_visit``.
+
+    Returns
+    -------
+    bool
+    """
+    turnout, visit = about["turnout"], about["visit"]
+    stored = read_visits(folder, turnout.id, by_content({visit: about["version"]}))
+    return any(s.neighbours == ", ".join(group.neighbours) for s in stored)
 
 
 def complete_visits(stored: Iterable[StoredVisit]) -> set[str]:

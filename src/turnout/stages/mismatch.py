@@ -21,6 +21,7 @@ from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
 from turnout.stages.checkpoint import Checkpoint, Replay
+from turnout.stages.combined_visits import is_stored
 from turnout.stages.mismatch_groups import Group, groups, members_of, unit_of, visits
 from turnout.stages.mismatch_inputs import Note, gather_inputs
 from turnout.stages.mismatch_rows import finding_tables
@@ -200,7 +201,7 @@ def _diagnose_group(
     store = Checkpoint(Path(options.fits), name, (about["identity"],))
     folder = stored_visits.folder_of(options.fits)
     is_in_model = _is_in_model(group, about)
-    if "rows" in store and (not is_in_model or stored_visits.is_stored(folder, group, about)):
+    if "rows" in store and (not is_in_model or is_stored(folder, group, about)):
         return store["rows"]
     replay = Replay(Path(options.fits), f"{name}-predictions", (about["identity"],))
     report_progress = options.progress(group, *number) if options.progress else None

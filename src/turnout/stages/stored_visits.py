@@ -333,23 +333,6 @@ def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> P
     return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
 
 
-def is_stored(folder: Path, group: Group, about: Mapping[str, Any]) -> bool:
-    """Whether a group of sections is stored at a visit, of these versions.
-
-    Parameters
-    ----------
-    folder, group, about
-        As ``store_visit``.
-
-    Returns
-    -------
-    bool
-    """
-    turnout, visit = about["turnout"], about["visit"]
-    stored = read_visits(folder, turnout.id, by_content({visit: about["version"]}))
-    return any(s.neighbours == ", ".join(group.neighbours) for s in stored)
-
-
 def remove_other_visits(folder: Path, turnout_id: str, visits: Collection[str]) -> None:
     """Remove the files of all visits of a turnout but these, so that a folder does not grow with each night.
 

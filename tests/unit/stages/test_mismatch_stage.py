@@ -378,7 +378,6 @@ def test_notes_of_a_visit_are_stored_as_text_with_its_information(tmp_path, monk
     monkeypatch.setattr(mismatch, "TrackCase", lambda *_, **__: None)
     monkeypatch.setattr(mismatch, "diagnose", lambda *_: SimpleNamespace(verdict=SimpleNamespace(answer="none")))
     monkeypatch.setattr(mismatch, "finding_tables", lambda *_: {"mismatch_findings": [{}]})
-    monkeypatch.setattr(mismatch, "state_rows", lambda *_: [])
     monkeypatch.setattr(mismatch.stored_visits, "store_visit", lambda *given: kept.update(given[4]))
     description = {
         "visit": "2024-05-07",
@@ -390,8 +389,7 @@ def test_notes_of_a_visit_are_stored_as_text_with_its_information(tmp_path, monk
     group = SimpleNamespace(labels=("A1",), route="main", campaign=None, neighbours=("A1",))
     turnout = SimpleNamespace(id="t1", settings={"mismatch": None})
     options = mismatch.Options(fits=str(tmp_path))
-    rows = mismatch._diagnose_group(group, turnout, (), description, options, (0, 1))
-    assert rows["twin_states"] == []
+    mismatch._diagnose_group(group, turnout, (), description, options, (0, 1))
     assert [list(note) for note in kept["notes"]] == [
         ["2024-05-07", "too short", True],
         ["2024-05-07", "no force", False],
