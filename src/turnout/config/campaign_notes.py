@@ -12,8 +12,8 @@ from turnout.config.csv_table import Cells, TableError, read_csv, row_problem
 from turnout.config.document import Place
 from turnout.config.events import day_problem, parse_utc, time_problem
 from turnout.config.frozen_mapping import Frozen
-from turnout.config.schema import DECIMAL_COMMA, decimal_point_hint
 from turnout.config.turnout import Campaign, TurnoutConfig
+from turnout.config.value_hints import DECIMAL_COMMA, decimal_point_hint
 from turnout.errors import ReadError
 from turnout.number_text import decimal_number
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from turnout.config.document import Place, as_config_errors, compose, place_of_node
 from turnout.config.parameters import KEYS, Entries, Entry, Number, ParameterSet
-from turnout.config.schema import DECIMAL_POINT, decimal_point_hint, suggestion
+from turnout.config.schema import suggestion
+from turnout.config.value_hints import DECIMAL_POINT, decimal_point_hint
 from turnout.number_text import decimal_number
 from turnout.units import PARAMETER_UNITS, parameter_unit
 

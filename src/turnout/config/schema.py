@@ -1,6 +1,5 @@
 """Types of configuration keys, and the check of a tree of YAML against them."""
 
-import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -9,6 +8,13 @@ from typing import Any
 
 from turnout.config.document import Branch, Leaf
 from turnout.config.settings.setting import MAIL_ADDRESSES, MAIL_SENDER, WEB_ADDRESS
+from turnout.config.value_hints import (
+    DECIMAL_POINT,
+    decimal_point_hint,
+    hint_at_other_unit,
+    hint_without_unit,
+    is_in_range,
+)
 from turnout.errors import ConfigError
 from turnout.number_text import decimal_number, number_text
 
@@ -87,9 +93,9 @@ class FleetWideKey:
 Rule = Key | NamedEntries | Group | FleetWideKey
 
 
-# Keys that were renamed, with their present name.
 MAX_PLACES = 3  # of a misplaced key that a message names
 MISSPELT = 0.8  # likeness from which an unknown key is taken for a misspelt one, not for one of another place
+# Keys that were renamed, with their present name.
 FORMER_KEYS = {"softest_blow": "minimum_peak_force", "weakest_blow": "minimum_peak_share"}
 
 
@@ -215,7 +221,7 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
     if not isinstance(value, VALUE_TYPES[key.value_type]) or (isinstance(value, bool) and key.value_type != "flag"):
         hint = ""
         if key.value_type in ("number", "integer") and isinstance(value, str):
-            hint = decimal_point_hint(value) or _hint_without_unit(key, value)
+            hint = decimal_point_hint(value) or hint_without_unit(key, value)
         return quotation(value), f"Write {_expected_text(key)}{hint}"
     if isinstance(value, (int, float)) and not abs(value) < LARGEST_NUMBER:  # nan and inf, too
         return quotation(value), f"Write {_expected_text(key)}"
@@ -227,79 +233,14 @@ def value_problem(key: Key, value: Any) -> tuple[str, str] | None:
         return quotation(value), f"Write {_expected_text(key)}"
     if not isinstance(value, (int, float)):
         return None
-    if _is_in_range(key, value):
+    if is_in_range(key, value):
         return None
-    return quotation(value), f"Write {_expected_text(key)}{_hint_at_other_unit(key, value)}"
+    return quotation(value), f"Write {_expected_text(key)}{hint_at_other_unit(key, value)}"
 
 
 CONTROL_CHARACTER = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")  # of no text; pages and tables cannot show it
-DECIMAL_COMMA = re.compile(r"[+-]?\d+,(?!\d{3}$)\d+")  # three digits may be a mark for thousands
-PLAIN_UNITS = ("m", "s", "N", "Hz", "V")  # which people write with a prefix
-PREFIXES = (("m", 1e-3), ("k", 1e3))
-NUMBER_WITH_UNIT = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)\s*([^\s\d.,]\S*)", re.ASCII)
 LARGEST_NUMBER = 1e300  # beyond it a whole number is no floating-point number
 MAX_QUOTED = 60  # characters of a wrong value that a message quotes
-
-
-def _is_in_range(key: Key, value: float) -> bool:
-    """Whether a number is within the limits of a key."""
-    low = key.minimum is not None and value < key.minimum
-    high = key.maximum is not None and value > key.maximum
-    return not low and not high and (key.above is None or value > key.above)
-
-
-def decimal_point_hint(text: str) -> str:
-    """How a number with a decimal comma has to be written.
-
-    Parameters
-    ----------
-    text : str
-        What was written in place of a number.
-
-    Returns
-    -------
-    str
-        The end of a remedy; "" for other texts.
-
-    Examples
-    --------
-    >>> decimal_point_hint("13,1"), decimal_point_hint("20,000"), decimal_point_hint("fast")
-    (', with a decimal point: 13.1', '', '')
-    """
-    return f", with a decimal point: {text.strip().replace(',', '.')}" if DECIMAL_COMMA.fullmatch(text.strip()) else ""
-
-
-def _hint_without_unit(key: Key, text: str) -> str:
-    """How a number with its unit behind it has to be written, "" for another text."""
-    match = NUMBER_WITH_UNIT.fullmatch(text.strip())
-    if not match:
-        return ""
-    if match[2] == key.unit:
-        return f", without the unit: {match[1]}"
-    factors = {"%": 0.01} if key.unit in ("", None, "-", "1") else {prefix + key.unit: f for prefix, f in PREFIXES}
-    value = float(match[1]) * factors.get(match[2], math.nan)
-    return f", without the unit: {value:.9g}" if _is_in_range(key, value) and value == value else ""
-
-
-def _hint_at_other_unit(key: Key, value: float) -> str:
-    """What a number would be if it is in percent or has a prefix before its unit, where that is allowed."""
-    if not value:
-        return ""
-    if (
-        key.unit in ("", None, "-", "1")
-        and key.maximum is not None
-        and key.maximum <= 1.0
-        and _is_in_range(key, value / 100.0)
-    ):
-        return f" ({value:g} % are {value / 100.0:g})"
-    if key.unit in PLAIN_UNITS:
-        for prefix, factor in PREFIXES:
-            if not (prefix == "m" and key.unit == "Hz") and _is_in_range(key, value * factor):
-                return f" ({value:.9g} {prefix}{key.unit} are {value * factor:.9g} {key.unit})"
-    return ""
-
-
-DECIMAL_POINT = "If it belongs to the number before it, write a point in place of the comma, as in 24.6"
 
 
 def typed_value(key: Key, leaf: Leaf) -> Any:
