@@ -268,6 +268,8 @@ def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUni
         by_turnout.setdefault(planned.unit.turnout, []).append(planned)
     hashes = {e["turnout"]: e["hashes"] for e in json.loads(Path(plan).read_text(encoding="utf-8"))["turnouts"]}
     for turnout, members in by_turnout.items():
+        if configuration.is_left_out(turnout):
+            continue
         notes = {id(p.unit): p.note for p in members}
         model = digest_of_model(configuration.turnout(turnout))
         work = [[e.at.isoformat(), e.kind, e.section, e.resets] for e in configuration.events if e.turnout == turnout]

@@ -361,10 +361,12 @@ class _Run:
 
         An empty result withdraws the rows of a unit that was only in quarantine, as there is nothing left to repair. It
         also withdraws those of a unit whose files were moved to other units, as they would count twice. A stage that
-        gathers its own units plans only some of them, so none of its units counts as vanished.
+        gathers its own units plans only some of them, so none of its units counts as vanished. Units of a turnout
+        that is left out for an error in its configuration stay as they are.
         """
         units = self.state.units
-        missing = [name for name in units if name not in wanted]
+        is_left_out = self.tasks.configuration.is_left_out
+        missing = [name for name in units if name not in wanted and not is_left_out(name.split("/", 1)[0])]
         to_withdraw = {name for name in missing if units[name].status == "quarantined"}
         if missing and not self.stage.gather:
             to_withdraw.update(moved_units(units, wanted))

@@ -7,8 +7,9 @@ import sys
 
 import numpy as np
 import pytest
-from length_fleet import CALLS, Fleet
+from length_fleet import CALLS, Fleet, length
 
+from turnout.config import load_configuration
 from turnout.errors import InstallationError, TurnoutError
 from turnout.readers import read
 from turnout.workflow import tasks
@@ -18,6 +19,7 @@ from turnout.workflow.jobs import stage_job
 from turnout.workflow.plan import write_plans
 from turnout.workflow.quality_gate import check_quality, judge
 from turnout.workflow.retries import read_postponed
+from turnout.workflow.shard import run_shard
 from turnout.workflow.state import State, batch_paths, load_state
 from turnout.workflow.tasks import Stage
 
@@ -56,6 +58,19 @@ def test_units_whose_configuration_is_newer_than_the_plan_wait(fleet):
     summary = fleet.run(plan=False)
     assert (summary.processed, summary.stale) == (0, 3)
     assert fleet.run().processed == 3
+
+
+def test_units_of_a_turnout_that_is_left_out_stay_also_if_no_plan_has_them(fleet):
+    fleet.put("t0/2024-05-13/A_1.txt", "damaged")
+    fleet.run()
+    before = fleet.rows()
+    (fleet.folder / "config/overrides").mkdir()
+    (fleet.folder / "config/overrides/t0.yaml").write_text("sections: [")
+    configuration = load_configuration(fleet.folder / "config", leave_out=True)
+    fleet.plan.write_text("")  # truncated: its entries are lost
+    write_plans(configuration, fleet.raw, fleet.plan.parent, 1)
+    run_shard(fleet.plan, fleet.state, Stage("hammer", length, "1"), configuration, fleet.raw)
+    assert len(before["t0/hammer/A/2024-05-13"]["quarantine"]) == 1 and fleet.rows() == before
 
 
 def test_damage_and_faults_are_rows_of_the_quarantine_until_they_are_repaired(fleet):
