@@ -192,6 +192,8 @@ def keep_rows(tables: dict[str, list[dict]], configuration: Configuration, regis
     """
     if not configuration.faulty:
         return
+    for name in KEPT_COLUMNS:  # its new or changed events wait, too: they would stand beside the earlier ones
+        tables[name] = [row for row in tables[name] if not configuration.is_left_out(row["turnout_id"])]
     turnout_ids = {row["turnout_id"] for row in tables["turnouts"]}
     if (registry / GENERATION_FILE).exists():
         with open_registry(registry) as connection:
