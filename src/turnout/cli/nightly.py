@@ -78,8 +78,7 @@ def run(args: argparse.Namespace) -> int:
     add_result(args, asdict(night))
     add_use(args, n_used=0 if night.nothing_usable else 1, n_left_out=len(night.unused))
     print(night)
-    has_ended_well = not night.code or (night.left_out and not night.reason)
-    not_sent = _alert(args.options) if has_ended_well and night.published else 0
+    not_sent = _alert(args.options) if night.has_ended_well and night.published else 0
     return night.code or not_sent
 
 

@@ -72,6 +72,11 @@ class NightReport:
     reason: str = ""
     left_out: tuple[str, ...] = ()
 
+    @property
+    def has_ended_well(self) -> bool:
+        """Whether every job ran, also of a run that left turnouts out."""
+        return self.code == 0 or (self.code == LEFT_OUT_CODE and bool(self.left_out) and not self.reason)
+
     def __str__(self) -> str:
         well = "ok"
         if self.left_out:
@@ -83,7 +88,7 @@ class NightReport:
         outcome = {0: well, EXIT_TIME_LIMIT: "stopped at the time limit"}.get(
             self.code, f"failed with exit code {self.code}"
         )
-        outcome = well if self.left_out and self.code == LEFT_OUT_CODE and not self.reason else outcome
+        outcome = well if self.has_ended_well else outcome
         return (
             f"{outcome}: {self.units} units known, {self.processed} processed, "
             f"{self.quarantined} of these with rows in quarantine, "

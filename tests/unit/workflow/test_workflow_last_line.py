@@ -8,7 +8,7 @@ import pytest
 
 from turnout.registry.job import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
-from turnout.workflow.nightly import nightly
+from turnout.workflow.nightly import NightReport, nightly
 from turnout.workflow.run_report import failure_reason
 
 STATE = """
@@ -123,6 +123,14 @@ def test_a_night_that_left_turnouts_out_is_not_ok_and_its_exit_code_is_1(folder)
     assert "; left out: config/overrides/t2.yaml, line 3, column 5: unknown key 'rat'; in no unit: t1/a.csv" in str(
         night
     )
+
+
+@pytest.mark.parametrize(("code", "why", "well"), [(1, "", True), (124, "", False), (1, "a job died", False)])
+def test_a_night_that_left_turnouts_out_and_did_not_end_has_no_alerts(code, why, well):
+    """As one without an error in its configuration: at the time limit the list may be that of the day before."""
+    night = NightReport(code, 2, 2, 0, 0, published=True, reason=why, left_out=("config/overrides/t2.yaml: an error",))
+    assert night.has_ended_well == well and str(night).startswith("every job ran") == well
+    assert NightReport(0, 2, 2, 0, 0).has_ended_well and not NightReport(124, 2, 2, 0, 0).has_ended_well
 
 
 def damaged_disk(turnout, label, name):
