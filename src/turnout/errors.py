@@ -91,8 +91,8 @@ class PartlyComputed(Exception):
 class ConfigError(TurnoutError):
     """A configuration file contains something that cannot be used.
 
-    ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead. ``turnout`` is the id in the row
-    of a table that has the error, "" where that row has no valid one; None for an error that is in no row.
+    ``place`` is "line 12, column 5" or the key; ``remedy`` is what to write instead. ``turnouts`` are the ids in the
+    rows of a table that have the error, "" for a row without a valid one; none for an error that is in no row.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class ConfigError(TurnoutError):
         What to write instead: a sentence without its full stop.
     """
 
-    turnout: str | None = None
+    turnouts: tuple[str, ...] = ()
 
     def __init__(self, path: PathLike | str, place: str, problem: str, remedy: str):
         super().__init__(f"{path}, {place}: {problem}. {remedy}.")

@@ -122,7 +122,7 @@ def read_events(
 def _note_turnout(cells: Mapping[str, str], errors: Iterable[ConfigError]) -> None:
     """Note in the errors of a row which turnout it is about."""
     for error in errors:
-        error.turnout = cells["turnout"]
+        error.turnouts = (cells["turnout"],)
 
 
 def date_problem(event: Event) -> tuple[str, str] | None:

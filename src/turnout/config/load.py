@@ -22,6 +22,9 @@ from turnout.errors import ConfigError, ConfigErrors
 
 TABLES = ("turnouts.tsv", "events.csv", "acknowledgements.csv")
 
+# Folder -> columns of turnouts.tsv with the names of the files there that a turnout uses
+USERS_OF_FILES = {"layouts": ("layout",), "overrides": ("turnout",), "tracks": ("turnout", "layout")}
+
 
 def load_configuration(
     folder: Path | str = "config",
@@ -180,8 +183,8 @@ class _ConfigurationReader:
     def note_rows(self, errors: Iterable[ConfigError]) -> None:
         """Note which turnouts the errors in rows of a table concern."""
         for error in errors:
-            if error.turnout is not None:
-                self.faulty.setdefault(error.turnout, []).append(error)
+            for turnout in error.turnouts:
+                self.faulty.setdefault(turnout, []).append(error)
 
     def can_leave_out(self, rows: Iterable[Row]) -> bool:
         """Whether every error concerns single turnouts or unused files, and any turnout is left."""
@@ -190,16 +193,20 @@ class _ConfigurationReader:
         return has_rest and all(id(error) in ids_of_errors for error in self.errors)
 
     def note_misnamed(self, rows: Iterable[Row]) -> None:
-        """Note which turnouts the errors in the names of layouts and overrides concern; those of others are unused."""
+        """Note which turnouts the errors in the names of layouts, overrides and tracks concern.
+
+        A layout or override of no turnout is unused. A track of no turnout may be what the files of others extend, so
+        that its error concerns the whole fleet.
+        """
         for error in self.errors:
             path = Path(error.path)
-            if path.parent.name not in ("layouts", "overrides") or not path.parent.parent.name == self.folder.name:
+            folder, key = path.parent.name, file_key(path.stem)
+            if folder not in USERS_OF_FILES or path.parent.parent.name != self.folder.name:
                 continue
-            names = {row.id: row.id if path.parent.name == "overrides" else row.values["layout"] for row in rows}
-            concerned = [turnout for turnout, name in names.items() if file_key(name) == file_key(path.stem)]
+            concerned = [row.id for row in rows if key in (file_key(row.values[of]) for of in USERS_OF_FILES[folder])]
             for turnout in concerned:
                 self.faulty.setdefault(turnout, []).append(error)
-            if not concerned:
+            if not concerned and folder != "tracks":
                 self.unused.append(error)
 
     def check_extensions(self) -> None:

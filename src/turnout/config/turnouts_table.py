@@ -107,38 +107,42 @@ def read_table(path: Path, name: str) -> tuple[list[Row], list[ConfigError]]:
     rows: list[Row] = []
     line_of_id: dict[str, int] = {}
     folders: dict[str, Row] = {}
-    ids: dict[str, str] = {}
+    ids: dict[str, Row] = {}
     for line, text in numbered[1:]:
         n_before = len(errors)
         row, row_errors = _row(text, line, header, name)
         errors += row_errors
         if row_errors:
-            _note_turnout(row, row_errors)
+            _note_turnouts((row,), row_errors)
             continue
+        first = None
         if row.id in line_of_id:
             remedy = f"Give it another id, or remove one of the lines {line_of_id[row.id]} and {line}"
             errors.append(row.place("turnout").error(f"turnout {row.id!r} for the second time", remedy))
         elif (key := file_key(row.id)) in ids:
-            problem = f"turnout {row.id!r} and {ids[key]!r} differ only in capitals: on some file systems one folder"
+            first = ids[key]
+            problem = f"turnout {row.id!r} and {first.id!r} differ only in capitals: on some file systems one folder"
             errors.append(row.place("turnout").error(problem, "Give it another id"))
         elif (folder := file_key(row.raw)) in folders and row.raw != folders[folder].raw:
-            problem = f"raw folders {row.raw!r} and {folders[folder].raw!r} are one folder on some file systems"
+            first = folders[folder]
+            problem = f"raw folders {row.raw!r} and {first.raw!r} are one folder on some file systems"
             errors.append(row.place("raw").error(problem, "Give each turnout its own folder"))
         elif folder in folders:
-            problem = f"raw folder {row.raw!r} is also that of turnout {folders[folder].id!r}"
+            first = folders[folder]
+            problem = f"raw folder {row.raw!r} is also that of turnout {first.id!r}"
             errors.append(row.place("raw").error(problem, "Give each turnout its own folder"))
         else:
-            line_of_id[row.id], folders[folder], ids[key] = line, row, row.id
+            line_of_id[row.id], folders[folder], ids[key] = line, row, row
             rows.append(row)
-        _note_turnout(row, errors[n_before:])
+        _note_turnouts((row, first) if first else (row,), errors[n_before:])
     return rows, errors
 
 
-def _note_turnout(row: Row, errors: Iterable[ConfigError]) -> None:
-    """Note in the errors of a row which turnout it is about."""
-    turnout = str(row.values.get("turnout", ""))
+def _note_turnouts(rows: Iterable[Row], errors: Iterable[ConfigError]) -> None:
+    """Note in the errors of rows which turnouts they are about: of two that contradict each other, both."""
+    ids = [str(row.values.get("turnout", "")) for row in rows]
     for error in errors:
-        error.turnout = turnout if re.fullmatch(ID, turnout) else ""
+        error.turnouts = tuple(turnout if re.fullmatch(ID, turnout) else "" for turnout in ids)
 
 
 def titles_of(line: str) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ EVENTS = "turnout,section,date,kind,resets\nt1,A7,2026-04-02,tamping,\n"
 @pytest.fixture
 def folder(tmp_path):
     folder = tmp_path / "config"
-    for name in ("layouts", "overrides"):
+    for name in ("layouts", "overrides", "tracks"):
         (folder / name).mkdir(parents=True)
     for name in ("main", "other"):
         (folder / "layouts" / f"{name}.yaml").write_text(LAYOUT)
@@ -54,6 +54,14 @@ LEFT_OUT = {
         ["t1", "t2"],
     ),
     "a row for the second time": ("turnouts.tsv", TABLE + "t3\tmain\n", ["t3"]),
+    "the raw folder of a turnout below": (
+        "turnouts.tsv",
+        "turnout\tlayout\traw\nt3\tmain\tt1\nt1\tmain\nt2\tmain\n",
+        ["t1", "t3"],
+    ),
+    "an id in other capitals": ("turnouts.tsv", TABLE + "T3\tmain\n", ["T3", "t3"]),
+    "a track that would not be read": ("tracks/t2.yml", "", ["t2"]),
+    "a track of a layout that would not be read": ("tracks/main.yml", "", ["t1", "t2"]),
     "an id": ("turnouts.tsv", TABLE.replace("t3\t", "t 3\t"), [""]),
     "an event": ("events.csv", EVENTS + "t2,A7,2.4.2026,tamping,\n", ["t2"]),
     "events that contradict each other": ("events.csv", EVENTS + "t1,A7,2026-04-02,tamping,none\n", ["t1"]),
@@ -83,6 +91,7 @@ def test_an_error_leaves_out_only_the_turnouts_that_it_concerns(folder, name, te
         ("config.yaml", "receptance:\n  gate_levl: 0.9\n"),
         ("turnouts.tsv", TABLE.replace("km", "kmm")),
         ("events.csv", EVENTS.replace("resets", "reset")),
+        ("tracks/base.yml", ""),
         ("layouts/main.yaml", "sections: ["),
     ],
 )
