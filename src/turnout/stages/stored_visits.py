@@ -275,18 +275,22 @@ def store_answer(folder: Path, group: Group, case: TrackCase, answer: str, about
     _write_visit(folder, group, calibrated_parameters(case, group.route), answer, about, None)
 
 
-def store_failure(folder: Path, group: Group, words: str, about: Mapping[str, Any]) -> None:
+def store_failure(folder: Path, group: Group, words: str, answer: str, about: Mapping[str, Any]) -> None:
     """Write why a group of sections cannot be fitted at one visit: it counts as fitted, without information.
 
     Parameters
     ----------
-    folder, group, about
+    folder, group
         As ``store_visit``.
     words : str
         The reason, one more of the notes.
+    answer : str
+        Of the diagnosis, "" without one.
+    about : mapping
+        As ``store_visit``.
     """
     notes = [*about.get("notes", ()), (about["visit"], f"sections {', '.join(group.labels)}: {words}", False)]
-    _write_visit(folder, group, {}, "", {**about, "notes": notes}, ())
+    _write_visit(folder, group, {}, answer, {**about, "notes": notes}, ())
 
 
 def _write_visit(

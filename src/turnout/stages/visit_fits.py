@@ -144,5 +144,5 @@ def _fit_visit(
             fitted.append(fit if start else fit.without_jacobian())
         except (SimulationError, np.linalg.LinAlgError) as error:
             if stores:
-                store_failure(folder, group, str(error), {**about, "notes": notes})
+                store_failure(folder, group, str(error), answer or "", {**about, "notes": notes})
     return fitted, [] if usable else summary_of_notes(notes)

@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.turnout import TrackCase
-from turnout.stages import stored_visits
+from turnout.stages import stored_visits, visit_fits
 from turnout.stages.combined_visits import complete_visits, parameters_of, visits_of
-from turnout.stages.stored_visits import StoredVisit, remove_other_visits
+from turnout.stages.stored_visits import StoredVisit, read_visits, remove_other_visits
+from turnout.stages.visit_fits import VisitFits
 
 
 def test_only_files_of_other_visits_of_the_same_turnout_are_removed(tmp_path):
@@ -93,6 +95,33 @@ def test_a_visit_is_complete_with_all_of_its_groups():
     assert complete_visits(stored.values()) == {"2026-01-01"}
     assert complete_visits([stored["A, B"]]) == complete_visits([stored["A, B"], unfitted]) == set()
     assert visits_of(stored.values()) == []  # without information there is no visit
+
+
+def test_a_visit_with_an_open_finding_keeps_it_if_it_cannot_be_fitted(monkeypatch, tmp_path):
+    """`turnout twin` lists it among the visits that it does not use."""
+    group = SimpleNamespace(labels=("A",), route="main", neighbours=("A", "B"), campaign=None)
+    replaced = {
+        "track_of": lambda *_: (None, ()), "mismatch_context": lambda *_, **__: ("", {}),
+        "gather_inputs": lambda *_: SimpleNamespace(notes=[]), "neighbours_of": lambda *_: [("main", ("A", "B"))],
+        "groups": lambda *_: [group],
+    }  # fmt: skip
+    for name, function in replaced.items():
+        monkeypatch.setattr(visit_fits, name, function)
+
+    def no_case(*_, **__):
+        raise SimulationError("the wheel leaves the track")
+
+    monkeypatch.setattr(visit_fits, "TrackCase", no_case)
+    turnout, version = SimpleNamespace(id="t1", settings={"mismatch": None}), {"code": "1"}
+    answers = {("2026-01-01", "A, B"): "named"}
+    paths = {"raw_root": "", "work": "", "track": None}
+    fits = VisitFits(
+        turnout, tmp_path, {"2026-01-01": ()}, {"2026-01-01": version}, answers, **paths, without=(), notes=[]
+    )
+    fits.fit_all(["2026-01-01"])
+    (stored,) = read_visits(tmp_path, "t1", {"2026-01-01": version})
+    assert (stored.answer, stored.groups, stored.neighbours) == ("named", (), "A, B")
+    assert [words for _, words, _ in stored.notes] == ["sections A: the wheel leaves the track"]
 
 
 def test_a_fit_begins_at_the_means_of_a_belief_by_the_names_of_the_turnout(monkeypatch):
