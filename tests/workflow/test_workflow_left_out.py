@@ -5,12 +5,12 @@ import shutil
 import pytest
 import toy_fleet as toy
 
+EVENTS = "turnout,section,date,kind\nT00001,A1,2024-02-01,tamping\nT00000,A1,2024-02-01,tamping\n"
 ERRORS = {
     "an override": ("overrides/T00001.yaml", "sections:\n  A1: {position: x}\n"),
     "an id": ("turnouts.tsv", "turnout\tlayout\tline\nT00000\ttoy\tline 0\nT 00001\ttoy\tline 1\n"),
-    "an event": ("events.csv", "turnout,section,date,kind\nT00001,A1,1.2.2024,tamping\n"),
+    "an event": ("events.csv", EVENTS.replace("T00001,A1,2024-02-01", "T00001,A1,1.2.2024")),
 }
-EVENTS = "turnout,section,date,kind\nT00001,A1,2024-02-01,tamping\n"
 
 
 @pytest.fixture
@@ -44,6 +44,7 @@ def test_a_faulty_turnout_waits_and_has_the_right_rows_after_the_correction(flee
     rows = toy.rows(fleet)
     assert of_turnout(rows, "T00001") == before
     assert len(of_turnout(rows, "T00000")["recordings"]) == 4
+    assert len(of_turnout(rows, "T00000")["events"]) == 1  # also if it is changed that night
     assert [row for row in rows["quarantine"] if "configuration_error" in row and f"config/{name}" in row]
 
     path.write_text(valid) if valid is not None else path.unlink()

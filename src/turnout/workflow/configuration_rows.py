@@ -178,8 +178,8 @@ def _error_row(error: ConfigError, turnout: str | None, reason: str = "not_count
 def keep_rows(tables: dict[str, list[dict]], configuration: Configuration, registry: Path) -> None:
     """Add the rows of turnouts that are left out for an error: those of the registry stay as they are.
 
-    Their errors become rows of the quarantine, of the turnout where the registry knows it. If a row has no valid id,
-    all earlier events stay, too, because it may be one of them.
+    Their errors become rows of the quarantine, of the turnout where the registry knows it. If a row of
+    events.csv has no valid id, all earlier events stay, too, because it may be one of them.
 
     Parameters
     ----------
@@ -214,7 +214,8 @@ def keep_rows(tables: dict[str, list[dict]], configuration: Configuration, regis
 
 def _is_kept(row: Mapping[str, Any], table: str, configuration: Configuration) -> bool:
     """Whether a row of the registry stays although the configuration has none for it now."""
-    return configuration.is_left_out(row["turnout_id"]) or (table == "events" and "" in configuration.faulty)
+    without_id = table == "events" and any(Path(e.path).name == "events.csv" for e in configuration.faulty.get("", ()))
+    return without_id or configuration.is_left_out(row["turnout_id"])
 
 
 def fleet_hash(configuration: Configuration) -> str:
