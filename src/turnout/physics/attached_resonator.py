@@ -62,10 +62,12 @@ class AttachedResonator(PhysicsTerm):
 
     @classmethod
     def hypotheses(cls, site: SupportSite | BaySite) -> Iterator[Hypothesis]:
-        """A light and a heavy mass over this support, or in the middle of this bay, at several frequencies."""
-        beyond = {"beyond": 0.5} if isinstance(site, BaySite) else {}
-        n_scanned = 2 * site.n_sites  # over the supports, and between them
-        yield Hypothesis(STARTS, {"support": site.support, **beyond}, site.where, n_scanned)
+        """A light and a heavy mass over this support, or at this place of the bay, at several frequencies."""
+        if isinstance(site, SupportSite):  # the middles of the bays are tested as well
+            yield Hypothesis(STARTS, {"support": site.support}, site.where, 2 * site.n_sites)
+        else:
+            fixed = {"support": site.support, "beyond": site.share}
+            yield Hypothesis(STARTS, fixed, site.where, site.n_positions * site.n_sites)
 
     def links(self, track: Track) -> Sequence[Link]:
         """Links of an additional degree of freedom at the support."""

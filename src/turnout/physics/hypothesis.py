@@ -71,11 +71,16 @@ class SupportSite:
 
 @dataclass(frozen=True)
 class BaySite:
-    """The middle between a ``support`` and the next one, at ``place`` [m]; ``n_sites`` supports are tested."""
+    """Between a ``support`` and the next one, at ``place`` [m]; ``n_sites`` supports are tested.
+
+    ``share`` of the bay from the support to the place. ``n_positions``: positions in each bay, of which this is one.
+    """
 
     support: int
     place: float
     n_sites: int
+    share: float = 0.5
+    n_positions: int = 2
 
     @property
     def where(self) -> dict[str, object]:

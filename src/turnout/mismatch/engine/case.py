@@ -266,6 +266,19 @@ class Case:
         """
         return ()
 
+    def finer_candidates(self, candidate: Candidate) -> Sequence[Candidate]:
+        """Positions between those of ``candidates`` at which the effect of a leader is tried as well.
+
+        Parameters
+        ----------
+        candidate : Candidate
+
+        Returns
+        -------
+        sequence of Candidate
+        """
+        return ()
+
     def ambiguity(self) -> Ambiguity | None:
         """Something that the recordings show and cannot tell what it is; None by default."""
         return None

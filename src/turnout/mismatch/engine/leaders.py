@@ -133,7 +133,8 @@ def _neighbours(case: Case, candidate: Candidate) -> list[Candidate]:
     """
     if candidate.position is None:
         return []
-    alike = [c for c in case.candidates if c.family == candidate.family and c.position is not None]
+    tested = (*case.candidates, *case.finer_candidates(candidate))
+    alike = [c for c in tested if c.family == candidate.family and c.position is not None]
     alike = [c for c in alike if _differs_in_coordinates(c, candidate)]
     keys = [key for key in SITE_COORDINATES if key in candidate.where]
     coordinates = {key: sorted({c.where[key] for c in (candidate, *alike)}) for key in keys}

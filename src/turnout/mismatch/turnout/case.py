@@ -18,7 +18,7 @@ from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.turnout import sensitivity
 from turnout.mismatch.turnout.accepted_effects import NO_EFFECTS, AcceptedEffect, AcceptedEffects, effects_on
 from turnout.mismatch.turnout.campaign import CampaignInput
-from turnout.mismatch.turnout.candidates.catalogue import distant_starts, is_testable, list_candidates
+from turnout.mismatch.turnout.candidates.catalogue import distant_starts, finer_candidates, is_testable, list_candidates
 from turnout.mismatch.turnout.case_data import CaseData, case_data
 from turnout.mismatch.turnout.channel_lines import line_without_wheel
 from turnout.mismatch.turnout.disturbances import independent_of_trains
@@ -251,6 +251,20 @@ class TrackCase(PredictedCase):
         if not self.fitted_passages():
             return ()
         return self.accepted.without(scan_geometry(*self.with_fixed_effects(fit), self.families))
+
+    def finer_candidates(self, candidate: Candidate) -> tuple[Candidate, ...]:
+        """An effect between supports at every quarter of the bays beside the candidate.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            A leader.
+
+        Returns
+        -------
+        tuple[Candidate, ...]
+        """
+        return finer_candidates(self.data, candidate)
 
     def ambiguity(self) -> Ambiguity | None:
         """The likeliest of impacts of wheels, a line in the level of all passages and one of a channel; else None."""

@@ -7,7 +7,7 @@ mass make the fit worse, and the derivative points the wrong way.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -198,12 +198,38 @@ def _support_sites(data: CaseData) -> Iterator[SupportSite]:
         yield SupportSite(j, place, len(zone.effect_supports), zone.first, zone.last, bool(data.aligned_passages))
 
 
-def _bay_sites(data: CaseData) -> Iterator[BaySite]:
-    """The middles between the supports that are tested."""
+def _bay_sites(data: CaseData, shares: Sequence[float] = (0.5,), n_positions: int = 2) -> Iterator[BaySite]:
+    """Places between the supports that are tested, by their ``shares`` of the bay; by default the middles."""
     zone = data.site.nominal
     positions = zone.turnout.track_of("main").support
     for j, k in pairwise(zone.effect_supports):
-        yield BaySite(j, round(float(0.5 * (positions[j] + positions[k])), 3), len(zone.effect_supports))
+        for share in shares:
+            place = round(float((1.0 - share) * positions[j] + share * positions[k]), 3)
+            yield BaySite(j, place, len(zone.effect_supports), share, n_positions)
+
+
+def finer_candidates(data: CaseData, candidate: Candidate) -> tuple[Candidate, ...]:
+    """The effect of a candidate at a quarter and three quarters of the bays that it lies in or ends.
+
+    Parameters
+    ----------
+    data : CaseData
+        Its track.
+    candidate : Candidate
+        A candidate of ``list_candidates``.
+
+    Returns
+    -------
+    tuple of Candidate
+        None for an effect that is not tested between supports.
+    """
+    effect = physics.effects_by_name().get(candidate.family)
+    if effect is None or BaySite not in effect.site_types or candidate.position is None:
+        return ()
+    ends = np.round(data.site.nominal.turnout.track_of("main").support, 3)  # as positions of candidates
+    sites = _bay_sites(data, (0.25, 0.75), 4)
+    beside = [s for s in sites if ends[s.support] <= candidate.position <= ends[s.support + 1]]
+    return tuple(finer for site in beside for finer in _candidates_at(site, [effect]))
 
 
 def _blade_sites(data: CaseData) -> Iterator[BladeSite]:
