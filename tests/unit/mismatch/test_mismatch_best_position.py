@@ -76,6 +76,27 @@ def test_a_leader_at_another_position_moves_to_the_true_one(start, true):
     assert moved.gain > leader.gain
 
 
+class DentedBetween(Dented):
+    """The bump may lie at every quarter of the bays beside a leader."""
+
+    def finer_candidates(self, candidate):
+        at = candidate.position
+        return [
+            Candidate.of("bump", SIZE, lambda p, x=x: p | {"place": x}, ((1.0,),), {"place": x}, n_scanned=36)
+            for x in np.round(np.arange(at - 0.45, at + 0.5, 0.15), 2)
+            if candidate.family == "bump" and x not in POSITIONS
+        ]
+
+
+@pytest.mark.parametrize("start", [4.2, 5.4])
+def test_a_leader_moves_to_a_position_between_those_of_the_search(start):
+    case = DentedBetween(4.35)
+    base, leader = leader_at(case, start)
+    moved = at_best_position(Search(case), base, leader)
+    assert moved.candidate.where["place"] == 4.35
+    assert moved.estimates[0][0] == pytest.approx(DEPTH, abs=4.0 * moved.estimates[1][0])
+
+
 def test_the_gain_is_that_of_a_fit_which_starts_there():
     case = Dented(4.2)
     base, leader = leader_at(case, 3.0)
