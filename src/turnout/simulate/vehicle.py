@@ -87,7 +87,8 @@ class Vehicle:
                 )
         positions = self.wheel_positions
         if not len(positions) or np.any(np.diff(positions) <= 0.0):
-            raise SimulationError(f"{self.name}: wheels must follow each other, their places are {positions!r}.")
+            stated = ", ".join(f"{x:g}" for x in positions) or "not given"
+            raise SimulationError(f"{self.name}: wheels must follow each other, their positions [m] are {stated}.")
         for quantity in WHEEL_FIELDS:
             value = getattr(self, quantity)
             if isinstance(value, tuple) and len(value) != len(positions):

@@ -27,6 +27,7 @@ ENTRY_METADATA = ("term", "accepted", "finding", "route")
 SINCE = "since"  # key of an entry that is a change of the calibrated model, see ``accepted_changes``
 ROUTES = ("main", "diverging")
 MAX_SUPPORT_DISTANCE = 0.35  # m: positions closer than this are the same support
+SUPPORT_SPACING = 0.6  # m between supports, usual
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,11 @@ class AcceptedEffect:
 
     @property
     def place(self) -> float | None:
-        """Mean position [m], None for an effect without a position."""
+        """Mean position [m], of an effect between supports with the usual spacing; None without a position."""
         positions = [float(self.fixed[name]) for name in (*SUPPORT_KEYS, "place", "start", "end") if name in self.fixed]
-        return sum(positions) / len(positions) if positions else None
+        if not positions:
+            return None
+        return sum(positions) / len(positions) + float(self.fixed.get("beyond", 0.0)) * SUPPORT_SPACING
 
     @property
     def key(self) -> str:

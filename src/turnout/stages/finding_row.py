@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from turnout import physics
+from turnout.stages.accepted_effects import SUPPORT_SPACING
 from turnout.stages.mismatch_text import UNFINISHED, whole_sentence
 from turnout.stages.parameter_text import parameter_estimate
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 MAX_CELL_DISTANCE = 0.3  # m: a cell of the residual closer than this is at the finding
 FALSE_DISCOVERY_RATE = 0.05  # expected share of false ones among the frames reported
-SUPPORT_SPACING = 0.6  # m between supports
 GENERAL_CHECK = "Inspect the track at this position; repeat the measurement after the work"
 FILES_CHECK = "Compare positions in the layout, the track file and the vehicle files with the site"
 OFF_FILE = "strained_value_remains"  # rule of a decision

@@ -226,6 +226,14 @@ def test_the_sentence_of_a_mass_between_two_sleepers_has_its_position(config):
     assert f" at {middle:.1f} m " in effect_in_words(described, row)
 
 
+def test_an_accepted_mass_between_two_sleepers_is_found_again_at_its_position():
+    """It was compared by the sleeper before it, 0.45 m off at three quarters of the bay; 0.35 m is the limit."""
+    accepted = AcceptedEffect("attached_resonator", {"support": 12.0, "beyond": 0.75}, {"mass": (30.0, None)})
+    assert accepted.place == pytest.approx(12.45)
+    assert accepted.is_of("attached_resonator", {"place": 12.45})
+    assert not accepted.is_of("attached_resonator", {"place": 12.0})
+
+
 def own_track(config):
     return load_track("small", folder=config / "tracks").track
 
