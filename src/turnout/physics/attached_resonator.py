@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 SOURCE = "Den Hartog 1934, Mechanical vibrations, ch. 3: the auxiliary mass"
 # [kg, Hz, -]: a light mass on a rail that yields little, and a heavy one that holds it, where its resonance is wider
+NODE_TOLERANCE = 1e-9  # elements within which a position is a node
 STARTS = tuple((mass, f, 0.03) for mass in (15.0, 60.0) for f in np.geomspace(60.0, 800.0, 23))
 
 
@@ -28,7 +29,7 @@ class AttachedResonator(PhysicsTerm):
     r"""A mass on a spring on the rail, over one support or ``beyond`` it by that share of the bay behind it,
     :math:`\Delta K = -\omega^2 m\,(1 + 2i\zeta r)/(1 - r^2 + 2i\zeta r)`, :math:`r = f/f_0`.
 
-    It is attached to the nearest node of the mesh: within an eighth of a bay with four elements in each.
+    Between two nodes of the mesh it moves with their interpolated displacement.
     """
 
     support: int
@@ -75,16 +76,25 @@ class AttachedResonator(PhysicsTerm):
         if self.mass == 0.0:
             return []
         omega, node = 2.0 * np.pi * self.frequency, ("resonator", self.support)
-        spring = ((self._rail_node(track), 1.0), (node, -1.0))
+        spring = (*self._rail_ends(track), (node, -1.0))
         return [
             Link(spring, self.mass * omega**2, 2.0 * self.damping * omega * self.mass, tag="resonator"),
             Link(((node, 1.0),), mass=self.mass, tag="resonator"),
         ]
 
-    def _rail_node(self, track: Track) -> tuple:
-        """Name of the node of the rail that carries it."""
-        steps = round(self.beyond * track.elements_per_bay)
-        return ("rail", self.support, steps) if steps else ("rail", self.support)
+    def _rail_ends(self, track: Track) -> tuple[tuple[tuple, float], ...]:
+        """Names and weights of the one or two nodes of the rail that carry it."""
+        steps = self.beyond * track.elements_per_bay
+        first = int(steps + NODE_TOLERANCE)
+        share = steps - first
+        if share < NODE_TOLERANCE:
+            return ((self._rail_node(first, track), 1.0),)
+        return (self._rail_node(first, track), 1.0 - share), (self._rail_node(first + 1, track), share)
+
+    def _rail_node(self, steps: int, track: Track) -> tuple:
+        """Name of a node of the rail, by its elements from the support."""
+        bays, in_bay = divmod(steps, track.elements_per_bay)
+        return ("rail", self.support + bays, in_bay) if in_bay else ("rail", self.support + bays)
 
     @property
     def supports(self) -> range:
@@ -121,4 +131,4 @@ class AttachedResonator(PhysicsTerm):
 
     def condensed_links(self, track: Track, frequency: np.ndarray) -> list[tuple[tuple, np.ndarray]]:
         """The stiffness of mass and spring at the rail."""
-        return [(((self._rail_node(track), 1.0),), self.dynamic_stiffness(frequency))]
+        return [(self._rail_ends(track), self.dynamic_stiffness(frequency))]

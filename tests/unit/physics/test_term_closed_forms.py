@@ -68,6 +68,20 @@ def test_a_resonator_in_the_middle_of_a_bay_acts_there():
     assert "between sleepers 20 and 21" in term.sentence()
 
 
+@pytest.mark.parametrize("elements", [2, 3, 4, 5])
+@pytest.mark.parametrize("beyond", [0.0, 0.25, 0.5, 0.75])
+def test_a_resonator_anywhere_in_a_bay_is_carried_at_its_position(elements, beyond):
+    """The weights of its nodes add up to 1 and have their centre at its position, on every mesh."""
+    track = TRACK.with_(elements_per_bay=elements)
+    term = physics.AttachedResonator(20, 25.0, 180.0, 0.05, beyond=beyond)
+    ((ends, _),) = term.condensed_links(track, F)
+    places = {name: 20.0 + (name[1] - 20) + (name[2] if len(name) > 2 else 0) / elements for name, _ in ends}
+    assert sum(weight for _, weight in ends) == pytest.approx(1.0, abs=1e-12)
+    assert sum(weight * places[name] for name, weight in ends) == pytest.approx(20.0 + beyond, abs=1e-12)
+    assert len(ends) == (1 if (beyond * elements) % 1 == 0 else 2)
+    assert np.isfinite(receptance(assemble(track, (term,)), F, 12.0, 12.0)).all()
+
+
 def test_both_supports_of_a_bay_carry_half_of_a_mass_that_is_fixed_to_the_rail():
     time = np.arange(0.0, 0.2, 1e-4)
     motion = SupportMotion(1e-4 * np.sin(60.0 * time), np.zeros(time.size), 1e4, 300e6, 90e6)

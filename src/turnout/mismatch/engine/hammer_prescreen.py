@@ -7,7 +7,7 @@ actual errors finds the minimum: smooth errors would accept a resonance at a wro
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -132,8 +132,25 @@ class _Prescreen:
                 gains[s.candidate.key] = self._gain_at_site(group, s, sought_gain)
             likeliest = sorted(best_starts.values(), key=lambda s: -gains[s.candidate.key])
             return [(s.candidate, s.start) for s in likeliest[: self.settings.scouted_places]]
-        likeliest = sorted(best_starts.values(), key=lambda s: -s.gain)[: self.settings.scouted_places]
+        likeliest = peaks_of_promise(best_starts.values())[: self.settings.scouted_places]
         return [(s.candidate, s.start) for s in likeliest if s.gain > self.settings.promise]
+
+    def best_beside(self, fit: PrescreenFit | None, sites: Sequence[Candidate]) -> PrescreenFit | None:
+        """A promising fit, moved to the next of the ``sites`` along the track as long as it gains, from its own sizes.
+
+        A family that the base model absorbs is tried at every site before.
+        """
+        positions = [c.position for c in sites]
+        while fit is not None and sites and fit.gain > self.settings.promise:
+            if fit.candidate.refit.prescreen_group:
+                break
+            at = positions.index(fit.candidate.position)
+            beside = [self.fit(c, fit.psi) for c in (*sites[max(at - 1, 0) : at], *sites[at + 1 : at + 2])]
+            best = max((f for f in beside if f is not None), key=lambda f: f.gain, default=fit)
+            if best.gain <= fit.gain:
+                break
+            fit = best
+        return fit
 
     def _best_of_track(self, ranked: Sequence[_Start]) -> tuple[Candidate, np.ndarray]:
         """The best of the most promising starts of a family of the whole track."""
@@ -169,6 +186,30 @@ class _Prescreen:
         return 0.5 * (self.broad_fit.cost - cost)
 
 
+def sites_along_track(starts: Iterable[_Start]) -> list[Candidate]:
+    """The candidates of a family that is tested at positions alone, from one end of the track to the other; else []."""
+    sites = {s.candidate.key: s.candidate for s in starts}
+    if any(c.position is None or not set(c.where) <= {"place", "sleeper"} for c in sites.values()):
+        return []
+    return sorted(sites.values(), key=lambda c: c.position or 0.0)
+
+
+def peaks_of_promise(starts: Iterable[_Start]) -> list[_Start]:
+    """The best start of every site that promises no less than both of its neighbours along the track, the best first.
+
+    Sites beside a peak are reached from it. Of a family that is not tested at positions alone all sites are kept.
+    """
+    starts = list(starts)
+    sites = sites_along_track(starts)
+    if not sites:
+        return sorted(starts, key=lambda s: -s.gain)
+    by_key = {s.candidate.key: s for s in starts}
+    ordered = [by_key[c.key] for c in sites]
+    gains = np.array([-np.inf, *(s.gain for s in ordered), -np.inf])
+    peaks = [s for s, before, behind in zip(ordered, gains[:-2], gains[2:]) if s.gain >= max(before, behind)]
+    return sorted(peaks, key=lambda s: -s.gain)
+
+
 def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None) -> list[PrescreenFit]:
     """Fits at the best site of every family that the hammer tests show on top of ``fit``.
 
@@ -201,7 +242,8 @@ def prescreen(search: Search, fit: Fit, families: Collection[str] | None = None)
         if families is not None and family not in families:
             continue
         fits = [step.fit(candidate, start) for candidate, start in step.likeliest_starts(starts)]
-        successful = [f for f in fits if f is not None]
+        sites = sites_along_track(starts)
+        successful = [f for f in (step.best_beside(f, sites) for f in fits) if f is not None]
         if successful:
             best_fits.append(max(successful, key=lambda f: f.gain))
     best_fits.sort(key=lambda f: -f.gain)
