@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SOURCE = "Den Hartog 1934, Mechanical vibrations, ch. 3: the auxiliary mass"
 # [kg, Hz, -]: a light mass on a rail that yields little, and a heavy one that holds it, where its resonance is wider
-FREQUENCY_ERROR = 0.02  # a mass between two tested positions, on supports that are not quite where the file has them
+FREQUENCY_ERROR = 0.02  # a mass between two tested positions; docs/decisions/marginalized-errors.md
 NODE_TOLERANCE = 1e-9  # elements within which a position is a node
 STARTS = tuple((mass, f, 0.03) for mass in (15.0, 60.0) for f in np.geomspace(60.0, 800.0, 23))
 

@@ -3,24 +3,13 @@
 import os
 
 import pytest
+from tests.unit.config.one_section import LAYOUT
 
 from turnout.cli.main import main
 from turnout.config import load_configuration
 from turnout.config.document import load
 from turnout.config.schema import Key, suggestion, value_problem
 from turnout.errors import ConfigError, ConfigErrors
-
-LAYOUT = """\
-sections:
-  A7: {panel: CP, track: main, position: 24.6}
-hammer:
-  files: "hammer/{campaign}/{section}_{test}.{ext}"
-  force: force
-  response: rail
-  channels:
-    force: {source: force, quantity: force, unit: N}
-    rail: {source: rail, quantity: acceleration, unit: m/s²}
-"""
 
 
 @pytest.fixture

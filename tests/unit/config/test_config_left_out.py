@@ -1,23 +1,13 @@
 """An error in the configuration of one turnout leaves that turnout out of the nightly run, and no other."""
 
 import pytest
+from tests.unit.config.one_section import LAYOUT
 
 from turnout.config import load_configuration
 from turnout.errors import ConfigError, ConfigErrors
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 
-LAYOUT = """\
-sections:
-  A7: {panel: CP, track: main, position: 24.6}
-hammer:
-  files: "hammer/{campaign}/{section}_{test}.{ext}"
-  force: force
-  response: rail
-  channels:
-    force: {source: force, quantity: force, unit: N}
-    rail: {source: rail, quantity: acceleration, unit: m/s²}
-"""
 TABLE = "turnout\tlayout\tkm\thammer_rate_hz\nt1\tmain\t1.5\t\nt2\tmain\t2\t\nt3\tother\t3\t\n"
 EVENTS = "turnout,section,date,kind,resets\nt1,A7,2026-04-02,tamping,\n"
 

@@ -82,6 +82,29 @@ def test_a_resonator_anywhere_in_a_bay_is_carried_at_its_position(elements, beyo
     assert np.isfinite(receptance(assemble(track, (term,)), F, 12.0, 12.0)).all()
 
 
+@pytest.mark.parametrize("beyond", [0.0, 0.25])
+def test_the_stated_error_of_a_frequency_covers_a_mass_between_two_tested_positions(beyond):
+    """A mass of 70 kg at an eighth of a bay, farthest from the quarters that are tested, fitted at both of these."""
+    track, at = TRACK.with_(elements_per_bay=8), (10.8, 12.0, 13.2)
+    frequency = np.geomspace(80.0, 400.0, 60)
+
+    def responses_of(values, share):
+        term = physics.AttachedResonator(20, *values, beyond=share)
+        matrices = assemble(track, (term,))
+        return np.concatenate([receptance(matrices, frequency, a, b) for a in at for b in at])
+
+    true = responses_of((70.0, 201.0, 0.03), 0.125)
+
+    def residual(values):
+        misfit = (responses_of(values, beyond) - true) / np.abs(true)
+        return np.concatenate([misfit.real, misfit.imag])
+
+    bounds = ([1.0, 50.0, 0.005], [150.0, 800.0, 0.3])
+    fit = least_squares(residual, [70.0, 201.0, 0.03], bounds=bounds, x_scale=[10.0, 10.0, 0.01])
+    (share,) = (p.model_error_share for p in physics.AttachedResonator.parameters if p.name == "frequency")
+    assert 0.001 < abs(fit.x[1] / 201.0 - 1.0) < 1.96 * share
+
+
 def test_both_supports_of_a_bay_carry_half_of_a_mass_that_is_fixed_to_the_rail():
     time = np.arange(0.0, 0.2, 1e-4)
     motion = SupportMotion(1e-4 * np.sin(60.0 * time), np.zeros(time.size), 1e4, 300e6, 90e6)

@@ -1,21 +1,10 @@
 """A turnout without its raw folder, and names of files that would break a line."""
 
 import pytest
+from tests.unit.config.one_section import LAYOUT
 
 from turnout.config import load_configuration
 from turnout.workflow.scan import scan
-
-LAYOUT = """\
-sections:
-  A7: {panel: CP, track: main, position: 24.6}
-hammer:
-  files: "hammer/{campaign}/{section}_{test}.{ext}"
-  force: force
-  response: rail
-  channels:
-    force: {source: force, quantity: force, unit: N}
-    rail: {source: rail, quantity: acceleration, unit: m/s²}
-"""
 
 
 def problems(folder, raw):

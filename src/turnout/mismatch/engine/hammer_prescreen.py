@@ -140,10 +140,10 @@ class _Prescreen:
 
         A family that the base model absorbs is tried at every site before.
         """
+        if fit is None or not sites or fit.candidate.refit.prescreen_group:
+            return fit
         positions = [c.position for c in sites]
-        while fit is not None and sites and fit.gain > self.settings.promise:
-            if fit.candidate.refit.prescreen_group:
-                break
+        while fit.gain > self.settings.promise:
             at = positions.index(fit.candidate.position)
             beside = [self.fit(c, fit.psi) for c in (*sites[max(at - 1, 0) : at], *sites[at + 1 : at + 2])]
             best = max((f for f in beside if f is not None), key=lambda f: f.gain, default=fit)
