@@ -5,6 +5,8 @@ from turnout.arrow_memory import use_system_allocator
 use_system_allocator()
 
 from turnout.registry.job import register  # noqa: E402
+from turnout.workflow.job_log import job_log  # noqa: E402
 from turnout.workflow.jobs import register_job  # noqa: E402
 
-register_job(register, snakemake.output[0], snakemake.log[0], snakemake.params)
+with job_log(snakemake.log[0]):
+    register_job(register, snakemake.output[0], snakemake.params)

@@ -2,6 +2,10 @@
 
 from turnout.stages.simulate import write_hammer
 from turnout.stages.simulate_request import hammer_request
+from turnout.workflow.job_log import job_log
 
-for path, note in write_hammer(hammer_request(snakemake.input.track, snakemake.output.recording, snakemake.wildcards)):
-    print(path, note)
+with job_log(snakemake.log[0]):
+    for path, note in write_hammer(
+        hammer_request(snakemake.input.track, snakemake.output.recording, snakemake.wildcards)
+    ):
+        print(path, note)

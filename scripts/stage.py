@@ -4,6 +4,8 @@ from turnout.threads import use_one_thread
 
 use_one_thread()
 
+from turnout.workflow.job_log import job_log  # noqa: E402
 from turnout.workflow.jobs import stage_job  # noqa: E402
 
-stage_job(snakemake.input.plan, snakemake.output.done, snakemake.log[0], snakemake.params, snakemake.threads)
+with job_log(snakemake.log[0]):
+    stage_job(snakemake.input.plan, snakemake.output.done, snakemake.params, snakemake.threads)

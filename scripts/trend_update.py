@@ -4,13 +4,11 @@ from turnout.arrow_memory import use_system_allocator
 
 use_system_allocator()
 
-import logging  # noqa: E402
-
 from turnout.stages.trend import trend_job  # noqa: E402
+from turnout.workflow.job_log import job_log  # noqa: E402
 from turnout.workflow.retries import attempt  # noqa: E402
 
-logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
-with attempt("trend", snakemake.params.again):
+with job_log(snakemake.log[0]), attempt("trend", snakemake.params.again):
     configuration, day = snakemake.params.job["configuration"], snakemake.params.day
     rows = trend_job(snakemake.input.registry, snakemake.output.state, configuration, day)["rows"]
     print(f"trend: {', '.join(f'{n} rows of {table}' for table, n in rows.items())}")

@@ -1,14 +1,12 @@
 """Rule worklist: charts, alarms and their diagnoses in; the worklist out."""
 
-import logging
-
 from turnout.stages.worklist import worklist_job
+from turnout.workflow.job_log import job_log
 from turnout.workflow.jobs import touch_after_publication
 from turnout.workflow.retries import attempt
 
-logging.basicConfig(filename=snakemake.log[0], filemode="w", level="INFO", format="%(levelname)s %(message)s")
 generation, params = "results/registry/_generation.json", snakemake.params
-with attempt("worklist", params.again):
+with job_log(snakemake.log[0]), attempt("worklist", params.again):
     with touch_after_publication(generation, [*snakemake.input.done], [snakemake.input.trend, "work/verdict.json"]):
         n = worklist_job(generation, snakemake.output[0], day=params.day)
     print(f"worklist: {n} diagnoses of alarms")

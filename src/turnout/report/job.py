@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from typing import TYPE_CHECKING
@@ -23,9 +24,9 @@ def report_job(
     registry: str | Path,
     pages: str | Path,
     turnouts: Collection[str] | None = None,
-    log: str | Path | None = None,
     threads: int = 1,
     day: str | None = None,
+    progress: bool = True,
 ) -> int:
     """Write the changed pages of a registry.
 
@@ -37,12 +38,12 @@ def report_job(
         Folder of the pages.
     turnouts : collection of str or None
         Ids of turnouts; None: all.
-    log : str, Path or None
-        File that states the number of pages; None: show the progress.
     threads : int
         Number of processes.
     day : str or None
         Day whose state is shown, YYYY-MM-DD; None: today.
+    progress : bool
+        Show the progress.
 
     Returns
     -------
@@ -65,11 +66,10 @@ def report_job(
             _in_processes(registry, pages, content, generation, threads, day)
 
         writer = write_parallel if threads > 1 and n_turnouts > AT_ONCE else None
-        n = write_pages(connection, pages, generation, turnouts or None, log is None, writer, day)
+        n = write_pages(connection, pages, generation, turnouts or None, progress, writer, day)
         write_finding_pages(connection, pages, generation, turnouts or None)
-    if log is not None:
-        with open(log, "w") as file:
-            file.write(f"{n} pages of generation {generation} written, {n_turnouts + 1 - n} had not changed\n")
+    unchanged = n_turnouts + 1 - n
+    logging.getLogger(__name__).info("%d pages of generation %d written, %d had not changed", n, generation, unchanged)
     return n
 
 

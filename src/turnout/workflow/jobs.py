@@ -25,7 +25,7 @@ from turnout.workflow.state import batch_paths, state_of, state_of_mark
 from turnout.workflow.tasks import Stage
 
 
-def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any, threads: int) -> Summary:
+def stage_job(plan: PathLike | str, mark: PathLike | str, params: Any, threads: int) -> Summary:
     """Run one stage of one shard and write its mark; the state file is in the same folder.
 
     Parameters
@@ -34,8 +34,6 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
         Plan file of the shard.
     mark : path-like
         Mark of the shard, the output of the rule.
-    log : any
-        Log file of the job; Snakemake gives a list with one name.
     params : Params
         kind, function, algo, job and, where needed, context and gather.
     threads : int
@@ -53,7 +51,6 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
     TurnoutError
         If the configuration or the state of the shard cannot be used.
     """
-    _log_to(log)
     stage = Stage(params.kind, params.function, params.algo, params.get("context"), params.get("gather"))
     job = params.job
     configuration = usable_configuration(job["configuration"])
@@ -70,7 +67,7 @@ def stage_job(plan: PathLike | str, mark: PathLike | str, log: Any, params: Any,
     return summary
 
 
-def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: Any, params: Any) -> QualityGate:
+def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, params: Any) -> QualityGate:
     """Check the quality of the run.
 
     Parameters
@@ -79,8 +76,6 @@ def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: An
         Marks of all shards of the stages that are judged.
     output : path-like
         File of the judged batches.
-    log : any
-        Log file of the job; Snakemake gives a list with one name.
     params : Params
         job, again.
 
@@ -94,7 +89,6 @@ def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: An
     SystemExit
         With 1 if the run fails.
     """
-    _log_to(log)
     states = [state_of_mark(mark) for mark in marks]
     try:
         with attempt("verdict", params.again):
@@ -109,7 +103,7 @@ def verdict_job(marks: Iterable[PathLike | str], output: PathLike | str, log: An
 MAX_SHARED_SHOWN = 10  # files that are at two turnouts in the log; the registry names all
 
 
-def register_job(register: Callable, generation: PathLike | str, log: Any, params: Any) -> None:
+def register_job(register: Callable, generation: PathLike | str, params: Any) -> None:
     """Register the batches of all shards, including those that take no part in this run.
 
     Before that, units that were moved to a turnout of another shard are withdrawn from the old one. Hammer files that
@@ -121,12 +115,9 @@ def register_job(register: Callable, generation: PathLike | str, log: Any, param
         ``turnout.registry.job.register``, or a function with its arguments.
     generation : path-like
         Generation file of the registry, the output of the rule.
-    log : any
-        Log file of the job; Snakemake gives a list with one name.
     params : Params
         job, stages, shards, configuration, again, damage.
     """
-    _log_to(log)
     configuration = usable_configuration(params.job["configuration"])
     plans = [Path("work/plan") / f"{shard}.json" for shard in params.shards]
     states = [Path("work") / stage / f"{shard}.json" for stage in params.stages for shard in params.shards]
@@ -180,18 +171,6 @@ def touch_after_publication(
         for path in (*read_before, *benchmarks, *marks):
             if path.exists():
                 os.utime(path)
-
-
-def _log_to(log: Any) -> None:
-    """Write messages to the log file of the job, and warnings to the screen, too."""
-    Path(str(log)).parent.mkdir(parents=True, exist_ok=True)
-    form = logging.Formatter("%(levelname)s %(message)s")
-    to_file, to_screen = logging.FileHandler(str(log), mode="w", encoding="utf-8"), logging.StreamHandler(sys.stderr)
-    to_screen.setLevel(logging.WARNING)
-    for handler in (to_file, to_screen):
-        handler.setFormatter(form)
-        logging.getLogger("turnout").addHandler(handler)
-    logging.getLogger("turnout").setLevel(logging.INFO)
 
 
 def _report(what: Any) -> None:

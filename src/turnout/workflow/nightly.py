@@ -19,7 +19,7 @@ from turnout.counts import count_of, first_texts
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
 from turnout.installation import shipped_path
-from turnout.workflow.output_places import require_writable_places
+from turnout.workflow.output_places import nearly_full_disks, require_writable_places
 from turnout.workflow.plan import is_cut_plan, read_plan
 from turnout.workflow.project import profile_folder, snakefile_options, snakemake_environment
 from turnout.workflow.run_report import (
@@ -162,7 +162,8 @@ def _reason(code: int, started: int, quiet: bool) -> str:
         name = signal.Signals(-code).name
         return f"Snakemake was ended by {name}, as by a lack of memory or a person: the next run continues"
     place = "run again without --quiet to see its message" if quiet else "its message stands above"
-    return failure_reason(started) or f"Snakemake stopped before any job: {place}"
+    reason = failure_reason(started) or f"Snakemake stopped before any job: {place}"
+    return "; ".join([reason, *nearly_full_disks()])  # a full disk stores no log either
 
 
 def _require_profile(profile: Path) -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +20,8 @@ FILES = (
     "results/worklist.csv",
 )
 PROBE = bytes(4096)  # one block: a full disk has none left
+LITTLE_SPACE = 100e6  # bytes: the temporary files of a registry of some turnouts already need a part of it
+FEW_FILES = 1000  # of a disk that can have no more: each unit and each batch of a run is a file
 
 
 def require_writable_places(project: Path = Path()) -> None:
@@ -39,6 +42,31 @@ def require_writable_places(project: Path = Path()) -> None:
         _require(project / name, "folder", "Rename or remove it: the run makes a folder there", _write_probe)
     for name in (*LOCKS, *FILES):
         _require(project / name, "file", "Rename or remove it: the run makes a file there", _check_file)
+
+
+def nearly_full_disks(project: Path = Path()) -> list[str]:
+    """Disks of the results, and of temporary files, that have little room left, in words.
+
+    Parameters
+    ----------
+    project : Path
+        Folder of the project.
+
+    Returns
+    -------
+    list of str
+        For each disk one of its folders, and how many bytes or files it can still store.
+    """
+    disks: dict[int, str] = {}
+    for folder in (*(project / name for name in FOLDERS), Path(tempfile.gettempdir())):
+        with suppress(OSError):
+            device, disk = folder.stat().st_dev, os.statvfs(folder)
+            room, sentence = disk.f_bavail * disk.f_frsize, f"the disk of {folder.absolute()} has room for only"
+            if room < LITTLE_SPACE:
+                disks.setdefault(device, f"{sentence} {room / 1e6:.1f} MB")
+            elif disk.f_files and disk.f_favail < FEW_FILES:  # some file systems do not count files
+                disks.setdefault(device, f"{sentence} {disk.f_favail} files")
+    return list(disks.values())
 
 
 def _require(path: Path, entry_type: str, otherwise: str, check: Callable[[Path], None]) -> None:

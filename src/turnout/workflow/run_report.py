@@ -7,6 +7,7 @@ from pathlib import Path
 import duckdb
 
 from turnout.errors import RegistryError
+from turnout.files import changed_at
 from turnout.registry.database import open_registry
 from turnout.registry.generation import GENERATION_FILE
 
@@ -25,9 +26,9 @@ MAX_REASON_LENGTH = 300  # characters of a message in the report
 def failure_reason(since: int = 0) -> str:
     """Reason of a failed run in a few words.
 
-    It is the first failed rule with its log. If only the rule verdict failed, it is the first complaint of the quality
-    gate. If no rule failed, it is the message that stopped the run before any job, or the exception of a traceback.
-    Without either it is the name of the log.
+    It is the first failed rule with its log, and the error that ended its job. If only the rule verdict failed, it is
+    the first complaint of the quality gate. If no rule failed, it is the message that stopped the run before any job,
+    or the exception of a traceback. Without either it is the name of the log.
 
     Parameters
     ----------
@@ -45,8 +46,9 @@ def failure_reason(since: int = 0) -> str:
     jobs = [(rule, log) for rule, log in failed if rule != "verdict"]
     if jobs:
         rule, log = jobs[0]
-        words = f"rule {rule} failed" + (f", see {log}" if log else "")
-        return words + (f" (and {len(failed) - 1} more)" if len(failed) > 1 else "")
+        further_jobs = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
+        place, error = (f", see {log}", _error_in(Path(log), since)) if log else ("", "")
+        return f"rule {rule} failed{place}{further_jobs}{error}"
     if failed:
         return _first_complaint()
     stopped = [match for text in texts if (match := STOP_MESSAGE.search(text))]
@@ -54,6 +56,14 @@ def failure_reason(since: int = 0) -> str:
         return " ".join(stopped[0][1].split())[:MAX_REASON_LENGTH]
     exceptions = [line for text in texts for line in EXCEPTION.findall(text)]
     return exceptions[-1][:MAX_REASON_LENGTH] if exceptions else f"see {written[-1][1]}" if texts else ""
+
+
+def _error_in(log: Path, since: int) -> str:
+    """Exception that ended a job, with a colon before it; "" if its log has none, such as a log of an earlier run."""
+    if not log.exists() or changed_at(log) < since:
+        return ""
+    exceptions = EXCEPTION.findall(log.read_text(encoding="utf-8", errors="replace"))
+    return f": {exceptions[-1][:MAX_REASON_LENGTH]}" if exceptions else ""
 
 
 def _failed_jobs(text: str) -> list[tuple[str, str]]:

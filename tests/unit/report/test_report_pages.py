@@ -23,6 +23,7 @@ from turnout.report.site import write_pages
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.configuration_rows import configuration_rows
+from turnout.workflow.job_log import job_log
 from turnout.workflow.scan import scan, unit_id
 
 DAYS = (date(2024, 5, 13), date(2024, 6, 17))
@@ -217,7 +218,8 @@ def written(folder, action):
 
 def test_a_page_is_written_again_only_if_its_rows_in_the_registry_change(copied):
     folder, registry = copied
-    assert written(folder, lambda: report_job(registry, folder, log=folder / "log")) == []
+    with job_log(folder / "log"):
+        assert written(folder, lambda: report_job(registry, folder, progress=False)) == []
     assert "1 pages of generation" in (folder / "log").read_text()
     event = {"event_id": "e1", "turnout_id": "tommerup_s2", "event_at_utc": "2024-06-01T00:00:00", "kind": "tamping"}
     event |= {"resets_ballast": True, "resets_railpad": False}

@@ -11,7 +11,7 @@ JOBS = {
     "worklist_job(root / '_generation.json', root / 'list.csv')",
     "change without an alarm": "from turnout.stages.change_units import alarmed_groups as groups; "
     "from turnout.stages import change_units as units; units.REGISTRY = root; assert not list(groups(root, None))",
-    "pages": "from turnout.report.job import report_job as job; job(root, root / 'pages', log=root / 'log')",
+    "pages": "from turnout.report.job import report_job as job; job(root, root / 'pages', progress=False)",
 }
 
 

@@ -1,13 +1,18 @@
 """The last line of a nightly run: what can be used, what vanished since the last run, and the reason of a failure."""
 
+import errno
 import json
+import logging
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from turnout.errors import RegistryError
 from turnout.registry.job import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.job_log import job_log
 from turnout.workflow.nightly import NightReport, nightly
 from turnout.workflow.run_report import failure_reason
 
@@ -215,6 +220,41 @@ def test_the_reason_is_the_first_failed_rule_with_its_log(folder):
     write("run", ERROR.format(rule="passage", job=2) + ERROR.format(rule="register", job=4))
     write("then", ERROR.format(rule="verdict", job=1), later=5)
     assert failure_reason() == "rule passage failed, see logs/passage.log (and 2 more)"
+
+
+def test_the_reason_of_a_failed_rule_is_the_error_that_ended_its_job(folder):
+    """Of the log of an earlier run nothing is stated: a job that dies, or a full disk, leaves no other."""
+    with pytest.raises(RegistryError), job_log("logs/register.log"):
+        try:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        except OSError as error:
+            raise RegistryError("work/a.json: it cannot be written") from error
+    write("run", ERROR.format(rule="register", job=4))
+    reason = "rule register failed, see logs/register.log"
+    assert failure_reason() == f"{reason}: turnout.errors.RegistryError: work/a.json: it cannot be written"
+    os.utime("logs/register.log", (1, 1))
+    assert failure_reason(since=2 * 10**9) == reason
+
+
+def test_a_failed_night_states_which_disk_is_nearly_full(folder, monkeypatch):
+    (folder / "snakemake.py").write_text("raise SystemExit(1)")
+    values = {"f_frsize": 4096, "f_bavail": 300, "f_files": 10**6, "f_favail": 10**6}
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(**values))
+    assert str(nightly([], "profiles/default")).endswith(f"; the disk of {folder}/work has room for only 1.2 MB")
+    values |= {"f_bavail": 10**7, "f_favail": 3}
+    assert str(nightly([], "profiles/default")).endswith(f"; the disk of {folder}/work has room for only 3 files")
+    values |= {"f_files": 0, "f_favail": 0}  # this file system does not count its files
+    assert "room" not in str(nightly([], "profiles/default"))
+
+
+def test_the_log_of_a_job_has_its_messages_and_no_later_ones(tmp_path, capsys):
+    log, logger = tmp_path / "logs/job.log", logging.getLogger("turnout.workflow")
+    with job_log(log):
+        logger.info("3 units")
+        logger.warning("a remark")
+    logger.warning("of another job")
+    assert log.read_text() == "INFO 3 units\nWARNING a remark\n"
+    assert capsys.readouterr().err.splitlines()[0] == "WARNING a remark"
 
 
 def test_the_reason_of_a_run_that_stopped_before_any_job_is_its_error(folder):

@@ -375,14 +375,13 @@ def test_a_stage_that_uses_a_damaged_batch_requests_it_again(fleet, monkeypatch)
     (batch,) = batch_paths([fleet.state])
     batch.unlink()
     monkeypatch.chdir(fleet.folder)
-    monkeypatch.setattr("turnout.workflow.jobs._log_to", lambda log: None)
     module = type(sys)("upon_hammer")
     module.models = lambda turnout, settings: ("", list(current_results("work", "hammer", turnout)))
     monkeypatch.setitem(sys.modules, "upon_hammer", module)
     job = {"configuration": "config", "raw": "raw", "only": [], "strict": False}
     params = Params(kind="hammer", function="x:y", algo="1", job=job, context="upon_hammer:models")
     with pytest.raises(DamagedBatch, match="cannot be read"):
-        stage_job("work/plan/00of01.json", "work/passage/00of01.done", "log", params, 1)
+        stage_job("work/plan/00of01.json", "work/passage/00of01.done", params, 1)
     assert read_postponed(fleet.state) == (1, {})
 
 
