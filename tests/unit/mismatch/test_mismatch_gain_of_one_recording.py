@@ -1,6 +1,7 @@
 """A gain in one recording that similar recordings do not have belongs to that recording alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.single_source import REPETITION, single_source
+from turnout.mismatch.engine.single_source import REPETITION, share_without_repetition, single_source
+from turnout.mismatch.turnout.case import TrackCase
 from turnout.physics import Parameter
 
 SIZE = (Parameter("size", "-", 0.0, (-9.0, 9.0), "of a bump", "made up 2026"),)
@@ -153,8 +155,68 @@ class ImpactCampaigns(Days):
 def test_impacts_at_one_position_are_one_observation(gains, gain, alone):
     conditions = [f"{position} {year}" for position in (2.1, 4.2, 9.0) for year in (2025, 2026)]
     by_condition = dict(zip([*conditions, "railcar"], gains))
-    case = ImpactCampaigns(2.1, 4.2, 9.0)
-    assert single_source(Search(case), None, Days((1.0, 1.0, 1.0)).candidates[0], gain, by_condition) == alone
+    case, fit = ImpactCampaigns(2.1, 4.2, 9.0), case_and_fit((1.0, 1.0, 1.0))[1]
+    assert single_source(Search(case), fit, case.candidates[0], gain, by_condition) == alone
+
+
+class ImpactsInSummerAndWinter(ImpactCampaigns):
+    """Impacts at three positions, which the effect changes in the second campaign by this factor of the first."""
+
+    def __init__(self, factor):
+        super().__init__(2.1, 4.2, 9.0)
+        self.factor = factor
+
+    def changes_by_line(self, changes):
+        lines = np.array([2.0, -1.0, np.nan, 3.0])
+        factors = {2025: 1.0, 2026: self.factor}
+        return {f"{x} {year}": factors[year] * lines for x in self.positions for year in (2025, 2026)}
+
+
+@pytest.mark.parametrize(
+    "factor, gain, alone",
+    [
+        (1.0, 30.1, ""), (1.0, 29.9, REPETITION),  # a half of 36 nats does not count: 12.1 and 11.9 remain
+        (-1.0, 12.1, ""),  # with the opposite sign every test counts in full
+        (0.0, 21.1, ""), (0.0, 20.9, REPETITION),  # nothing in the second campaign: a quarter of 36 nats, 9
+    ],
+)  # fmt: skip
+def test_repeated_impacts_count_in_full_so_far_as_the_effect_changes_them_differently(factor, gain, alone):
+    """As an effect of temperature does: an error that is the same at each visit does not imitate the difference."""
+    case, fit = ImpactsInSummerAndWinter(factor), case_and_fit((1.0, 1.0, 1.0))[1]
+    by_condition = {f"{x} {year}": 6.0 for x in (2.1, 4.2, 9.0) for year in (2025, 2026)} | {"railcar": 0.0}
+    assert single_source(Search(case), fit, case.candidates[0], gain, by_condition) == alone
+
+
+def test_lines_of_repeated_tests_that_only_one_of_them_has_do_not_count():
+    assert share_without_repetition(np.array([[1.0, np.nan, 2.0], [1.0, 50.0, 2.0]])) == pytest.approx(0.5, rel=1e-12)
+    assert share_without_repetition(np.array([[np.nan, 1.0], [1.0, np.nan], [1.0, 1.0]])) == 1.0 / 3.0
+    three = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 2.0]])  # mean (2/3, 2/3): 1 - 2 * (8/9) / 6
+    assert share_without_repetition(three) == pytest.approx(1.0 - 16.0 / 54.0, rel=1e-12)
+
+
+def test_changes_of_tests_have_one_place_for_each_channel_and_line():
+    """Channel A2 of the second test has been moved, so it has a place of its own."""
+    seats = {"a": ("A1", 2.1, "rail"), "b": ("A2", 4.2, "rail"), "c": ("A1", 2.1, "rail"), "d": ("A2", 4.8, "rail")}
+    lines = {"a": [0, 2], "b": [1], "c": [2, 3], "d": [1]}
+    pairs = {name: SimpleNamespace(seat=seats[name], lines=np.array(lines[name])) for name in seats}
+    conditions = {"a": "x", "b": "x", "passage": "train", "c": "y", "d": "y"}
+    observations = [SimpleNamespace(name=name, condition=condition) for name, condition in conditions.items()]
+    changes = [np.array(c) for c in ([1.0, 2.0, -1.0, -2.0], [5.0, -5.0], [9.0], [3.0, 4.0, -3.0, -4.0], [7.0, -7.0])]
+    by_condition = TrackCase.changes_by_line(SimpleNamespace(observations=observations, frf_pairs=pairs), changes)
+    assert list(by_condition) == ["x", "y"]
+    first, second = (by_condition[c].reshape(3, 2, -1)[:, :, :4] for c in "xy")
+    nan = np.nan
+    np.testing.assert_array_equal(first[0], [[1.0, nan, 2.0, nan], [-1.0, nan, -2.0, nan]])
+    np.testing.assert_array_equal(first[1, 0], [nan, 5.0, nan, nan])
+    np.testing.assert_array_equal(second[0, 1], [nan, nan, -3.0, -4.0])
+    assert np.all(np.isnan(first[2])) and np.all(np.isnan(second[1])) and second[2, 0, 1] == 7.0
+
+
+@pytest.mark.parametrize("excess, answer", [(0.9, "none"), (1.1, "unknown")])
+def test_a_name_that_rests_on_repeated_impacts_is_no_sign_of_an_effect(excess, answer):
+    """It has less evidence than a name needs, however often the impacts are repeated."""
+    score = Score(Candidate.of("bump", (), lambda p: None, ()), 60.0, 0.0, 1.0, None, {}, single_source=REPETITION)
+    assert judge([score], excess, MismatchSettings()).answer == answer
 
 
 def test_with_two_positions_neither_is_the_single_source():

@@ -319,6 +319,21 @@ class Case:
         """Condition -> position of the impacts [m], for hammer tests."""
         return {}
 
+    def changes_by_line(self, changes: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Changes of hammer tests, one place for each channel and line that any of them has.
+
+        Parameters
+        ----------
+        changes : sequence of (n,) array of float
+            One for each of the ``observations``.
+
+        Returns
+        -------
+        dict of str to (m,) array of float
+            Condition -> changes, nan where a test has no such line.
+        """
+        return {}
+
     def with_updated_errors(self, fit: Fit) -> Case:
         """The same case with errors of its observations as the model of a fit gives them.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.mismatch.engine.single_source import REPETITION
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.number_text import evidence_in_words
 
@@ -153,10 +154,14 @@ class EffectEvidence:
 
     @cached_property
     def shows_nothing(self) -> bool:
-        """Whether no candidate passes, or only a weak one that other conditions contradict, without any excess."""
+        """Whether no candidate passes, or only a weak one that other conditions contradict, without any excess.
+
+        A name that rests on the repetition of impacts is weak: without it, it has not the evidence that a name needs.
+        """
         if not self.has_leader:
             return True
         is_weak = self.leader.gain < THRESHOLDS.weak_gain * self.settings.threshold
+        is_weak = is_weak or self.leader.single_source == REPETITION
         return (self.contradicted or not self.consistent) and is_weak and self.excess <= 1.0
 
     @property

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from turnout.mismatch.engine.candidate import Candidate
+    from turnout.mismatch.engine.case import Case
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
     from turnout.mismatch.engine.search import Search
@@ -39,7 +40,9 @@ def single_source(
     What other impacts lose by the name is a question of its own (``is_contradicted``).
 
     The error of a receptance is that of the model, so it is the same at each visit. Tests that repeat impacts at one
-    position therefore count as one. A name that needs each of them as evidence of its own rests on the repetition.
+    position therefore count as one, so far as the effect changes them alike. Where it differs between them, as an
+    effect of the temperature does, that error cannot imitate the difference. A name that needs each of them as evidence
+    of its own rests on the repetition.
 
     Parameters
     ----------
@@ -56,7 +59,7 @@ def single_source(
     hammer_positions = case.hammer_positions()
     if position := _single_hammer_position(hammer_positions, gain, by_condition, threshold):
         return position
-    if _gain_without_repetition(hammer_positions, gain, by_condition) < threshold <= gain:
+    if _rests_on_repetition(case, fit, candidate, gain, by_condition, threshold):
         return REPETITION
     strongest = max(by_condition, key=lambda c: by_condition[c], default="")
     if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
@@ -95,12 +98,54 @@ def impact_repetitions(hammer_positions: Mapping[str, float]) -> dict[str, int]:
     return {condition: counts[position] for condition, position in hammer_positions.items()}
 
 
-def _gain_without_repetition(
-    hammer_positions: Mapping[str, float], gain: float, by_condition: Mapping[str, float]
-) -> float:
-    """Gain if the tests at each position of impacts count as one, by their mean [nats]."""
+def _rests_on_repetition(
+    case: Case, fit: Fit, candidate: Candidate, gain: float, by_condition: Mapping[str, float], threshold: float
+) -> bool:
+    """Whether the gain is below the threshold if the tests at each position of impacts count as one."""
+    hammer_positions = case.hammer_positions()
     repetitions = impact_repetitions({c: p for c, p in hammer_positions.items() if c in by_condition})
-    return gain - sum((1.0 - 1.0 / n) * by_condition[condition] for condition, n in repetitions.items())
+    shares = {condition: 1.0 / n for condition, n in repetitions.items()}
+    if not _counted_gain(gain, by_condition, shares) < threshold <= gain:
+        return False
+    changes = case.changes_by_line(effect_signature(case, fit, candidate))
+    for position in {hammer_positions[condition] for condition in changes}:
+        repeated = [c for c in changes if hammer_positions[c] == position]
+        share = share_without_repetition(np.array([changes[c] for c in repeated]))
+        shares |= dict.fromkeys(repeated, share)
+    return _counted_gain(gain, by_condition, shares) < threshold
+
+
+def _counted_gain(gain: float, by_condition: Mapping[str, float], shares: Mapping[str, float]) -> float:
+    """The gain if of each repeated test only this share counts [nats]."""
+    return gain - sum((1.0 - share) * by_condition[condition] for condition, share in shares.items())
+
+
+def share_without_repetition(changes: np.ndarray) -> float:
+    r"""Share of the evidence of repeated tests that remains if their error is the same in all of them.
+
+    .. math:: 1 - (n - 1)\, |\bar s|^2 / \sum_k |s_k|^2
+
+    with the change :math:`s_k` of test k and their mean: what they have in common counts once, what differs counts in
+    full.
+
+    Parameters
+    ----------
+    changes : (n, m) array of float
+        Change of each test by the effect, over its error; nan where it has no such line.
+
+    Returns
+    -------
+    float
+        1/n for equal changes, 1 if they cancel each other, and 1/n without a common line.
+
+    Examples
+    --------
+    >>> [share_without_repetition(np.array(rows)) for rows in ([[3.0], [3.0]], [[3.0], [-3.0]], [[3.0], [0.0]])]
+    [0.5, 1.0, 0.75]
+    """
+    n, common = len(changes), changes[:, np.all(np.isfinite(changes), axis=0)]
+    energy = float(np.sum(np.square(common)))
+    return 1.0 - (n - 1) * float(np.sum(np.square(common.mean(axis=0)))) / energy if energy else 1.0 / n
 
 
 def _single_hammer_position(

@@ -30,6 +30,7 @@ from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.mismatch.turnout.prediction import PredictionCache, Predictor, no_cache
 from turnout.mismatch.turnout.predictions import Terms, Values
 from turnout.mismatch.turnout.priors import CASE, SIMULATION
+from turnout.mismatch.turnout.receptance_observation import LINES
 from turnout.mismatch.turnout.unmet_requirements import UnmetRequirement, unmet_requirements
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.mismatch.turnout.wheel_impacts import wheel_impacts
@@ -137,6 +138,27 @@ class TrackCase(PredictedCase):
     def hammer_positions(self) -> dict[str, float]:
         """Condition -> position of the impacts [m], for hammer tests."""
         return {o.condition: self.frf_pairs[o.name].test.place for o in self.observations if o.name in self.frf_pairs}
+
+    def changes_by_line(self, changes: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+        """Changes of hammer tests, one place for each channel and line that any of them has.
+
+        Parameters
+        ----------
+        changes : sequence of (n,) array of float
+            One for each of the ``observations``.
+
+        Returns
+        -------
+        dict of str to (m,) array of float
+            Condition -> changes, nan where a test has no such line.
+        """
+        tests = [(o, change) for o, change in zip(self.observations, changes) if o.name in self.frf_pairs]
+        seats = sorted({self.frf_pairs[o.name].seat for o, _ in tests})
+        by_condition = {o.condition: np.full((len(seats), 2, LINES.size), np.nan) for o, _ in tests}
+        for o, change in tests:
+            pair = self.frf_pairs[o.name]
+            by_condition[o.condition][seats.index(pair.seat)][:, pair.lines] = change.reshape(2, -1)
+        return {condition: lines.ravel() for condition, lines in by_condition.items()}
 
     def fitted_passages(self) -> list[AlignedPassage]:
         """``AlignedPassage`` of each passage that is fitted; reserved passages may not suggest a candidate."""
