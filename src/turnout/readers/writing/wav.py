@@ -58,4 +58,15 @@ def write_raw(
     with soundfile.SoundFile(content, "w", rate, samples.shape[1], subtype, format="WAV") as file:
         file.comment = json.dumps(notes)
         file.write(samples)
+    _clear_time_of_writing(content.getbuffer())
     path.write_bytes(content.getbuffer())
+
+
+def _clear_time_of_writing(content: memoryview) -> None:
+    """Set the time in the chunk of the peaks to 0: equal records give equal files."""
+    position = 12  # behind RIFF, its size and WAVE
+    while content[position : position + 4] not in (b"PEAK", b"data"):
+        size = int.from_bytes(content[position + 4 : position + 8], "little")
+        position += 8 + size + size % 2
+    if content[position : position + 4] == b"PEAK":  # its size, its version, the time
+        content[position + 12 : position + 16] = bytes(4)
