@@ -15,7 +15,7 @@ from turnout.config.settings import parts
 from turnout.config.settings_schema import fill_settings
 from turnout.config.turnout import HammerConfig, PassageConfig, Section
 from turnout.config.turnouts_table import Row
-from turnout.records import RawChannel, RawDescription
+from turnout.records import MID_SPAN, RawChannel, RawDescription
 
 # What each kind of unit uses of a turnout's configuration: sections of the settings, branches of the layout.
 USED_BY_UNIT = {
@@ -125,10 +125,16 @@ def hammer(tree: Branch) -> HammerConfig | None:
         for role, names in roles.items():
             names[label] = values.get(role)
         required = (values["force"], values["response"])
-        of_files = description(values, "hammer", {name: position for name in values["channels"]})
+        at_section = [name for name, channel in values["channels"].items() if not _is_at_mid_span(channel)]
+        of_files = description(values, "hammer", dict.fromkeys(at_section, position))
         descriptions[label] = replace(of_files, required=required)
     roles_by_section = {role: Frozen(names) for role, names in roles.items()}
     return HammerConfig(plain_values(tree["hammer"])["files"], Frozen(descriptions), **roles_by_section)
+
+
+def _is_at_mid_span(channel: dict) -> bool:
+    """Whether the distance of a sensor from its section is half a bay of the track, which the layout does not know."""
+    return "offset" not in channel and MID_SPAN in channel.get("mounting", "")
 
 
 def passages(tree: Branch) -> PassageConfig | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+MID_SPAN = "mid-span"  # in the mounting of a sensor between two sleepers
+
 
 @dataclass(frozen=True)
 class RawChannel:

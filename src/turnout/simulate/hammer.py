@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.records import Recording
+from turnout.records import MID_SPAN, Recording
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.links import terms_on_stretch
 from turnout.simulate.number_checks import check_count, check_number
@@ -19,7 +19,7 @@ from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, Pulse, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
 from turnout.simulate.track import Track
-from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track, supports_within
+from turnout.simulate.turnout_track import TurnoutTrack, half_bay, stretch_of_track, supports_within
 from turnout.simulate.vehicle import lone_wheels
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def hammer_sensors(location: float, spacing: float = 0.6) -> tuple[Sensor, Senso
         Both measure acceleration; their noise, limit and resolution are estimates.
     """
     head = Sensor("acc_1", location, "rail head at sleeper", noise=0.05, limit=5e3, resolution=0.01)
-    return head, replace(head, name="acc_2", place=location + 0.5 * spacing, mounting="rail head mid-span")
+    return head, replace(head, name="acc_2", place=location + 0.5 * spacing, mounting=f"rail head {MID_SPAN}")
 
 
 @overload
@@ -130,7 +130,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     hammer : Hammer
         Mass, tip and speed; by default 5.5 kg with a plastic tip.
     sensors : sequence of Sensor
-        By default ``hammer_sensors(location)``.
+        By default ``hammer_sensors`` at the location and half a bay of the track behind it.
     n_impacts : int
         Number of impacts, each with its own speed and position.
     terms : sequence of Effect
@@ -184,8 +184,8 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     check_number("pretrigger", pretrigger, "s", least=0.0)
     check_number("duration", duration, "s", above=pretrigger)
     hammer, impacts = hammer or Hammer(), []
-    position, _ = resolve_location(track, location)
-    sensors = hammer_sensors(position) if sensors is None else tuple(sensors)
+    position, base = resolve_location(track, location)
+    sensors = hammer_sensors(position, 2.0 * half_bay(base, position)) if sensors is None else tuple(sensors)
     prepared = prepared or prepare_hammer(track, location, terms, rate, substeps, half_length, scheme)
     prepared.check_step(rate, substeps)
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.config.parameters import Number, ParameterSet
 from turnout.errors import SimulationError
+from turnout.records import MID_SPAN
 from turnout.simulate.roughness import roughness
 from turnout.simulate.track import PER_SUPPORT, Track
 from turnout.simulate.wheel_path import PathPart, Surfaces
@@ -164,6 +165,51 @@ class TurnoutTrack:
         """
         tracks = {name: replace(track, **changes) for name, track in self.tracks.items()}
         return replace(self, track=replace(self.track, **changes), tracks=tracks)
+
+
+def half_bay(track: Track, position: float) -> float:
+    """Half the distance of two supports: so far behind its sleeper an accelerometer at mid-span is.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    position : float
+        Position of the sleeper. [m]
+
+    Returns
+    -------
+    float
+        Half the bay from the nearest support towards growing x; at the end of the track half its last bay. [m]
+
+    Examples
+    --------
+    >>> from turnout.simulate.track import uniform_track
+    >>> half_bay(uniform_track(24.0, spacing=0.75), 12.0)
+    0.375
+    """
+    first = min(track.nearest_support(position), track.support.size - 2)
+    return round(0.5 * float(track.support[first + 1] - track.support[first]), 6)
+
+
+def position_by_mounting(track: Track, position: float, mounting: str) -> float:
+    """Position of an accelerometer of a hammer test, if none is stated.
+
+    Parameters
+    ----------
+    track : Track
+        The track.
+    position : float
+        Position of the impacts. [m]
+    mounting : str
+        Where the accelerometer is fixed; ``MID_SPAN`` in it is half a bay behind the impacts.
+
+    Returns
+    -------
+    float
+        Position. [m]
+    """
+    return position + (half_bay(track, position) if MID_SPAN in mounting else 0.0)
 
 
 def supports_within(track: Track, position: float, half_length: float) -> np.ndarray:

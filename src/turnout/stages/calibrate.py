@@ -23,6 +23,7 @@ from turnout.simulate.calibration import Calibration, MeasuredReceptance, calibr
 from turnout.simulate.hammer import resolve_location
 from turnout.simulate.modal_calibration import ModeFit, fit_modes
 from turnout.simulate.parameters import track_path
+from turnout.simulate.turnout_track import position_by_mounting
 from turnout.stages.raw_files import require_file
 from turnout.stages.requested_files import section_of
 from turnout.stages.track_files import track_file
@@ -105,7 +106,7 @@ def calibrate_to_files(
         The turnout has no hammer tests in its layout, or no such section, or the name of a file states another one.
     """
     track = load_track(str(track_name))
-    position, _ = resolve_location(track, section)
+    position, base = resolve_location(track, section)
     paths = [Path(file) for file in files]
     description, force, responses, settings = _channels(section, turnout_id, config, paths)
     recordings, rejected = _recordings(paths, description)
@@ -118,7 +119,7 @@ def calibrate_to_files(
         channel = recordings[0].channels[recordings[0].index(name)]
         response_position = channel.position
         if response_position is None:
-            response_position = position + (0.3 if "mid-span" in channel.mounting else 0.0)
+            response_position = position_by_mounting(base, position, channel.mounting)
         impacts = [i for i in find_impacts(recordings, force, name, settings) if i.accepted]
         if len(impacts) < settings.minimum_impacts:
             raise SimulationError(f"calibration of {section}: {len(impacts)} accepted impacts in channel {name!r}.")

@@ -10,6 +10,7 @@ from turnout.config import Configuration
 from turnout.config.document import Branch
 from turnout.config.settings.passage import PassageSettings
 from turnout.errors import ConfigError, TurnoutError
+from turnout.records import MID_SPAN
 from turnout.simulate import load_track, load_vehicle
 from turnout.simulate.parameters import off_track_errors
 from turnout.simulate.run import Drive
@@ -21,7 +22,7 @@ MAX_OFFSET = 10.0  # m from a section to its sensor: a larger one is in millimet
 MAX_TURNOUT_LENGTH = 500.0  # m between two sections: no turnout is so long
 MAX_POSITION_DIFFERENCE = 0.5  # m: a larger difference between layout and track file is an error
 END_MARGIN = Drive.entry + Drive.margin  # m: closer to an end of the track a train is not completely on it
-MOUNTING_BEGINNINGS, MID_SPAN = ("rail", "sleeper"), "mid-span"  # what the simulation reads of a mounting
+MOUNTING_BEGINNINGS = ("rail", "sleeper")  # what the simulation reads of a mounting, beside MID_SPAN
 QUANTITIES_WITHOUT_POSITION = ("force", "temperature", "ignored")  # channels that need no position
 
 

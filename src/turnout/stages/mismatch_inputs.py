@@ -23,6 +23,7 @@ from turnout.readers import read
 from turnout.reasons import REASONS
 from turnout.records import LongRecording, Recording, Rejection, Unit
 from turnout.signal.cleaning import without_artefacts
+from turnout.simulate.turnout_track import position_by_mounting
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
 from turnout.stages.mismatch_trains import TrainUnknownError, train_of
@@ -36,9 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from turnout.records import RawDescription
-    from turnout.simulate import TurnoutTrack
+    from turnout.simulate import Track, TurnoutTrack
 
-MID_SPAN_OFFSET = 0.3  # m: distance of a "mid-span" accelerometer from the sleeper of the impact
 MAX_CLIPPED_SHARE = 0.002  # share of clipped samples that leaves the band of the diagnosis unchanged
 MAX_SIMILAR_PASSAGES = 16  # similar passages per visit: twice the limit of a case
 UNUSABLE_REASONS = ("clipped", "dead_channel", "not_finite", "sensor_lost", "drop_out", "channels_swapped")
@@ -172,18 +172,18 @@ def _add_test(
     conditions = {} if temperature is None else {"rail_temperature": temperature}
     name = f"{section} {day}"
     force = hammer.force[section]
-    positioned = tuple(_with_positions(r, position) for r in recordings)
+    positioned = tuple(_with_positions(r, position, track.track) for r in recordings)
     receptance_settings = turnout.settings["receptance"]
     inputs.tests.append(HammerInput(name, position, positioned, force, day, conditions, receptance_settings))
     inputs.sections[name] = section
 
 
-def _with_positions(recording: Recording, position: float) -> Recording:
+def _with_positions(recording: Recording, position: float, track: Track) -> Recording:
     """The recording with positions for accelerometers that have none: at the impact, or half a bay further."""
     channels = tuple(
         c
         if c.quantity != "acceleration" or c.position is not None
-        else replace(c, position=position + (MID_SPAN_OFFSET if "mid-span" in c.mounting else 0.0))
+        else replace(c, position=position_by_mounting(track, position, c.mounting))
         for c in recording.channels
     )
     return replace(recording, channels=channels)

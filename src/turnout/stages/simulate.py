@@ -25,7 +25,8 @@ from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
 from turnout.simulate.hammer import ImpactTruth, hammer_sensors, resolve_location
 from turnout.simulate.parameters import track_path
-from turnout.simulate.turnout_track import TurnoutTrack
+from turnout.simulate.track import Track
+from turnout.simulate.turnout_track import TurnoutTrack, half_bay, position_by_mounting
 from turnout.simulate.vehicle import Vehicle
 from turnout.stages.accepted_effects import effects_of, terms_on
 from turnout.stages.simulate_request import (
@@ -97,7 +98,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     position, base = resolve_location(track, section)
     route = track.locations[section][1] if isinstance(section, str) and section in track.locations else "main"
     description = None if turnout is None else section_channels(turnout, section)
-    hammer, sensors = _hammer_channels(description, position)
+    hammer, sensors = _hammer_channels(description, position, base)
     rate = description.rate if description and description.rate else settings.rate
     for test in range(1, request["tests"] + 1):
         recordings, impacts = simulate_hammer(
@@ -267,18 +268,17 @@ def _sensor(channel: RawChannel, position: float) -> Sensor:
     )
 
 
-def _hammer_channels(description: RawDescription | None, position: float) -> tuple[Hammer, tuple[Sensor, ...]]:
+def _hammer_channels(
+    description: RawDescription | None, position: float, track: Track
+) -> tuple[Hammer, tuple[Sensor, ...]]:
     if description is None:
-        return Hammer(), hammer_sensors(position)
+        return Hammer(), hammer_sensors(position, 2.0 * half_bay(track, position))
     force = next((c for c in description.channels if c.quantity == "force"), None)
     if force is None:
         raise SimulationError("the turnout's hammer channels have none of quantity 'force'.")
     responses = [c for c in description.channels if c.quantity in ("acceleration", "velocity", "displacement")]
-    sensors = []
-    for channel in responses:
-        sensor = _sensor(channel, position + (0.3 if "mid-span" in channel.mounting else 0.0))
-        sensors.append(sensor)
-    return Hammer(force=_sensor(force, position)), tuple(sensors)
+    sensors = tuple(_sensor(c, position_by_mounting(track, position, c.mounting)) for c in responses)
+    return Hammer(force=_sensor(force, position)), sensors
 
 
 def _passage_sensors(description: RawDescription | None, track: TurnoutTrack) -> tuple[Sensor, ...]:
