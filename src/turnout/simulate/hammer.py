@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 PLASTIC_TIP = PowerLaw(1.2e9, 1.5, 0.05)
 
 
+MAX_SPREADS = 2.0  # standard deviations that an impact is away from its position, at most
+
 # A 5.5 kg sledge of 0.23 mV/N and 22.2 kN full scale (PCB 086D50, from memory, unverified); noise and step of a
 # 24-bit converter of 5 V behind it are estimates.
 LOAD_CELL = Sensor("hammer", 0.0, "hammer", "force", noise=2.0, limit=22.2e3, resolution=0.7)
@@ -188,6 +190,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     sensors = hammer_sensors(position, 2.0 * half_bay(base, position)) if sensors is None else tuple(sensors)
     prepared = prepared or prepare_hammer(track, location, terms, rate, substeps, half_length, scheme)
     prepared.check_step(rate, substeps)
+    _check_impact_positions(position, hammer, prepared.track)
     rng = np.random.default_rng(seed)
     probes = [actual_sensor(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
     channels = (replace(hammer.force, place=position), *sensors)
@@ -195,7 +198,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     recordings = []
     for record in range(n_impacts):
         velocity = hammer.velocity * np.exp(hammer.velocity_spread * rng.normal())
-        impact_position = position + hammer.position_spread * float(np.clip(rng.normal(), -2.0, 2.0))
+        impact_position = position + hammer.position_spread * float(np.clip(rng.normal(), -MAX_SPREADS, MAX_SPREADS))
         clean = _simulate_impact(prepared, hammer, velocity, impact_position, probes, duration - pretrigger, pulse)
         impacts.append(ImpactTruth(impact_position, float(velocity), float(mean_of(clean[0], substeps).max())))
         pretrigger_zeros = np.zeros((len(channels), round(pretrigger * rate) * substeps))
@@ -298,6 +301,16 @@ def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tupl
         raise SimulationError(f"no section {location!r} in the track file{title}. Write one of {names or 'none'}.")
     position, route = track.locations[location]
     return float(position), track.track_of(route)
+
+
+def _check_impact_positions(position: float, hammer: Hammer, track: Track) -> None:
+    """Reject impacts of which some would miss the rail."""
+    reach = MAX_SPREADS * hammer.position_spread
+    if not track.start <= position - reach <= position + reach <= track.end:
+        raise SimulationError(
+            f"impacts at {position:.3f} m, of which some are {reach:.3f} m away, are not all on the track, which goes "
+            f"from {track.start:.3f} m to {track.end:.3f} m."
+        )
 
 
 def _simulate_impact(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from math import inf, isfinite
 from operator import index
 from typing import Any
@@ -50,6 +51,26 @@ def check_number(
     limits = " and ".join(f"{word} {limit:g}" for word, limit in bounds if isfinite(limit))
     demand = f"{limits} {unit}".rstrip() if limits else f"a finite number{f' in {unit}' if unit else ''}"
     raise SimulationError(f"{title} must be {demand}, got {value!r}.")
+
+
+def check_fields(title: str, record: Any) -> None:
+    """Reject a record with a field of type float that is not a finite number: an infinite length would be no defect.
+
+    Parameters
+    ----------
+    title : str
+        What the record is, the first words of the error.
+    record : dataclass
+        The record.
+
+    Raises
+    ------
+    SimulationError
+        With the field and what was given.
+    """
+    for field in fields(record):
+        if field.type in (float, "float"):
+            check_number(f"{title}: {field.name}", getattr(record, field.name))
 
 
 def check_count(title: str, value: Any, least: int = 1) -> None:

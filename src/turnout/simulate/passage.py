@@ -12,13 +12,14 @@ import numpy as np
 from turnout.errors import SimulationError
 from turnout.records import Recording
 from turnout.simulate.number_checks import check_number
+from turnout.simulate.path_checks import check_path
 from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, run
 from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
-from turnout.simulate.wheel_path import PathPart, check_path
+from turnout.simulate.wheel_path import PathPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -273,7 +274,7 @@ def _drive(
     check_number("duration with lead and tail", distance / speed, "s", below=MAX_DURATION)
     for path_part in irregularities:
         wheel = getattr(path_part, "wheel", None)
-        if wheel is not None and not 0 <= wheel < len(vehicle.wheels):
+        if wheel is not None and wheel not in range(len(vehicle.wheels)):
             raise SimulationError(
                 f"{path_part!r} is on wheel {wheel!r}; {vehicle.name!r} has wheels 0 to {len(vehicle.wheels) - 1}."
             )

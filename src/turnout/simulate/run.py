@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from turnout.simulate.preparation import Prepared
     from turnout.simulate.vehicle import Vehicle
 
+MAX_STEPS = 1e8  # 80 minutes at 20 kHz; a signal needs 0.8 GB
 CLUSTER_CUT = 0.9  # ports closer than this [m] share one Newton system, the others couple by iteration
 
 
@@ -124,6 +125,7 @@ def run(
     """
     check_number("duration", duration, "s", above=0.5 * prepared.dt)
     n_step = round(duration / prepared.dt)
+    check_number("number of time steps", n_step, below=MAX_STEPS)
     if vehicle and drive is None:
         raise SimulationError("a vehicle needs a drive: where it starts, and how fast it is.")
     drive = drive or STANDING

@@ -188,6 +188,11 @@ def couple(name: str, vehicles: Sequence[Vehicle]) -> Vehicle:
     Vehicle
         The train, with the conditions of its first vehicle.
 
+    Raises
+    ------
+    SimulationError
+        For no vehicle, for vehicles that differ in gravity, and where wheels would not follow each other.
+
     Examples
     --------
     >>> from turnout.simulate.vehicle import car
@@ -195,6 +200,10 @@ def couple(name: str, vehicles: Sequence[Vehicle]) -> Vehicle:
     >>> [float(p) for p in two.wheel_positions[:5]]
     [0.0, 2.5, 17.7, 20.2, 26.0]
     """
+    if not vehicles:
+        raise SimulationError(f"{name}: a train of no vehicles.")
+    if len({vehicle.gravity for vehicle in vehicles}) > 1:
+        raise SimulationError(f"{name}: vehicles of one train need the same gravity.")
     bodies: list[Body] = []
     suspensions: list[Suspension] = []
     wheels: list[int] = []
@@ -218,6 +227,7 @@ def couple(name: str, vehicles: Sequence[Vehicle]) -> Vehicle:
             quantity: one_or_all([value for v in vehicles for value in v.wheel_values(quantity)])
             for quantity in WHEEL_FIELDS
         },
+        gravity=lead.gravity,
         extra_links=tuple(links),
         length=end + lead.overhang,
         overhang=lead.overhang,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.simulate.number_checks import check_number
+from turnout.simulate.number_checks import check_fields, check_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -98,7 +98,7 @@ class Dip:
     length: float
 
     def __post_init__(self) -> None:
-        _check_length("dip", self.place, self.length)
+        _check_part("dip", self.place, self.length, self)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         return self.depth * np.exp(-np.abs(np.asarray(x) - self.place) / self.length)
@@ -113,7 +113,7 @@ class Cosine:
     length: float
 
     def __post_init__(self) -> None:
-        _check_length("cosine", self.place, self.length)
+        _check_part("cosine", self.place, self.length, self)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         phase = np.clip((np.asarray(x) - self.place) / self.length, -0.5, 0.5)
@@ -139,7 +139,7 @@ class Kink:
     power: float = 2.0
 
     def __post_init__(self) -> None:
-        _check_length("kink", self.place, self.length)
+        _check_part("kink", self.place, self.length, self)
         if not self.power >= 1.0:
             raise SimulationError(f"kink at {self.place:.3f} m: power {self.power!r} is below 1.")
         if not 0.0 < self.share < 1.0:
@@ -173,6 +173,8 @@ class Sections:
     def __post_init__(self) -> None:
         if len(self.places) != len(self.dips) or len(self.places) < 2 or np.any(np.diff(self.places) <= 0.0):
             raise SimulationError(f"sections: {len(self.places)} places, {len(self.dips)} dips; places must rise.")
+        if not np.all(np.isfinite([*self.places, *self.dips])):
+            raise SimulationError("sections: not all places and dips are numbers.")
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         from scipy.interpolate import PchipInterpolator
@@ -199,7 +201,7 @@ class BladeTop:
     on_blade = True
 
     def __post_init__(self) -> None:
-        _check_length("blade top", self.start, abs(self.length))
+        _check_part("blade top", self.start, abs(self.length), self)
         if not self.power >= 1.0:
             raise SimulationError(f"blade top at {self.start:.3f} m: power {self.power!r} is below 1.")
 
@@ -222,7 +224,7 @@ class StockFall:
     power: float = 2.0
 
     def __post_init__(self) -> None:
-        _check_length("stock rail", self.start, abs(self.length))
+        _check_part("stock rail", self.start, abs(self.length), self)
         if not self.power >= 1.0:
             raise SimulationError(f"stock rail at {self.start:.3f} m: power {self.power!r} is below 1.")
 
@@ -241,7 +243,7 @@ class Corrugation:
     wavelength: float
 
     def __post_init__(self) -> None:
-        _check_length("corrugation", self.start, self.wavelength)
+        _check_part("corrugation", self.start, self.wavelength, self)
         check_number(f"corrugation from {self.start:g} m: end", self.end, "m", above=self.start)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
@@ -271,6 +273,7 @@ class WheelFlat:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(f"flat of wheel {self.wheel}", self)
         check_number(f"flat of wheel {self.wheel}: length", self.length, "m", least=0.0)
         check_number(f"flat of wheel {self.wheel}: radius", self.radius, "m", above=0.0)
 
@@ -303,6 +306,7 @@ class OutOfRound:
     phase: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(f"out-of-round wheel {self.wheel}", self)
         check_number(f"out-of-round wheel {self.wheel}: radius", self.radius, "m", above=0.0)
 
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
@@ -318,47 +322,20 @@ class Sampled:
     step: float
     dip: np.ndarray
 
+    def __post_init__(self) -> None:
+        check_fields("sampled dip", self)
+        check_number("sampled dip: step", self.step, "m", above=0.0)
+        if np.ndim(self.dip) != 1 or np.size(self.dip) < 2:
+            raise SimulationError(f"sampled dip: needs two values or more in a row, got {self.dip!r}.")
+
     def __call__(self, x: ArrayLike, wheel: int = 0) -> np.ndarray:
         return uniform_spline(self.dip, self.start, self.step, x)
 
 
-def _check_length(path_name: str, position: float, length: float) -> None:
+def _check_part(name: str, position: float, length: float, part: PathPart) -> None:
     if not length > 0.0:
-        raise SimulationError(f"{path_name} at {position:.3f} m: a length of {length!r} m is none.")
-
-
-CHECK_STEP = 0.005  # m between the positions that are compared
-MAX_CHECK_JUMP = 1e-3  # m, largest jump between two of them that is not examined further
-
-
-def check_path(path_parts: Sequence[PathPart], start: float, end: float) -> None:
-    """Reject a path with a jump of more than ``MAX_CHECK_JUMP`` that remains on a grid 2000 times finer.
-
-    Parameters
-    ----------
-    path_parts : sequence of path parts
-        Parts of the path, each checked alone.
-    start : float
-        First position. [m]
-    end : float
-        Last position. [m]
-
-    Raises
-    ------
-    SimulationError
-        For a jump, and for a dip that is not a number.
-    """
-    x = np.arange(start, end + CHECK_STEP, CHECK_STEP)
-    for path_part in path_parts:
-        p = path_part(x, 0)
-        jumps = np.abs(np.diff(p))
-        if not np.all(np.isfinite(p)):
-            raise SimulationError(f"path {path_part!r}: not a number at {x[~np.isfinite(p)][0]:.3f} m.")
-        for k in np.flatnonzero(jumps > MAX_CHECK_JUMP)[:50]:
-            fine = np.linspace(x[k], x[k + 1], 2001)
-            jump = np.max(np.abs(np.diff(path_part(fine, 0))))
-            if jump > 0.5 * jumps[k]:
-                raise SimulationError(f"path {path_part!r} jumps by {jump * 1e3:.2f} mm at {x[k]:.3f} m.")
+        raise SimulationError(f"{name} at {position:.3f} m: a length of {length!r} m is none.")
+    check_fields(f"{name} at {position:.3f} m", part)
 
 
 def spline_pieces(path_parts: Sequence[PathPart], wheel: int, start: float, end: float, step: float) -> np.ndarray:

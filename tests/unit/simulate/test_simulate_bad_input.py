@@ -19,12 +19,13 @@ from turnout.simulate import (
 from turnout.simulate.force_laws import PowerLaw, TableLaw
 from turnout.simulate.links import Link
 from turnout.simulate.matrices import assemble
+from turnout.simulate.path_checks import check_path
 from turnout.simulate.preparation import prepare
 from turnout.simulate.run import Drive, Probe, run
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Body, Vehicle, lone_wheels
-from turnout.simulate.wheel_path import Sections, check_path
+from turnout.simulate.wheel_path import Sections
 
 TRACK = uniform_track(24.0)
 SENSOR = [Sensor("A", 12.0)]

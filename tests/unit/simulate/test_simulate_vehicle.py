@@ -115,6 +115,12 @@ def test_wheels_of_a_composed_train_keep_their_radius_and_contact():
     assert load_vehicle("wagon_four_axles", units=2).radius == load_vehicle("wagon_four_axles").radius
 
 
+def test_coupled_vehicles_keep_their_gravity():
+    """Half of it: half of the load on every wheel."""
+    moon = car(length=26.0, overhang=1.9, gravity=0.5 * 9.81)
+    assert couple("two", [moon, moon]).static_loads == pytest.approx(0.5 * car().static_loads[0])
+
+
 def test_coupled_vehicles_keep_the_loads_on_their_wheels():
     light, heavy = (lone_wheels(900.0, (0.0, 2.0), pressing=force, length=5.0) for force in (3e4, 7e4))
     pair = couple("pair", [light, heavy])

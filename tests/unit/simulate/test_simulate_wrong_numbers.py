@@ -13,8 +13,20 @@ from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import run
 from turnout.simulate.track import RailStretch, uniform_track
+from turnout.simulate.train import couple
 from turnout.simulate.vehicle import lone_wheels
-from turnout.simulate.wheel_path import Corrugation, OutOfRound, WheelFlat
+from turnout.simulate.wheel_path import (
+    BladeTop,
+    Corrugation,
+    Cosine,
+    Dip,
+    Kink,
+    OutOfRound,
+    Sampled,
+    Sections,
+    StockFall,
+    WheelFlat,
+)
 
 NAN, INF = float("nan"), float("inf")
 TRACK = uniform_track(24.0)
@@ -87,6 +99,30 @@ def impact(**options):
         (lambda: WheelFlat(0, 0.05, 0.0), "flat of wheel 0: radius must be above 0 m"),
         (lambda: OutOfRound(2, 1e-4, 3, 0.0), "out-of-round wheel 2: radius must be above 0 m"),
         (lambda: Corrugation(20.0, 15.0, 1e-4, 0.1), "corrugation from 20 m: end must be above 20 m, got 15"),
+        (lambda: passage(irregularities=[WheelFlat(0.5, 0.05, 0.43)]), r"wheel 0\.5; 'wheels' has wheels 0 to 0"),
+        (lambda: WheelFlat(0, 0.05, 0.43, NAN), "flat of wheel 0: phase must be a finite number"),
+        (lambda: OutOfRound(0, INF, 3, 0.43), "out-of-round wheel 0: amplitude must be a finite number"),
+        (lambda: Dip(INF, 1e-3, 0.5), "dip at inf m: place must be a finite number"),
+        (lambda: Cosine(12.0, 1e-3, INF), "cosine at 12.000 m: length must be a finite number"),
+        (lambda: Kink(12.0, NAN, 0.5), "kink at 12.000 m: depth must be a finite number"),
+        (lambda: BladeTop(12.0, INF, 1e-2), "blade top at 12.000 m: length must be a finite number"),
+        (lambda: StockFall(12.0, 1.0, 1e-2, INF), "stock rail at 12.000 m: power must be a finite number"),
+        (lambda: Corrugation(11.0, 13.0, 1e-5, INF), "corrugation at 11.000 m: wavelength must be a finite number"),
+        (lambda: Sections((11.0, NAN), (0.0, 0.0)), "sections: not all places and dips are numbers"),
+        (lambda: Sampled(NAN, 0.01, np.zeros(9)), "sampled dip: start must be a finite number"),
+        (lambda: Sampled(11.0, 0.0, np.zeros(9)), "sampled dip: step must be above 0 m"),
+        (lambda: Sampled(11.0, 0.01, 1e-3), "sampled dip: needs two values or more in a row, got 0.001"),
+        (lambda: passage(irregularities=[Corrugation(11.0, 13.0, 2e-5, 0.008)]), "changes too quickly .* 5 mm, misses"),
+        (lambda: passage(irregularities=[WheelFlat(0, 0.01, 0.43)]), "changes too quickly at .* misses 40%"),
+        (lambda: impact(duration=1e9), r"number of time steps must be below 1e\+08, got 49"),
+        (lambda: impact(rate=1e12), r"number of time steps must be below 1e\+08"),
+        (
+            lambda: simulate_hammer(TRACK, 24.0),
+            r"impacts at 24\.000 m, of which some are 0\.020 m away, are not all on",
+        ),
+        (lambda: simulate_hammer(TRACK, 26.0), "not all on the track, which goes from 0.000 m to 24.000 m"),
+        (lambda: couple("train", []), "train: a train of no vehicles"),
+        (lambda: couple("train", [WHEEL, lone_wheels(700.0)]), "vehicles of one train need the same gravity"),
         (lambda: PowerLaw(INF), "not those of a contact"),
         (lambda: GapLaw(-1e8), "gap law: stiffness must be at least 0 N/m"),
         (lambda: GapLaw(1e8, onset=0.0), "gap law: onset must be above 0 m"),
@@ -110,6 +146,8 @@ def test_any_type_of_number_is_used(speed):
     "build",
     [
         lambda: WheelFlat(0, 0.0, 0.43),
+        lambda: passage(irregularities=[WheelFlat(0, 0.015, 0.43), Corrugation(11.0, 13.0, 1e-5, 0.015)]),
+        lambda: simulate_hammer(TRACK, 24.0, Hammer(position_spread=0.0), [Sensor("A", 24.0)], 1),
         lambda: Sensor("A", 1.0, noise=0.0, cutoff=None, limit=INF, resolution=0.0),
         lambda: Hammer(velocity_spread=0.0, position_spread=0.0),
         lambda: LinearLaw(-1e6, 0.0, -2e3),
