@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 from tests.oracles.march_numpy import march_numpy
+from tests.published.test_simulate_moving_load import below, dip_force, p2_force, spectral_line
 
 from benchmarks.bar import Bar, stopwatch
 from turnout.simulate import Sensor, car, load_track, load_vehicle, simulate_passage, uniform_track
-from turnout.simulate.discretization_error import PassageCase, end_error, numerical_error
+from turnout.simulate.discretization_error import BANDS, PassageCase, compare_recordings, end_error, numerical_error
 from turnout.simulate.frequency_response import receptance
 from turnout.simulate.infinite_track import floquet_receptance, winkler_receptance
 from turnout.simulate.matrices import assemble
@@ -22,10 +23,12 @@ from turnout.simulate.passage import prepare_passage
 from turnout.simulate.preparation import prepare
 from turnout.simulate.rail import Rail
 from turnout.simulate.run import Drive, Probe, run
+from turnout.simulate.vehicle import lone_wheels
 from turnout.simulate.wheel_path import Kink
 
 SPEED = 160.0 / 3.6
 CURVES = Path(__file__).resolve().parents[2] / "shared" / "data" / "reference_track_models"
+SENSORS = tuple(Sensor(name, x) for name, x in (("A4", 9.0), ("A7", 24.6), ("A11", 36.0)))
 START_UP = """
 import time
 from turnout.simulate import Sensor, car, simulate_passage, uniform_track
@@ -36,7 +39,7 @@ print(time.process_time())
 
 def bars():
     """Every bar of the simulation."""
-    for group in (cost, growth, trains, accuracy, other_programs):
+    for group in (cost, growth, trains, accuracy, mass_matrices, dips, sleeper_passing, other_programs):
         for bar in group():
             yield replace(bar, figure=float(bar.figure))
 
@@ -151,18 +154,69 @@ def accuracy():
     compiled = run(prepared, 0.02, [Probe(12.0)], vehicle, drive)
     difference = np.max(np.abs(compiled.signals - plain.signals)) / np.max(np.abs(compiled.signals))
     yield Bar("compiled march against plain numpy, relative", difference, 1e-9, "")
-    turnout = load_track("tommerup")
-    positions = (("A4", 9.0), ("A7", 24.6), ("A11", 36.0))
-    case = PassageCase(
-        turnout, car(half_pivot=4.0), SPEED, tuple(Sensor(n, x) for n, x in positions), {"lead": 0.3, "tail": 0.2}
-    )
+    case = PassageCase(load_track("tommerup"), car(half_pivot=4.0), SPEED, SENSORS, {"lead": 0.3, "tail": 0.2})
     report = numerical_error(case)
     for k, (low, high) in enumerate(report.bands):
         title = f"own error {low:.0f}-{high:.0f} Hz: step, waveform, worst sensor"
         yield Bar(title, 100 * report.step[:, k].max(), 2.0, "%")
         mesh, level = 100 * report.mesh[:, k].max(), np.abs(report.level_mesh[:, k]).max()
         yield Bar(f"own error {low:.0f}-{high:.0f} Hz: mesh, waveform", mesh, None, "%", note=f"level {level:.2f} dB")
-    yield Bar("own error: absorbing ends, 5-1000 Hz, worst band", 100 * end_error(case).max(), None, "%")
+    ends = 100 * end_error(case)
+    yield Bar("own error: absorbing ends, 5-600 Hz, worst band", ends[:, :4].max(), None, "%")
+    yield Bar("own error: absorbing ends, 600-1000 Hz", ends[:, 4].max(), None, "%")
+
+
+def mass_matrices():
+    """The same passage with either mass matrix of the rail, against 16 elements per bay with the same matrix."""
+    turnout = load_track("tommerup")
+
+    def passage(mass_matrix, elements):
+        rail = replace(turnout.track.rail, mass_matrix=mass_matrix)
+        stretches = tuple(replace(s, rail=replace(s.rail, mass_matrix=mass_matrix)) for s in turnout.track.stretches)
+        track = turnout.with_track(elements_per_bay=elements, rail=rail, stretches=stretches)
+        sensors = tuple(replace(sensor, cutoff=None) for sensor in SENSORS)
+        return simulate_passage(track, car(half_pivot=4.0), SPEED, sensors, lead=0.3, tail=0.2).samples
+
+    for mass_matrix, numbers in (("consistent", (4, 8)), ("corrected", (4, 5, 8))):
+        finest = passage(mass_matrix, 16)
+        for elements in numbers:
+            with stopwatch() as watch:
+                samples = passage(mass_matrix, elements)
+            errors = 100 * compare_recordings(samples, finest, 20e3)[0].max(axis=0)
+            for (low, high), error in list(zip(BANDS, errors))[3:]:
+                title = f"{mass_matrix} mass, {elements} elements, {low:.0f}-{high:.0f} Hz, worst sensor"
+                yield Bar(title, error, None, "%", note=f"{watch.cpu:.2f} CPU s")
+
+
+def dips():
+    """P2 force of a wheel at a dip against the formula of Jenkins et al. 1974."""
+    prepared = prepare(uniform_track(96.0), 5e-5)
+    for mass, speed, angles in (
+        (600.0, SPEED, (5e-3, 10e-3, 20e-3)),
+        (900.0, 100 / 3.6, (20e-3,)),
+        (300.0, 100 / 3.6, (20e-3,)),
+    ):
+        for angle in angles:
+            time, force = dip_force(prepared, mass, angle, speed)
+            after, formula = (time > 0.0) & (time < 0.012), p2_force(mass, angle, speed)
+            title = f"P2, {mass:.0f} kg, {1e3 * angle:.0f} mrad, {3.6 * speed:.0f} km/h"
+            for limit in (100.0, *((80.0, 90.0, 120.0, 150.0) if angle == 5e-3 else ())):
+                peak = below(limit, force, 5e-5)[after].max()
+                yield Bar(f"{title}, below {limit:.0f} Hz", peak / 1e3, None, "kN", note=f"formula {formula / 1e3:.0f}")
+            late = force[(time > 3e-3) & (time < 0.02)].max()
+            yield Bar(f"{title}, from 3 ms on, no filter", late / 1e3, None, "kN", note=f"formula {formula / 1e3:.0f}")
+
+
+def sleeper_passing():
+    """Force lines of a wheel at the first four multiples of speed over bay, by elements per bay."""
+    wheel, n = lone_wheels(750.0, gravity=0.0, pressing=53.96e3), round(72 * 0.6 / SPEED / 1e-4)
+    for elements in (4, 16):
+        prepared = prepare(uniform_track(96.0, elements_per_bay=elements), 1e-4)
+        outcome = run(prepared, 1.35, [], wheel, Drive(18.0, SPEED, entry=0.0))
+        force, time = outcome.force[0][-n:], outcome.time[-n:]
+        for k in (1, 2, 3, 4):
+            title = f"force line at {k * SPEED / 0.6:.0f} Hz, {elements} elements per bay"
+            yield Bar(title, spectral_line(force, time, k * SPEED / 0.6), None, "N")
 
 
 def other_programs():
