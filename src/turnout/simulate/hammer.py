@@ -14,10 +14,10 @@ from turnout.errors import SimulationError
 from turnout.records import MID_SPAN, Recording
 from turnout.simulate.force_laws import PowerLaw
 from turnout.simulate.links import terms_on_stretch
-from turnout.simulate.number_checks import check_count, check_number
+from turnout.simulate.number_checks import check_count, check_number, check_seed, check_start_time
 from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, Pulse, run
-from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
+from turnout.simulate.sensor import Sensor, actual_sensor, check_names, mean_of, record_signal
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack, half_bay, stretch_of_track, supports_within
 from turnout.simulate.vehicle import lone_wheels
@@ -185,6 +185,8 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     check_count("n_impacts", n_impacts)
     check_number("pretrigger", pretrigger, "s", least=0.0)
     check_number("duration", duration, "s", above=pretrigger)
+    check_seed("seed", seed)
+    check_start_time(started_at)
     hammer, impacts = hammer or Hammer(), []
     position, base = resolve_location(track, location)
     sensors = hammer_sensors(position, 2.0 * half_bay(base, position)) if sensors is None else tuple(sensors)
@@ -194,6 +196,7 @@ def simulate_hammer(  # type: ignore[misc]  # the overloads stand for any of the
     rng = np.random.default_rng(seed)
     probes = [actual_sensor(sensor, prepared.terms).probe(prepared.track) for sensor in sensors]
     channels = (replace(hammer.force, place=position), *sensors)
+    check_names(channels)
     channel_terms = [t for t in prepared.terms if t.effect_type == "channel" and "hammer" in t.recording_types]
     recordings = []
     for record in range(n_impacts):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
+from datetime import datetime
 from math import inf, isfinite
 from operator import index
 from typing import Any
@@ -102,3 +104,39 @@ def check_count(title: str, value: Any, least: int = 1) -> None:
         is_enough = False
     if not is_enough:
         raise SimulationError(f"{title} must be a whole number of at least {least}, got {value!r}.")
+
+
+def check_seed(title: str, value: Any) -> None:
+    """Reject what seeds no random numbers: a whole number from 0, or a sequence of them, does.
+
+    Parameters
+    ----------
+    title : str
+        What the seed is of, the first word of the error.
+    value : Any
+        The seed.
+
+    Raises
+    ------
+    SimulationError
+        With what was given.
+    """
+    for number in value if isinstance(value, Iterable) else (value,):
+        check_count(title, number, least=0)
+
+
+def check_start_time(moment: Any) -> None:
+    """Reject a start time that is not in UTC without a zone, as all times are.
+
+    Parameters
+    ----------
+    moment : Any
+        The time, or None.
+
+    Raises
+    ------
+    SimulationError
+        With what was given.
+    """
+    if moment is not None and not (isinstance(moment, datetime) and moment.tzinfo is None):
+        raise SimulationError(f"started_at must be a datetime in UTC without a time zone, or None, got {moment!r}.")

@@ -11,11 +11,11 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.records import Recording
-from turnout.simulate.number_checks import check_number
+from turnout.simulate.number_checks import check_number, check_seed, check_start_time
 from turnout.simulate.path_checks import check_path
 from turnout.simulate.preparation import Prepared, prepare, time_step_of
 from turnout.simulate.run import Drive, run
-from turnout.simulate.sensor import Sensor, actual_sensor, mean_of, record_signal
+from turnout.simulate.sensor import Sensor, actual_sensor, check_names, mean_of, record_signal
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack
 from turnout.simulate.vehicle import Vehicle
@@ -170,6 +170,10 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     check_number("entry", entry, "m", least=0.0)
     if roughness is not None:
         check_number("roughness", roughness, "dB")
+    check_seed("seed", seed)
+    if rail_seed is not None:
+        check_seed("rail_seed", rail_seed)
+    check_start_time(started_at)
     if direction not in ("facing", "trailing"):
         raise SimulationError(f"direction {direction!r} is neither 'facing' nor 'trailing'.")
     turnout = track if isinstance(track, TurnoutTrack) else TurnoutTrack(track, {route: ((),)})
@@ -181,6 +185,7 @@ def simulate_passage(  # type: ignore[misc]  # the overloads stand for any of th
     sensors, sign = tuple(sensors), 1 if direction == "facing" else -1
     if not sensors:
         raise SimulationError("a passage without sensors records nothing.")
+    check_names(sensors)
     seats = [actual_sensor(sensor, prepared.terms) for sensor in sensors]
     probes = [seat.probe(prepared.track) for seat in seats]
     drive, duration = _drive(

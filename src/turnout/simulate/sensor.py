@@ -116,6 +116,25 @@ def actual_sensor(sensor: Sensor, terms: Sequence[Effect]) -> Sensor:
     return sensor
 
 
+def check_names(sensors: Sequence[Sensor]) -> None:
+    """Reject sensors of one recording with the same name: its channels are known by their names.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+        Channels of the recording.
+
+    Raises
+    ------
+    SimulationError
+        With the name that occurs more than once.
+    """
+    names = [sensor.name for sensor in sensors]
+    for name in names:
+        if names.count(name) > 1:
+            raise SimulationError(f"{names.count(name)} sensors have the name {name!r}.")
+
+
 def mean_of(signals: np.ndarray, substeps: int) -> np.ndarray:
     """Means over ``substeps`` time steps of signals; a remainder is dropped.
 

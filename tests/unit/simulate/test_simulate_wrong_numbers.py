@@ -1,5 +1,6 @@
 """A number that a simulation cannot use is an error that names it; numbers at a limit are used."""
 
+from datetime import UTC, datetime
 from functools import cache
 
 import numpy as np
@@ -114,6 +115,14 @@ def impact(**options):
         (lambda: Sampled(11.0, 0.01, 1e-3), "sampled dip: needs two values or more in a row, got 0.001"),
         (lambda: passage(irregularities=[Corrugation(11.0, 13.0, 2e-5, 0.008)]), "changes too quickly .* 5 mm, misses"),
         (lambda: passage(irregularities=[WheelFlat(0, 0.01, 0.43)]), "changes too quickly at .* misses 40%"),
+        (lambda: passage(seed=-1), "^seed must be a whole number of at least 0, got -1"),
+        (lambda: passage(seed=1.5), "^seed must be a whole number of at least 0, got 1.5"),
+        (lambda: passage(rail_seed=(3, -1)), "^rail_seed must be a whole number of at least 0, got -1"),
+        (lambda: impact(seed=NAN), "^seed must be a whole number of at least 0, got nan"),
+        (lambda: passage(started_at="2024-05-13"), "started_at must be a datetime in UTC without a time zone, or None"),
+        (lambda: impact(started_at=datetime(2024, 5, 13, tzinfo=UTC)), "started_at must be a datetime in UTC without"),
+        (lambda: simulate_passage(TRACK, WHEEL, 40.0, [Sensor("A", 12.0)] * 2), "2 sensors have the name 'A'"),
+        (lambda: impact(sensors=[Sensor("hammer", 12.0)]), "2 sensors have the name 'hammer'"),
         (lambda: impact(duration=1e9), r"number of time steps must be below 1e\+08, got 49"),
         (lambda: impact(rate=1e12), r"number of time steps must be below 1e\+08"),
         (
