@@ -189,7 +189,7 @@ def mass_matrices():
 
 
 def dips():
-    """P2 force of a wheel at a dip against the formula of Jenkins et al. 1974."""
+    """Second peak of the contact force at a dip, against the formula of Jenkins et al. 1974."""
     prepared = prepare(uniform_track(96.0), 5e-5)
     for mass, speed, angles in (
         (600.0, SPEED, (5e-3, 10e-3, 20e-3)),
@@ -199,7 +199,7 @@ def dips():
         for angle in angles:
             time, force = dip_force(prepared, mass, angle, speed)
             after, formula = (time > 0.0) & (time < 0.012), p2_force(mass, angle, speed)
-            title = f"P2, {mass:.0f} kg, {1e3 * angle:.0f} mrad, {3.6 * speed:.0f} km/h"
+            title = f"second peak at a dip, {mass:.0f} kg, {1e3 * angle:.0f} mrad, {3.6 * speed:.0f} km/h"
             for limit in (100.0, *((80.0, 90.0, 120.0, 150.0) if angle == 5e-3 else ())):
                 peak = below(limit, force, 5e-5)[after].max()
                 yield Bar(f"{title}, below {limit:.0f} Hz", peak / 1e3, None, "kN", note=f"formula {formula / 1e3:.0f}")
