@@ -202,9 +202,18 @@ def record_signal(
 
 
 def _apply_filters(sensor: Sensor, signal: np.ndarray, rate: float, substeps: int) -> np.ndarray:
-    """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around."""
+    """Mounting, delay and anti-alias filter in one transform, padded so that the signal does not wrap around.
+
+    The straight line between the ends of the signal passes unchanged but for the delay; the remainder begins and ends
+    at 0. The track moves before the first sample and after the last one, so a filter must not see steps there.
+    """
     if not (sensor.mount_frequency or sensor.delay or sensor.cutoff):
         return signal
+    sample = np.arange(signal.size) / max(signal.size - 1, 1)
+    rise = signal[-1] - signal[0]
+    line = signal[0] + rise * sample
+    late_line = signal[0] + rise * (sample - sensor.delay * rate * substeps / max(signal.size - 1, 1))
+    signal = signal - line
     padded = next_fast_len(signal.size + max(4096, signal.size // 8), real=True)
     frequency = np.fft.rfftfreq(padded, 1.0 / (rate * substeps))
     transfer = np.ones(frequency.size, dtype=complex)
@@ -215,7 +224,7 @@ def _apply_filters(sensor: Sensor, signal: np.ndarray, rate: float, substeps: in
         transfer *= np.exp(-2j * np.pi * frequency * sensor.delay)
     if sensor.cutoff:
         transfer *= _anti_alias(sensor.cutoff, frequency / rate, substeps)
-    return np.fft.irfft(np.fft.rfft(signal, padded) * transfer, padded)[: signal.size]
+    return late_line + np.fft.irfft(np.fft.rfft(signal, padded) * transfer, padded)[: signal.size]
 
 
 def _anti_alias(cutoff: float, frequency: np.ndarray, substeps: int) -> np.ndarray:

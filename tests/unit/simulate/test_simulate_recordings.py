@@ -25,6 +25,7 @@ from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.rail import Rail
 from turnout.simulate.roughness import level, roughness
 from turnout.simulate.sensor import record_signal
+from turnout.simulate.vehicle import lone_wheels
 
 RNG = np.random.default_rng(7)
 
@@ -49,6 +50,25 @@ def test_each_stage_of_a_sensor_has_its_stated_effect():
     assert noisy.std() == pytest.approx(0.3, rel=0.03)
     late = record_signal(Sensor("a", 0.0, delay=2e-3, **bare), np.exp(-(((t - 0.1) / 2e-3) ** 2)), rate, RNG)
     assert t[np.argmax(late)] == pytest.approx(0.102, abs=1e-4)
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("stage", [{}, {"mount_frequency": 3e3}, {"delay": 0.7e-3}], ids=["filter", "mount", "delay"])
+def test_a_recording_begins_and_ends_within_the_motion(stage, substeps):
+    """A deflection at rest, and one that grows, are recorded as they are from the first sample to the last."""
+    rate, time = 10e3, (np.arange(900 * substeps) + 0.5) / (10e3 * substeps)
+    for rise, tolerance in ((0.0, 1e-12), (2.0, 2e-5)):  # a mounting delays a slow signal by 5 µs, 1 / (Q ω0)
+        recorded = record_signal(Sensor("a", 0.0, **stage), 0.4 + rise * time, rate, RNG, substeps=substeps)
+        expected = 0.4 + rise * ((np.arange(900) + 0.5) / rate - stage.get("delay", 0.0))
+        np.testing.assert_allclose(recorded, expected, rtol=0.0, atol=tolerance)
+
+
+def test_a_train_that_starts_on_its_sensor_is_recorded_from_the_first_sample_on():
+    wheel = lone_wheels(700.0, gravity=0.0, pressing=5e4)
+    sensor = Sensor("A", 12.0, quantity="displacement")
+    passage = {"rate": 5e3, "lead": 0.0, "tail": 0.05, "truth": True}
+    recording, truth = simulate_passage(uniform_track(24.0), wheel, 40.0, [sensor], **passage)
+    assert recording.samples[0, 0] == pytest.approx(truth.clean[0, 0], rel=0.01)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
