@@ -7,7 +7,6 @@ friction and a noisy sensor of its angle; its copy of the example has ``np.sin(y
 python -m benchmarks.other_systems
 """
 
-import math
 import runpy
 import tempfile
 from functools import cache
@@ -15,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.stats import norm
 
 from turnout.mismatch import diagnose
 
@@ -90,9 +88,8 @@ def row(system, diagnosis, true):
     verdict = diagnosis.verdict
     if verdict.answer != "named":
         return f"| {system} | {verdict.answer} | | {true:.4g} |"
-    half = norm.ppf(0.975) * float(diagnosis.fit.psi_se[0])
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    amount = f"{float(diagnosis.fit.psi[0]):.{digits}f} ± {half:.{digits}f} (95 %)"
+    amount = diagnosis.fit.estimates[0].removeprefix("amount ")
+    digits = len(amount.split()[0].partition(".")[2])
     return f"| {system} | {verdict.names[0].replace('_', ' ')}, grade {verdict.grade} | {amount} | {true:.{digits}f} |"
 
 

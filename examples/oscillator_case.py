@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from examples.own_system import checked_record
 from numba import njit
 
 from turnout.mismatch.engine.candidate import Candidate
@@ -144,11 +145,19 @@ class OscillatorCase(Case):
         Tolerated error as a share of the rms of each record.
     offset : float
         Prior standard deviation of the offset of the sensor; 0 removes this nuisance parameter.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, a record is incomplete, or no law has a name in ``without``.
     """
 
     def __init__(self, records, reserved, rate, frequency, damping, gain, tolerance=0.01, offset=0.02, skipped=400,
                  without=(), effective=0.2):  # fmt: skip
+        if unknown := sorted(set(without) - set(LAWS)):
+            raise ValueError(f"without: no law is called {unknown[0]!r}; there are {', '.join(LAWS)}")
         self.rate, self.skipped, self.effective = rate, skipped, effective
+        records, reserved = ([(n, c, *checked_record(n, u, y)) for n, c, u, y in rows] for rows in (records, reserved))
         self.scale = 3.0 * float(np.sqrt(np.mean(np.concatenate([y for *_, y in records]) ** 2)))
         self.inputs = {name: (_step_inputs(u), y) for name, _, u, y in (*records, *reserved)}
         self._motions = {}
@@ -166,6 +175,8 @@ class OscillatorCase(Case):
 
     def _observation(self, name, condition, u, y, tolerance):
         judged = y[self.skipped :]
+        if judged.size < 2:
+            raise ValueError(f"{name}: {y.size} samples, of which the first {self.skipped} are not compared (skipped)")
         sigma = tolerance * float(np.sqrt(np.mean(judged**2)))
         return Observation(name, condition, judged, sigma, self.effective, covariates={"rms": float(np.std(judged))})
 

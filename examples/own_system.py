@@ -77,7 +77,8 @@ def simulate(force, dt, start, parameters, laws, amounts, scale):
         y += dt / 6.0 * (v + 2.0 * (v + 0.5 * dt * a1) + 2.0 * v3 + v4)
         v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         if not abs(y) < 1e3 * scale:
-            y, v = 0.0, 0.0
+            out[n + 1 :] = np.nan  # the fit does not use a simulation that is not finite
+            break
     return out
 
 
@@ -86,14 +87,24 @@ def simulate(force, dt, start, parameters, laws, amounts, scale):
 
 @dataclass(frozen=True)
 class Law:
-    """A law with its amount, as ``predict`` gets it."""
+    """A law with its amount, as ``predict`` gets it; ``Fit.estimates`` states amounts with their intervals."""
 
     name: str
     amount: float
 
     def sentence(self):
         """The law in words."""
-        return f"{ALL_LAWS[self.name][1]} (amount {self.amount:.3g})"
+        return ALL_LAWS[self.name][1]
+
+
+def checked_record(name, force, y):
+    """Force and displacement of one record as arrays. ValueError if they are no pair that can be simulated."""
+    force, y = np.asarray(force, dtype=float), np.asarray(y, dtype=float)
+    if force.ndim != 1 or force.shape != y.shape or y.size < 2:
+        raise ValueError(f"{name}: force {force.shape} and displacement {y.shape} must be two rows of equal length")
+    if not (np.all(np.isfinite(force)) and np.all(np.isfinite(y))):
+        raise ValueError(f"{name}: force or displacement has missing samples (NaN or infinity); cut the record there")
+    return force, y
 
 
 def law_candidates(names, bounds=None):
@@ -127,14 +138,27 @@ class Mount(Case):
         tolerance alone would then be below the noise, and no law would explain the record. [m]
     without : sequence of str
         Laws that are left out of the library.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, a record is incomplete, or no law has a name in ``without``.
     """
 
     def __init__(
         self, records, reserved, rate, frequency, damping, gain=(0.0, 0.0), tolerance=0.01, noise=0.0, without=()
     ):
-        self.rate, self.gain, self.noise = rate, gain, noise
+        for what, number in (("rate", rate), ("mean of the frequency", frequency[0])):
+            if not float(number) > 0.0:
+                raise ValueError(f"the {what} is {number} Hz; it must be above 0")
+        if not (tolerance >= 0.0 and noise >= 0.0):
+            raise ValueError(f"tolerance {tolerance} and noise {noise} must not be negative")
+        if unknown := sorted(set(without) - set(LAWS)):
+            raise ValueError(f"without: no law is called {unknown[0]!r}; there are {', '.join(LAWS)}")
+        self.rate, self.gain, self.noise = float(rate), gain, noise
+        records, reserved = ([(n, c, *checked_record(n, f, y)) for n, c, f, y in rows] for rows in (records, reserved))
         self.recorded = {name: (force, y) for name, _, force, y in (*records, *reserved)}
-        self.scale = max(float(np.max(np.abs(y))) for *_, y in records)
+        self.scale = max((float(np.max(np.abs(y))) for *_, y in records), default=0.0)
         self.observations = tuple(self.observation(*r, tolerance) for r in records)
         self.reserved = tuple(self.observation(*r, tolerance) for r in reserved)
         self.nuisances = tuple(self.parameters(frequency, damping))
@@ -202,14 +226,19 @@ def made_records(law, amount, levels, rate=200.0, seconds=10.0, force_sd=1.0, no
 def show(title, diagnosis):
     """Print the answer, the effect with its size, and the fit on the held-out record, or what to do without a name."""
     print(f"{title}: {diagnosis}")
-    for term in diagnosis.fit.terms:
-        print(f"   {term.sentence()}")
+    for term, estimate in zip(diagnosis.fit.terms, diagnosis.fit.estimates):
+        print(f"   {term.sentence()}: {estimate}")
     fit = diagnosis.verification
-    if fit is None or fit.after is None:
+    if not diagnosis.fit.terms and diagnosis.verdict.answer == "unknown":
         print("   no law is named: check the noise, the step of the simulation, the ranges of the amounts,")
         print("   and whether the records are too long for the stated frequency; then add what else may act")
         return
-    print(f"   fit on the held-out record: {fit.before:.1f} % without it, {fit.after:.1f} % with it")
+    if fit.n == 0:
+        print("   no record was held out, so nothing tests this answer: give one in reserved")
+    elif fit.after is None:
+        print(f"   fit on the held-out record: {fit.before:.1f} %")
+    else:
+        print(f"   fit on the held-out record: {fit.before:.1f} % without it, {fit.after:.1f} % with it")
 
 
 def main():

@@ -26,7 +26,7 @@ class Law:
     amount: float
 
     def sentence(self):
-        return f"{self.kind} of {self.amount:.3g} in spring {self.spring}"
+        return f"{self.kind} in spring {self.spring}"
 
 
 @njit(cache=True)
@@ -118,7 +118,7 @@ def campaign(laws, seed=1):
 if __name__ == "__main__":
     diagnosis = diagnose(campaign((Law("cubic", 1, 0.5),)), MismatchSettings(iterations=30, base_iterations=30))
     print(diagnosis)
-    for term in diagnosis.fit.terms:
-        print(f"   {term.sentence()}")
+    for term, estimate in zip(diagnosis.fit.terms, diagnosis.fit.estimates):
+        print(f"   {term.sentence()}: {estimate}")
     fit = diagnosis.verification
     print(f"   fit on the held-out recording: {fit.before:.1f} % without it, {fit.after:.1f} % with it")

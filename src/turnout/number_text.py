@@ -78,6 +78,37 @@ def number_text(value: float) -> str:
     return power_of_ten_text(value)
 
 
+def value_with_half_width(value: float, half_width: float, unit: str = "") -> str:
+    """A value with the half width of its 95 % interval, which has two significant digits.
+
+    Parameters
+    ----------
+    value : float
+        The value.
+    half_width : float
+        Half width of its 95 % interval, in the unit of the value.
+    unit : str
+        Unit; "" or "-" for none.
+
+    Returns
+    -------
+    str
+        Its text.
+
+    Examples
+    --------
+    >>> value_with_half_width(0.238154, 0.00104), value_with_half_width(1234.5, 67.8, "N/m")
+    ('0.2382 ± 0.0010 (95 %)', '1234 ± 68 N/m (95 %)')
+    >>> value_with_half_width(0.5, float("nan")), value_with_half_width(2.0, 0.0)
+    ('0.5, uncertainty not known', '2, uncertainty not known')
+    """
+    unit = "" if unit in ("", "-") else f" {unit}"
+    if not (math.isfinite(half_width) and half_width > 0.0):
+        return f"{value:.4g}{unit}, uncertainty not known"
+    n_decimals = max(0, 1 - math.floor(math.log10(float(f"{half_width:.1e}"))))
+    return f"{value:z.{n_decimals}f} ± {half_width:.{n_decimals}f}{unit} (95 %)"
+
+
 def power_of_ten_text(value: float, n_digits: int = 6) -> str:
     """A number as a multiple of a power of ten.
 

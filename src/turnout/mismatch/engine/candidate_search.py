@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case_check import checked_predictions
 from turnout.mismatch.engine.hammer_prescreen import prescreen
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -333,7 +334,8 @@ def _distance(first: Any, second: Any) -> float:
 def _predicted_change(case: Case, fit: Fit, candidate: Candidate, k: int) -> list[np.ndarray] | None:
     """Change of the prediction at a start. None if the effect cannot be simulated at this size."""
     try:
-        new = case.predict(fit.values, (*fit.terms, candidate.term(candidate.starts[k])), case.observations)
+        terms = (*fit.terms, candidate.term(candidate.starts[k]))
+        new = checked_predictions(case.observations, case.predict(fit.values, terms, case.observations))
     except SimulationError:
         return None
     return [a - b for a, b in zip(new, fit.predictions)]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.case_check import checked_predictions
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -198,7 +199,7 @@ class Case:
             shifted = dict(values)
             for k in members:
                 shifted[self.nuisances[k].name] += THRESHOLDS.nuisance_step * self.nuisances[k].sd
-            predicted = self.predict(shifted, terms, observations)
+            predicted = checked_predictions(observations, self.predict(shifted, terms, observations))
             for k in members:
                 nuisance = self.nuisances[k]
                 for o, new, old, jacobian in zip(observations, predicted, base, jacobians):

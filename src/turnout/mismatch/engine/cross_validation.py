@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case_check import checked_predictions
 from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -223,7 +224,7 @@ def effect_signature(case: Case, fit: Fit, candidate: Candidate) -> list[np.ndar
     """
     other_terms = tuple(t for c, t in zip(fit.candidates, fit.terms) if c.key != candidate.key)
     try:
-        without = case.predict(fit.values, other_terms, case.observations)
+        without = checked_predictions(case.observations, case.predict(fit.values, other_terms, case.observations))
     except SimulationError:
         return []
     return [o.whiten(p - q) for o, p, q in zip(case.observations, fit.predictions, without)]

@@ -55,7 +55,7 @@ NUMERICS_RULES: tuple[Rule[NumericalError], ...] = (
 
 EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("explains_too_little", lambda e: e.has_leader and e.explains_too_little and not e.exemption, "unknown",
-         "the best candidate effect explains only {e.leader.explained:.0%} of the residual in excess of the intact "
+         "the best candidate effect explains only {e.leader.explained:z.0%} of the residual in excess of the intact "
          "state", HOW),
     Rule("leaves_too_much", lambda e: e.has_leader and e.residual_excess > e.settings.leftover, "unknown",
          "with {e.leader.in_words}, the residual is still {e.residual_excess:.0f} times that of the intact state", HOW),
@@ -100,7 +100,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("rival_within_margin", lambda e: e.rivals, "a_or_b",
          "the evidence for one effect is hardly larger than for the other", HOW),
     Rule("exempt_from_explaining", lambda e: e.explains_too_little, "named",
-         "{e.exemption}; it explains {e.leader.explained:.0%} of the residual in excess of the intact state", PAIRS),
+         "{e.exemption}; it explains {e.leader.explained:z.0%} of the residual in excess of the intact state", PAIRS),
     Rule("may_be_in_one_type_of_recordings", lambda e: e.special_forms, "named",
          "these recordings do not tell whether it is in hammer tests and passages, or in those of one type alone",
          MISTAKES),
@@ -128,7 +128,7 @@ PAIR_RULES: tuple[Rule[PairEvidence], ...] = (
     Rule("first_stays_unknown", lambda e: e.first_is_unknown, "unknown first", "", PAIRS),
     Rule("no_pair", lambda e: not e.is_pair, "all", "", PAIRS),
     Rule("second_left_alone_explains_too_little", lambda e: e.first_is_redundant and e.second_explains_too_little,
-         "unknown second", "the best candidate effect explains only {e.second_score.explained:.0%} of the "
+         "unknown second", "the best candidate effect explains only {e.second_score.explained:z.0%} of the "
          "residual in excess of the intact state", PAIRS),
     Rule("first_adds_too_little", lambda e: e.first_is_redundant, "second", "", PAIRS),
     Rule("second_predicts_reserved_worse", lambda e: e.second_predicts_worse, "first",

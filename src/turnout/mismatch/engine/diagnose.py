@@ -10,6 +10,7 @@ import numpy as np
 
 from turnout.counts import count_of
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case_check import check_case
 from turnout.mismatch.engine.component_evidence import evidence_of_any_component, local_changes
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
@@ -125,7 +126,10 @@ def diagnose(
     ------
     SimulationError
         If the base model cannot be simulated.
+    ValueError
+        If the parts of the case contradict each other, or a prediction has not the shape of its recording.
     """
+    check_case(case)
     search, base = fit_base(Search.of(case, settings, progress, store))
     frames = tuple(attribute(*cell_energies(search.case.observations, base.residuals)))
     numerics = _assess_numerics(search, base)

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from turnout.constants import Z95
+from turnout.number_text import value_with_half_width
+
 if TYPE_CHECKING:
     from turnout.mismatch.engine.candidate import Candidate
 
@@ -126,6 +129,15 @@ class Fit:
                 errors[k] = np.hypot(errors[k], share * (self.psi[k] - neutral))
             first += len(candidate.parameters)
         return errors
+
+    @property
+    def estimates(self) -> tuple[str, ...]:
+        """(n_term,) name and value of each parameter of the effects, with its 95 % interval, as text."""
+        parameters = (p for c in self.candidates for p in c.parameters)
+        return tuple(
+            f"{p.name} {value_with_half_width(float(value), Z95 * float(se), p.unit)}"
+            for p, value, se in zip(parameters, self.psi, self.psi_se)
+        )
 
 
 def terms_of(candidates: Sequence[Candidate], psi: np.ndarray) -> tuple[Any, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.case_check import checked_predictions
 from turnout.mismatch.engine.fit import terms_of
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
@@ -76,11 +77,14 @@ class JointProblem:
         Raises
         ------
         SimulationError
-            If the model cannot be simulated there.
+            If the model cannot be simulated there, or a prediction is not finite.
+        ValueError
+            If there is not one prediction for each observation, of the shape of its data.
         """
         values, psi = self.split(theta)
         self.evaluations += 1
-        return self.case.predict(values, terms_of(self.candidates, psi), self.observations)
+        predictions = self.case.predict(values, terms_of(self.candidates, psi), self.observations)
+        return checked_predictions(self.observations, predictions)
 
     def predict_or_none(self, theta: np.ndarray) -> list[np.ndarray] | None:
         """Predictions with these parameters.
@@ -265,6 +269,7 @@ class JointProblem:
                 shifted_predictions = self.case.predict_near(
                     values, terms, terms_of(self.candidates, shifted), self.observations, predictions
                 )
+                shifted_predictions = checked_predictions(self.observations, shifted_predictions)
                 break
             except SimulationError:
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,11 @@ class Nuisance:
     railpads. ``index`` is the number of its component among those of the group that are alike, else None. ``at`` is
     what it is fixed to, as (frame, level) of ``ResidualSpace.combinations``; None if that is not known. ``model_sd`` is
     the error that the model itself makes in the value, which no recording reduces, as a standard deviation.
+
+    Raises
+    ------
+    ValueError
+        If the mean is not finite or outside the bounds, or the standard deviation is not finite and above 0.
     """
 
     name: str
@@ -33,3 +39,18 @@ class Nuisance:
     index: int | None = None
     at: tuple[str, Any] | None = None
     model_sd: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high = self.bounds
+        what = f"nuisance parameter {self.name!r}"
+        if not all(isinstance(x, Real) for x in (self.mean, self.sd, low, high)):
+            raise ValueError(f"{what}: mean {self.mean!r}, sd {self.sd!r} and bounds {self.bounds!r} must be numbers")
+        if not np.isfinite(self.mean) or not low <= self.mean <= high or not low < high:
+            raise ValueError(
+                f"{what}: the mean {self.mean:g} must be finite and within the bounds {low:g} and {high:g}"
+            )
+        if not 0.0 < self.sd < np.inf:
+            raise ValueError(
+                f"{what}: the standard deviation {self.sd:g} must be finite and above 0; a number that is known "
+                "exactly is no nuisance parameter but a constant of the simulation"
+            )

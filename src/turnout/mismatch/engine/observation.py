@@ -50,8 +50,15 @@ class Observation:
             raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
         if data.size % self.rows:
             raise ValueError(f"observation {self.name!r}: {data.size} samples are no {self.rows} rows of equal length")
-        if not np.all(sigma > 0.0) or not 0.0 < self.effective <= 1.0:
-            raise ValueError(f"observation {self.name!r}: sigma must be above 0 and effective in 0 to 1")
+        if not data.size:
+            raise ValueError(f"observation {self.name!r} has no samples")
+        if not np.all((sigma > 0.0) & np.isfinite(sigma)):
+            raise ValueError(
+                f"observation {self.name!r}: sigma must be finite and above 0. A share of the rms is 0 where all data "
+                "are equal: state the noise of the sensor"
+            )
+        if not 0.0 < self.effective <= 1.0:
+            raise ValueError(f"observation {self.name!r}: effective is {self.effective}; it must be above 0, at most 1")
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "sigma", sigma)
 
