@@ -350,3 +350,29 @@ def diagnoses_once(worklist: Iterable[Mapping[str, Any]]) -> Iterator[str]:
         key = (work["turnout_id"], diagnosis)
         yield "as above for this turnout" if diagnosis and key in shown else diagnosis
         shown.add(key)
+
+
+def sorted_statements(detail: str | None) -> list[str]:
+    """Statements on a model, those that begin with a frequency in the order of frequencies and after all others.
+
+    Parameters
+    ----------
+    detail : str or None
+        Column ``detail`` of a model: statements with "; " between them.
+
+    Returns
+    -------
+    list of str
+        At least one, which is empty without a detail.
+
+    Examples
+    --------
+    >>> sorted_statements("701 Hz not used: too weak; 99 Hz not used: damping too high; the fit is poor")
+    ['the fit is poor', '99 Hz not used: damping too high', '701 Hz not used: too weak']
+    """
+
+    def frequency(statement: str) -> float:
+        number, _, rest = statement.partition(" ")
+        return float(number) if rest.startswith("Hz ") and number.isdecimal() else 0.0
+
+    return sorted((detail or "").split("; "), key=frequency)

@@ -11,7 +11,7 @@ import numpy as np
 from turnout.errors import REMARK_REASONS
 from turnout.hammer_test.dynamic_stiffness import dynamic_stiffness
 from turnout.reasons import REASONS
-from turnout.report.formatting import with_interval
+from turnout.report.formatting import sorted_statements, with_interval
 from turnout.report.pages.turnout import BANDS, PANELS
 
 if TYPE_CHECKING:
@@ -281,17 +281,11 @@ def _stiffness_lines(mode: Mapping[str, Any], rows: Mapping[str, Sequence[Mappin
 
 def _reason_lines(model: Mapping[str, Any]) -> list[str]:
     """Why the model was rejected or has one resonance only, or else its detail; a line for each statement."""
-    statements = sorted((model["detail"] or "").split("; "), key=_frequency)
+    statements = sorted_statements(model["detail"])
     if model["reason"]:
         return [_line("why", REASONS[model["reason"]]), *(_line("", statement) for statement in statements)]
     lines = [_line("" if k else "detail", statement) for k, statement in enumerate(statements)]
     return lines if model["detail"] else []
-
-
-def _frequency(statement: str) -> float:
-    """Frequency with which a statement begins; 0 without one, so that sorting leaves the order of such statements."""
-    number, _, rest = statement.partition(" ")
-    return float(number) if rest.startswith("Hz ") and number.isdecimal() else 0.0
 
 
 def _temperature(rows: Mapping[str, Sequence[Mapping[str, Any]]], unit: Unit, turnout: TurnoutConfig) -> str:

@@ -117,7 +117,7 @@ class Chart:
         return self.height - BOTTOM - self.y.share(values) * (self.height - self.top - BOTTOM)
 
     def line(self, x: ArrayLike, y: ArrayLike, style: str, label: str = "") -> None:
-        """Draw a polyline with gaps at missing values.
+        """Draw a polyline with gaps at missing values; nothing, also no name in the legend, if all are single.
 
         Parameters
         ----------
@@ -131,12 +131,15 @@ class Chart:
             Name of the series.
         """
         px, py = self.px(x), self.py(y)
-        pieces = (reduce_points(px[piece], py[piece]) for piece in runs(np.isfinite(px) & np.isfinite(py)))
+        slices = _visible(np.isfinite(px) & np.isfinite(py))
+        if not slices:
+            return
+        pieces = (reduce_points(px[piece], py[piece]) for piece in slices)
         path = "".join("M" + path_points(*piece) for piece in pieces)
         self.elements.append(f'<path class="{style}"{_series(label)} d="{path}">{_title(label)}</path>')
 
     def band(self, x: ArrayLike, low: ArrayLike, high: ArrayLike, style: str, label: str = "") -> None:
-        """Draw the area between two lines, with gaps at missing values.
+        """Draw the area between two lines, with gaps at missing values; nothing if all are single.
 
         Parameters
         ----------
@@ -152,7 +155,7 @@ class Chart:
             Name of the series.
         """
         px, low, high = self.px(x), self.py(low), self.py(high)
-        for piece in runs(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
+        for piece in _visible(np.isfinite(px) & np.isfinite(low) & np.isfinite(high)):
             forward, (x_back, y_back) = reduce_points(px[piece], high[piece]), reduce_points(px[piece], low[piece])
             path = f"M{path_points(*(np.append(a, b[::-1]) for a, b in zip(forward, (x_back, y_back))))}Z"
             self.elements.append(f'<path class="{style}"{_series(label)} d="{path}">{_title(label)}</path>')
@@ -321,7 +324,10 @@ class Chart:
         elements = [
             f'<path class="frame" d="M{LEFT} {self.top}V{bottom}H{right}"/><path class="grid" d="{"".join(grid)}"/>',
             '<g class="tick x" text-anchor="middle">',
-            *[f'<text x="{x:.1f}" y="{bottom + 14}">{text}</text>' for x, (_, text) in zip(px, x_ticks)],
+            *[
+                f'<text x="{min(x, self.width - 1 - 0.5 * LETTER * len(text)):.1f}" y="{bottom + 14}">{text}</text>'
+                for x, (_, text) in zip(px, x_ticks)
+            ],
             '</g><g class="tick y" text-anchor="end">',
             *[f'<text x="{LEFT - 5}" y="{y + 3.5:.1f}">{text}</text>' for y, (_, text) in zip(py, y_ticks)],
             "</g>",
@@ -341,6 +347,12 @@ def _wrap_title(title: str, n_letters: int) -> list[str]:
     if len(title) <= n_letters and title.isprintable() and title == title.strip():  # the usual case
         return [title]
     return textwrap.wrap(title, n_letters) or [""]
+
+
+def _visible(good: np.ndarray | bool) -> list[slice]:
+    """The contiguous runs of values; none if each is a single value, of which no line can be seen."""
+    pieces = runs(good)
+    return pieces if any(piece.stop - piece.start > 1 for piece in pieces) else []
 
 
 def _title(words: str) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from tests.unit.report.test_turnout_page import page
 
-from turnout.report.panels.calibrated_model import along_track_panels, calibrated_panels, narrowing_panel
+from turnout.report.panels.calibrated_model import KINDS, along_track_panels, calibrated_panels, narrowing_panel
 
 
 def state(parameter, position, value, sd, n_visits=2, day=1):
@@ -54,3 +54,16 @@ def test_the_page_states_the_number_of_used_visits_and_the_meaning_of_red():
     assert "from the 2 visits without an open finding or an unexpected change (1 left out)" in text
     assert "Red: the whole interval is outside." in text and "all visits" not in text
     assert "from the 1 visit without an open finding or an unexpected change; shaded" in page(calibrated=FIRST)
+
+
+def test_each_kind_of_parameter_has_a_line_of_its_own_look(repository):
+    """Two lines of one colour have no legend."""
+    ballast = [{**s, "parameter": s["parameter"].replace("pad", "ballast")} for s in (*FIRST, *STATES)]
+    svg = narrowing_panel([*FIRST, *STATES, *ballast])
+    assert re.findall(r'<path class="(curve [^"]*)" data-series="(\w+)"', svg) == [
+        ("curve kind-ballast", "ballast"),
+        ("curve kind-pad", "pad"),
+    ]
+    css = (repository / "src" / "turnout" / "report" / "templates" / "page.css").read_text(encoding="utf-8")
+    looks = [css.partition(f".curve.kind-{kind}{{")[2].partition("}")[0] for kind in KINDS]
+    assert len(set(looks)) == len(KINDS)

@@ -12,7 +12,7 @@ from turnout.report.panels.hammer import HammerTest, coherence_panel, receptance
 from turnout.report.panels.history import DAMPING, history_panel
 from turnout.report.panels.phase import phase_panel
 from turnout.report.path_data import reduce_points
-from turnout.report.svg import BOTTOM, LEFT, RIGHT, TOP, Chart
+from turnout.report.svg import BOTTOM, LEFT, LETTER, RIGHT, TOP, Chart
 
 
 def chart(scale="linear"):
@@ -265,3 +265,24 @@ def test_one_uncertain_campaign_does_not_flatten_a_history():
     span = 3.0 + 2.0 * 2.306  # of 100 to 103 Hz, each with Student's t of nine impacts
     assert float(low) == pytest.approx(100.0 - 2.306 - span - 0.24 * span, abs=0.02)
     assert float(high) == pytest.approx(103.0 + 2.306 + span + 0.24 * span, abs=0.02)
+
+
+def test_what_is_not_drawn_has_no_name_in_the_legend():
+    """A line or a band of one point is invisible: the name of a mean stood below charts with one campaign."""
+    chart = Chart(Axis(0.0, 2.0, "x"), Axis(0.0, 2.0, "y"))
+    chart.line([1.0], [1.0], "curve", "mean")
+    chart.line([0.0, 1.0, 2.0], [1.0, np.nan, 1.0], "curve", "mean")
+    chart.band([1.0], [0.5], [1.5], "expected", "expected")
+    assert "data-series" not in chart.svg()
+    chart.line([0.0, 1.0], [1.0, 1.0], "curve", "mean")
+    chart.band([0.0, 1.0], [0.5, 0.5], [1.5, 1.5], "expected", "expected")
+    assert chart.svg().count("data-series") == 2
+
+
+def test_the_last_tick_of_a_time_axis_is_not_cut_off():
+    first, last = 1764547200.0, 1777593600.0  # 2025-12-01 and 2026-05-01
+    svg = Chart(Axis(first, last, "", "time"), Axis(0.0, 1.0, "y")).svg()
+    labels = re.findall(r'<text x="([\d.]+)" y="\d+">([A-Z][a-z]{2} \d{4})</text>', svg)
+    width = float(re.search(r'viewBox="0 0 (\d+)', svg)[1])
+    assert len(labels) > 3 and labels[-1][1] == "May 2026"
+    assert all(float(x) + 0.5 * LETTER * len(words) < width for x, words in labels)

@@ -268,3 +268,24 @@ def test_the_page_states_what_was_found_first_and_what_it_rests_on_in_a_detail()
     assert "Diagnosis: hanging sleeper at 36.0 m<br>" in text
     assert "</summary>24 hammer tests; 2 trains fit by 12.4 %</details>" in text
     assert "its value counts" not in text and "its value counts" in page(worklist=[row | {"changed_component": "pad"}])
+
+
+def test_faults_of_a_file_with_other_remedies_have_rows_of_their_own_and_those_of_records_come_first():
+    """The page of a file that was cut off showed the last fault alone, "add the line break if it is whole"."""
+    row = {
+        "turnout_id": "t", "kind": "hammer", "path": "t/A7_1.csv", "record": None, "reason_code": "truncated",
+        "place": "line 408", "found": "the last line has no line break", "remedy": "add it", "n_alike": 3,
+    }  # fmt: skip
+    cut = row | {"place": "record 1 of 1", "found": "389 of 3000 samples", "remedy": "copy 3000 samples again"}
+    fewer = row | {"place": "record 2 of 10", "found": "1 of 10 records", "remedy": "correct the layout"}
+    text = page(quarantine=[row, fewer, cut])
+    found = [text.index(f"<td>{words}</td>") for words in ("389 of 3000 samples", "1 of 10 records", row["found"])]
+    assert found == sorted(found) and text.count("<td>t/A7_1.csv</td>") == 3
+    alike = [cut | {"place": f"record {k} of 4", "remedy": f"copy {k} samples again"} for k in (1, 2, 3)]
+    assert "<td>3 records: 1 to 3</td>" in page(quarantine=alike)
+
+
+def test_resonances_that_were_not_used_stand_in_the_order_of_their_frequencies():
+    detail = "701 Hz not used: too weak; 99 Hz not used: damping too high"
+    text = page(models=[REJECTED | {"status": "accepted", "reason": None, "detail": detail}], receptances=[])
+    assert "99 Hz not used: damping too high; 701 Hz not used: too weak" in text

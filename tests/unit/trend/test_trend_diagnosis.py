@@ -225,3 +225,15 @@ def test_the_worklist_names_the_sleepers_of_the_diagnosis(settings, rows, weeks_
     _, of_trains = amplitude_row(rows, settings, **tables)
     assert of_impacts == (expected or "worn, cracked or displaced pads, loose fastenings")
     assert of_trains == (expected or "running surface, fastenings and voids; the mounting of the sensor")
+
+
+def test_where_the_resonances_do_not_decide_the_advice_names_both_components(settings, rows):
+    """The sentence said that they do not decide, and the advice sent to one component alone."""
+    query = "select * replace (case when section_id = ? then 'either' end as changed_component) from chart_status"
+    with evaluated_views(rows, settings) as con:
+        con.register("chart_status", con.execute(query, [SECTION]).df())
+        query = "select sentence, look_at from worklist where section_id = ? and raised_at_utc is not null"
+        ((sentence, look_at),) = con.execute(query, [SECTION]).fetchall()
+    assert "do not decide between ballast and railpads" in sentence
+    pads, ballast = look_at.split("; ")
+    assert pads.startswith("worn, cracked or displaced pads") and ballast.startswith("voids and wet or fouled ballast")

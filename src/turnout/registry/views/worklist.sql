@@ -310,6 +310,12 @@ select
             ballast_advice(case when w.is_softer then -1 else 1 end, w.sleepers)
         when w.component = 'railpad' and coalesce(h.changed_component, 'either') <> 'ballast' then
             pad_advice(case when w.is_softer then -1 else 1 end, w.sleepers)
+        when h.changed_component = 'either' and h.component = 'ballast' then
+            ballast_advice(case h.direction when 'down' then -1 else 1 end, null) || '; '
+            || pad_advice(case h.direction when 'down' then -1 else 1 end, null)
+        when h.changed_component = 'either' and h.component = 'railpad' then
+            pad_advice(case h.direction when 'down' then -1 else 1 end, null) || '; '
+            || ballast_advice(case h.direction when 'down' then -1 else 1 end, null)
         when h.component = 'ballast' then
             ballast_advice(coalesce(h.ballast_stiffness_pct, case h.direction when 'down' then -1 else 1 end), null)
         when h.component = 'railpad' then

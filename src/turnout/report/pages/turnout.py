@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from turnout.report.formatting import (
     has_stiffness,
     number_ranges,
     result_and_evidence,
+    sorted_statements,
     with_half_width,
 )
 from turnout.report.panels.calibrated_model import calibrated_panels, visits_in_words
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 BANDS = ("ballast", "railpad")
 MAX_UNUSED_SHOWN = 5  # earlier unused tests that are listed per section
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 RECORD_PLACE = re.compile(r"record (\d+)(?: of (\d+))?((?:, .*)?)")  # place of a row of the quarantine
 TRACKS = {"main": "main track", "diverging": "diverging track", "both": "both tracks"}
 PANELS = {
@@ -232,7 +235,7 @@ def _section(
         "when": day(model["measured_at_utc"]) if model else "none",
         "history": history or "<p>No model yet.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
-        "detail": model["detail"] if model else "",
+        "detail": "; ".join(sorted_statements(model["detail"])) if model else "",
         "unused": unused,
         "departures": departure_sentences(off_track, modes),
         "departure_rows": departure_rows(off_track),
@@ -240,10 +243,14 @@ def _section(
 
 
 def _by_file(quarantine: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """One row for each file, reason and channels, with its records together; the details are those of its first one."""
-    groups: dict[tuple[str, str, str], list[Mapping[str, Any]]] = {}
-    for row in sorted(quarantine, key=lambda q: (q["path"], _place_of(q)[0] or 0)):
-        groups.setdefault((row["path"], row["reason_code"], str(row.get("channels"))), []).append(row)
+    """One row for each file, reason, channels and remedy, with its records together; those of a record come first.
+
+    The details are those of the first record. Remedies that differ only in a number are one.
+    """
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in sorted(quarantine, key=lambda q: (q["path"], _place_of(q)[0] or math.inf)):
+        remedy = NUMBER.sub("", row["remedy"] or "")
+        groups.setdefault((row["path"], row["reason_code"], str(row.get("channels")), remedy), []).append(row)
     return [dict(same[0]) | _records(same) for same in groups.values()]
 
 

@@ -160,7 +160,7 @@ def narrowing_panel(states: States, width: int = 462) -> str:
         return ""
     chart = Chart(
         Axis(visits[0] - 0.5, visits[-1] + 0.5, "visits used"),
-        Axis(0.0, 1.05, "standard deviation over file"),
+        Axis(0.0, 1.05, "standard deviation over that of the file"),
         "how the visits narrow the calibrated model (median of each kind)",
         width=width,
     )
@@ -169,7 +169,7 @@ def narrowing_panel(states: States, width: int = 462) -> str:
         by_count = [[s["sd"] / s["prior_sd"] for s in of_kind if s["n_visits"] == n] for n in visits]
         ratio = np.array([np.median(values) if values else np.nan for values in by_count])
         if np.any(np.isfinite(ratio)):
-            chart.line(visits, ratio, "curve", kind.replace("_", " "))
+            chart.line(visits, ratio, f"curve kind-{kind}", kind.replace("_", " "))
             last = int(np.flatnonzero(np.isfinite(ratio))[-1])
             chart.points([visits[last]], [ratio[last]], "point", 3.0, labels=[f"{kind}: {ratio[last]:.2f}"])
     return chart.svg()

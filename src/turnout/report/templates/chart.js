@@ -162,7 +162,7 @@
     groups.x.textContent = groups.y.textContent = "";
     ticks(this.x, this.view[0], this.view[1]).forEach(function (tick) {
       var at = plot.px(plot._x + plot.x.share(tick[0]) * plot._width);
-      make("*text", { x: at, y: plot._y + plot._height + 14 }, groups.x).textContent = tick[1];
+      make("*text", { x: Math.min(at, plot.svg.viewBox.baseVal.width - 1 - 3.1 * tick[1].length), y: plot._y + plot._height + 14 }, groups.x).textContent = tick[1];
       lines += "M" + at + " " + plot._y + "V" + (plot._y + plot._height);
     });
     ticks(this.y, this.view[2], this.view[3]).forEach(function (tick) {
