@@ -7,6 +7,7 @@ file: ``<!-- file: config/config.yaml -->``. A block that another test runs stat
 
 import argparse
 import ast
+import doctest
 import importlib.util
 import inspect
 import json
@@ -36,6 +37,7 @@ HELP = sorted((ROOT / "src" / "turnout" / "cli").glob("*.py"))
 QUERY = re.compile(r'(?:turnout query|-c) "((?:from|select) [^"]*)"')
 INLINE_QUERY = re.compile(r"`((?:from|select) (?!turnout\.)[^`]*)`")
 VIEWS = re.compile(r"\bviews? (`\w+`(?:(?:,| and) `\w+`)*)")
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
 NO_CODE = ("text", "mermaid")  # outputs, tables, drawings
 NOT_RUN = 2  # blocks that cannot run; a new one needs an equally good reason
 BLOCKS = blocks()
@@ -105,6 +107,10 @@ def test_python_blocks_print_the_shown_text(page, folder, monkeypatch, capsys):
             exec(compile(block.body, str(block), "exec"), names)
             if printed := capsys.readouterr().out:
                 assert after is not None and after.language == "text" and after.body == printed, block
+            if after is not None and after.language == "text" and after.body.startswith(">>> "):
+                for example in doctest.DocTestParser().get_examples(after.body):
+                    shown = repr(eval(example.source, names)) + "\n"  # digits may differ on another processor
+                    assert NUMBER.sub("#", shown) == NUMBER.sub("#", example.want), block
 
 
 @of("sql")
