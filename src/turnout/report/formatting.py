@@ -212,6 +212,30 @@ def day(when: datetime | None) -> str:
     return "–" if when is None else f"{when:%Y-%m-%d}"
 
 
+def campaign_name(campaign_id: str | None, when: datetime | None) -> str:
+    """The name of a campaign, as its folder and ``campaigns.csv`` have it: the local day. Its start in UTC may be a day
+    earlier.
+
+    Parameters
+    ----------
+    campaign_id : str or None
+        Turnout and name, with a slash between them.
+    when : datetime or None
+        Start, whose day stands for a campaign without an id. [UTC]
+
+    Returns
+    -------
+    str
+        A dash without either.
+
+    Examples
+    --------
+    >>> campaign_name("W5/2026-05-13", datetime(2026, 5, 12, 22, 30)), campaign_name(None, datetime(2026, 5, 12))
+    ('2026-05-13', '2026-05-12')
+    """
+    return campaign_id.rpartition("/")[2] if campaign_id else day(when)
+
+
 def badge(state: str) -> str:
     """Style of the badge that shows ``state``.
 

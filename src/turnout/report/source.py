@@ -59,7 +59,7 @@ ROWS = {
         from intervals order by section_id, band, measured_at_utc""",
     "models": f"select * from models_current where {ID_GIVEN} {NEWEST_MODEL}",
     "unused": f"""
-        select turnout_id, section_id, measured_at_utc, reason, detail
+        select turnout_id, section_id, campaign_id, measured_at_utc, reason, detail
         from (
             select *, max(measured_at_utc) over (partition by section_id) as newest_utc
             from models_current where {ID_GIVEN}
@@ -114,7 +114,8 @@ ROWS = {
 }
 TURNOUTS = f"""
     with models as (
-        select turnout_id, max(measured_at_utc) as latest, count(*) filter (where status <> 'rejected') as n_models
+        select turnout_id, max(measured_at_utc) as latest, max_by(campaign_id, measured_at_utc) as campaign_id,
+            count(*) filter (where status <> 'rejected') as n_models
         from (select * from models_current {NEWEST_MODEL}) group by turnout_id
     ),
     sections as (select turnout_id, count(*) as n_sections from sections group by turnout_id),
@@ -124,7 +125,7 @@ TURNOUTS = f"""
     quarantined as (
         select turnout_id, count(*) as n_quarantined from quarantine_open where not is_remark group by turnout_id
     )
-    select t.*, m.latest, coalesce(m.n_models, 0) as n_models, coalesce(s.n_sections, 0) as n_sections,
+    select t.*, m.latest, m.campaign_id, coalesce(m.n_models, 0) as n_models, coalesce(s.n_sections, 0) as n_sections,
         coalesce(r.n_rejected, 0) as n_rejected, coalesce(q.n_quarantined, 0) as n_quarantined
     from turnouts t left join models m using (turnout_id) left join sections s using (turnout_id)
         left join rejected r using (turnout_id) left join quarantined q using (turnout_id)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from datetime import datetime
 
 import duckdb
 import pytest
@@ -155,3 +156,11 @@ def test_a_section_with_a_step_has_no_long_term_score():
         rows = con.execute(SCORES.replace(":today", "null") + " order by turnout_id").fetchall()
     assert [row[0] for row in rows] == ["b", "c"] and rows[0][2:] == ("b/A8", "ballast")
     assert rows[0][1] == pytest.approx(100.0 * (1.0 - math.exp(-0.2 * (2.94 - 1.96 * 0.48)))) and rows[1][1] == 0.0
+
+
+def test_the_newest_campaign_has_the_name_of_its_folder_and_not_the_day_in_utc():
+    night = turnout("a") | {"latest": datetime(2026, 5, 12, 22, 30), "campaign_id": "a/2026-05-13"}
+    before = turnout("b") | {"latest": datetime(2026, 5, 12, 9, 0), "campaign_id": "b/2026-05-12"}
+    text = page([night, before])
+    assert "latest campaign 2026-05-13" in text and text.count("2026-05-12") == 1
+    assert "latest campaign –" in page([turnout("a")])

@@ -289,3 +289,17 @@ def test_resonances_that_were_not_used_stand_in_the_order_of_their_frequencies()
     detail = "701 Hz not used: too weak; 99 Hz not used: damping too high"
     text = page(models=[REJECTED | {"status": "accepted", "reason": None, "detail": detail}], receptances=[])
     assert "99 Hz not used: damping too high; 701 Hz not used: too weak" in text
+
+
+def test_a_campaign_of_the_night_has_the_name_of_its_folder():
+    """00:30 local time on 13 May is 22:30 UTC on 12 May; raw/t/hammer/2026-05-13 holds the files."""
+    model = REJECTED | {"campaign_id": "t/2026-05-13", "measured_at_utc": datetime(2026, 5, 12, 22, 30)}
+    used = model | {"model_id": "old", "status": "accepted", "reason": None, "detail": None}
+    earlier = {
+        "section_id": "t/A7", "campaign_id": "t/2026-04-13", "measured_at_utc": datetime(2026, 4, 12, 22, 30),
+        "reason": "low_coherence", "detail": None,
+    }  # fmt: skip
+    text = page(models=[used], receptances=[RECEPTANCE], unused=[earlier])
+    assert "latest campaign 2026-05-13" in text and "Latest hammer test, 2026-05-13" in text
+    assert "2026-04-13 (low coherence)" in text
+    assert "2026-05-12" not in text and "2026-04-12" not in text
