@@ -27,6 +27,9 @@ def test_the_uncertainties_are_95_percent_intervals_as_on_the_pages(repository):
         status="accepted", findings=(), speed=speed, type=type_, n_axle=8, contrast=5.9, direction="facing",
         track="main", offsets=(0.0,),
     )  # fmt: skip
-    lines = [line for line in _train_lines(recording, passage) if "±" in line]
+    everything = _train_lines(recording, passage)
+    lines = [line for line in everything if "±" in line]
     page = (repository / "docs" / "passages.md").read_text(encoding="utf-8")
     assert len(lines) == 2 and all("(95 %)" in line and line in page for line in lines)
+    (of_type,) = (line for line in everything if "probability" in line)
+    assert "1.000" not in of_type and of_type in page

@@ -120,7 +120,7 @@ def comparison_lines(comparison: PassageComparison) -> list[str]:
         peak = [float(abs(x).max()) for x in (b.recorded, b.simulated)]
         lines.append(
             f"{b.sensor:<10}{b.low:6.0f}-{b.high:<5.0f}{rms[0]:13.2f}{rms[1]:12.2f}{peak[0]:15.1f}{peak[1]:18.1f}"
-            f"{b.level_difference:+12.1f}{b.fit:9.1f}"
+            f"{b.level_difference:+z12.1f}{b.fit:9.1f}"
         )
     lines.append("level: power of the simulation over that of the recording")
     return lines

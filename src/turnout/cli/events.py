@@ -121,8 +121,8 @@ def _effect(registry: str) -> int:
             if retention
             else f"holds until {last:%Y-%m-%d}, the newest campaign"
         )
-        interval = "no interval" if low is None or high is None else f"{low:+.1f} to {high:+.1f}, 95 %"
-        size = "" if gain is None else f", {gain:+.1f} %"
+        interval = "no interval" if low is None or high is None else f"{low:+z.1f} to {high:+z.1f}, 95 %"
+        size = "" if gain is None else f", {gain:+z.1f} %"
         print(
             f"{at:%Y-%m-%d} {section} {band}, {kinds}: {verdict}{size} ({interval}; {before} and {after} campaigns)"
             + (f"; {retention}" if verdict == "stiffer" else "")

@@ -147,7 +147,8 @@ def _train_lines(recording: Recording, passage: Passage) -> list[str]:
     if speed.disagreement is not None and abs(speed.disagreement) > 3:
         lines.append(f"  sensors and axle spacing differ by {abs(speed.disagreement):.1f} standard errors")
     lines.append(f"  direction  {passage.direction}, track {passage.track}")
-    lines.append(f"  type       {type_.type}, probability {type_.probability:.3f}")
+    probability = "above 0.999" if type_.probability > 0.9995 else f"{type_.probability:.3f}"  # no certainty
+    lines.append(f"  type       {type_.type}, probability {probability}")
     if type_.residual is not None:
         row = " ".join(v.name for v in type_.vehicles)
         lines.append(f"             axle spacings differ by {100 * type_.residual:.1f} cm rms from {row}")

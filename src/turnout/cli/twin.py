@@ -97,7 +97,7 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
             i = step.innovation
             yield (
                 f"visit {step.visit} is not used: it differs from the track file and the used visits before, "
-                f"most at {i.parameter} ({i.deviates:+.1f} standard deviations); "
+                f"most at {i.parameter} ({i.deviates:+z.1f} standard deviations); "
                 f"turnout diagnose --turnout {turnout_id} --visit {step.visit} examines it alone, faults of loggers too"
             )
     for visit, answer in model.held.items():

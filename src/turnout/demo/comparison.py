@@ -146,7 +146,7 @@ def _changes(content: dict[str, Any]) -> Iterator[tuple[str, str, str, str]]:
         years = (last - date.fromisoformat(change["since"])).days / DAYS_PER_YEAR
         stiffness = 100.0 * (change["step"] * (1.0 + change["per_year"]) ** years - 1.0)
         cause = f", {change['event'].replace('_', ' ')}" if change["event"] else ""
-        words = f"stiffness {stiffness:+.0f} % by {last}, from {change['since']}{cause}"
+        words = f"stiffness {stiffness:+z.0f} % by {last}, from {change['since']}{cause}"
         yield change["section"], change["component"], words, change["since"] if change["event"] else ""
     for section, gaps in content["gaps_m"].items():
         since = next((day for day, gap in zip(content["days"], gaps) if gap > 0.0), None)
@@ -164,14 +164,16 @@ def _change_row(
         if effect is None or effect[0] is None:
             return Comparison(where, words, "no campaigns on both sides of the work")
         gain, low, high = effect
-        interval = "" if low is None or high is None else f" ({low:+.1f} to {high:+.1f})"
-        return Comparison(where, words, f"frequency {gain:+.1f} %{interval}, stiffness about {_stiffness(gain):+.0f} %")
+        interval = "" if low is None or high is None else f" ({low:+z.1f} to {high:+z.1f})"
+        return Comparison(
+            where, words, f"frequency {gain:+z.1f} %{interval}, stiffness about {_stiffness(gain):+z.0f} %"
+        )
     alarm = connection.execute(ALARM_QUERY, [turnout, section_id, band]).fetchone()
     if alarm is None or alarm[0] is None:
         return Comparison(where, words, "nothing" if alarm is None else alarm[2])
     change, since, state = alarm
     from_day = f", from {since:%Y-%m-%d}" if since else ""
-    found = f"{state}: frequency {change:+.1f} %, stiffness about {_stiffness(change):+.0f} %{from_day}"
+    found = f"{state}: frequency {change:+z.1f} %, stiffness about {_stiffness(change):+z.0f} %{from_day}"
     finding = connection.execute(FINDING_QUERY, [turnout, section]).fetchone()
     return Comparison(where, words, found + (f"; diagnosis: {finding[0]}" if finding else ""))
 
@@ -193,7 +195,7 @@ def _weld_row(connection: duckdb.DuckDBPyConnection, content: dict[str, Any], we
         return Comparison(where, words, "nothing" if row is None else row[2])
     change, since, state = row
     from_day = f", from {since:%Y-%m-%d}" if since else ""
-    return Comparison(where, words, f"{state}: weekly peak acceleration {change:+.0f} %{from_day}")
+    return Comparison(where, words, f"{state}: weekly peak acceleration {change:+z.0f} %{from_day}")
 
 
 def _stiffness(frequency_pct: float) -> float:

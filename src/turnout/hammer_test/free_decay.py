@@ -41,7 +41,9 @@ def judge_second_contact(cut: Cut, settings: ReceptanceSettings) -> None:
         return
     largest = max(further, key=lambda c: c.share)
     delay = 1e3 * (largest.top - cut.contact.top) / cut.rate
-    text = f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+.1f} ms from it"
+    text = (
+        f"further contacts: {len(further)}, the largest {largest.share:.3f} of the first and {delay:+z.1f} ms from it"
+    )
     if len(further) > 1 and largest.share > MIN_REPEATED_SHARE and abs(delay) > MIN_REPEATED_DELAY:
         text += "; where each is an impact of its own, set receptance.separation below the time between them"
     last = max(cut.contact.end, *(c.end for c in further))

@@ -220,7 +220,8 @@ def bias_sentence(bias: dict) -> str:
     """
     n = next(iter(bias.values()))["n"] if bias else 0
     clauses = [
-        f"{band} f {b['frequency_percent']:+.1f} %, zeta {b['damping_percent']:+.1f} %, found {100 * b['found']:.0f} %"
+        f"{band} f {b['frequency_percent']:+z.1f} %, zeta {b['damping_percent']:+z.1f} %, "
+        f"found {100 * b['found']:.0f} %"
         for band, b in bias.items()
     ]
     return f"simulated bias of method paper at this model ({n} impacts): " + "; ".join(clauses)

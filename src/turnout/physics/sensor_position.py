@@ -24,7 +24,7 @@ class SensorPosition(PhysicsTerm):
     shift: float
 
     name = "sensor_position"
-    left_out = "channel {channel_name} is {shift:+.2f} m from its described position"
+    left_out = "channel {channel_name} is {shift:+z.2f} m from its described position"
     message = "Sensor {channel} is {shift} from its position in the layout"
     site_check = "Measure the position of this sensor"
     separating_test = "passages at another speed"

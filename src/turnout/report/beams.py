@@ -110,7 +110,7 @@ def _table_row(published: float | None, damping: float | None, mode: FrfMode | N
     if mode is None:
         return words | {"found": "not found", "off": "–", "found_damping": "–", "n": 0}
     f, d = mode.frequency, mode.damping
-    off = "–" if published is None else f"{100 * (f.mean / published - 1):+.3f}"
+    off = "–" if published is None else f"{100 * (f.mean / published - 1):+z.3f}"
     return words | {
         "found": with_half_width(f.mean, (f.high - f.low) / 2, 3),
         "off": off,

@@ -66,7 +66,7 @@ def spectra_csv(comparison: PassageComparison) -> str:
 def _time_chart(b: BandComparison) -> str:
     step = max(1, b.time.size // MAX_POINTS)
     reach = 1.05 * float(max(np.abs(b.recorded).max(), np.abs(b.simulated).max()))
-    title = f"{b.sensor}, {b.low:.0f}-{b.high:.0f} Hz: simulation {b.level_difference:+.1f} dB, fit {b.fit:.0f} %"
+    title = f"{b.sensor}, {b.low:.0f}-{b.high:.0f} Hz: simulation {b.level_difference:+z.1f} dB, fit {b.fit:.0f} %"
     chart = Chart(
         Axis(float(b.time[0]), float(b.time[-1]), "time from the first axle [s]"),
         Axis(-reach, reach, "acceleration [m/s²]"),

@@ -154,8 +154,8 @@ def _frame_words(finding: Mapping[str, Any], evidence: Mapping[str, Any]) -> str
         return f"the train: {finding['train']}"
     frames = [f for f in evidence.get("frames", ()) if f["q"] is not None and f["q"] < 0.05]
     words = [
-        f"{FRAMES.get(f['frame'], f['frame'])} {f['level']}{' m' * (f['frame'] == 'place')} ({f['effect_db']:+.1f} dB, "
-        f"false discovery rate {f['q']:.3f}, n = {f['n']})"
+        f"{FRAMES.get(f['frame'], f['frame'])} {f['level']}{' m' * (f['frame'] == 'place')} "
+        f"({f['effect_db']:+z.1f} dB, false discovery rate {f['q']:.3f}, n = {f['n']})"
         for f in frames[:3]
     ]
     if finding["verdict"] in ("named", "a_or_b", "unknown") and finding["locked_to"]:
@@ -211,7 +211,7 @@ def _held_out_words(finding: Mapping[str, Any]) -> str:
     if abs(after - before) > half:
         return ""
     n = count_of(finding["n_held_out"], "held-out recording")
-    return f"; {n} alone would not decide ({after - before:+.1f} ± {half:.1f} points of fit)"
+    return f"; {n} alone would not decide ({after - before:+z.1f} ± {half:.1f} points of fit)"
 
 
 def _amount(finding: Mapping[str, Any]) -> str:
@@ -319,7 +319,7 @@ def rivals(finding: Mapping[str, Any]) -> list[dict]:
     return [
         {
             "name": r["family"].replace("_", " "),
-            "nats": f"{r['nats']:+.0f}" if r["nats"] is not None else "–",
+            "nats": f"{r['nats']:+z.0f}" if r["nats"] is not None else "–",
             "explained": f"{100 * r['explained']:.0f} %" if r["explained"] is not None else "–",
         }
         for r in evidence.get("ranking", ())

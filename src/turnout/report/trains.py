@@ -197,8 +197,8 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
         "section": effect["section_id"].split("/")[-1],
         "factor": f"{effect['factor']}, per {effect['per']}",
         "n": effect["n"],
-        "raw": "–" if effect["raw_change_pct"] is None else f"{effect['raw_change_pct']:+.2f}",
-        "held": f"{effect['change_pct']:+.2f} [{effect['low_pct']:+.2f}, {effect['high_pct']:+.2f}]",
+        "raw": "–" if effect["raw_change_pct"] is None else f"{effect['raw_change_pct']:+z.2f}",
+        "held": f"{effect['change_pct']:+z.2f} [{effect['low_pct']:+z.2f}, {effect['high_pct']:+z.2f}]",
         "fixed": effect["held_fixed"],
         "verdict": "differs from none" if clear else "cannot be distinguished from none",
     }

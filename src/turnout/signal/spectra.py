@@ -98,7 +98,7 @@ def density_interval(n: int, level: float = 0.95) -> tuple[float, float]:
     --------
     Thirty impacts determine a density to -1.4 and +1.7 dB.
 
-    >>> print("{:+.1f} {:+.1f} dB".format(*10 * np.log10(density_interval(30))))
+    >>> print("{:+z.1f} {:+z.1f} dB".format(*10 * np.log10(density_interval(30))))
     -1.4 +1.7 dB
     """
     nu = 2 * n

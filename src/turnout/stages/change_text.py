@@ -118,7 +118,7 @@ def _size_words(row: Mapping[str, Any], name: str) -> str:
     if row["component"] is None:
         return f"{value:+.3g} ({low:+.3g} to {high:+.3g}, 95 %) {row['change_unit']}"
     value, low, high = (100.0 * float(np.expm1(end)) for end in (value, low, high))
-    return f"{value:+.0f} % ({low:+.0f} to {high:+.0f}, 95 %)"
+    return f"{value:+z.0f} % ({low:+z.0f} to {high:+z.0f}, 95 %)"
 
 
 def _parameter_words(row: Mapping[str, Any]) -> str:

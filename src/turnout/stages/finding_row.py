@@ -95,7 +95,9 @@ def location_text(diagnosis: Diagnosis) -> str:
     frames = [f for f in diagnosis.frames if f.q < FALSE_DISCOVERY_RATE]
     if not frames:
         return "at no position, sensor or train in particular"
-    return ", ".join(f"at {f.frame} {f.level} ({f.effect:+.1f} dB, false discovery rate {f.q:.3f})" for f in frames[:2])
+    return ", ".join(
+        f"at {f.frame} {f.level} ({f.effect:+z.1f} dB, false discovery rate {f.q:.3f})" for f in frames[:2]
+    )
 
 
 def recommendation(diagnosis: Diagnosis) -> str:

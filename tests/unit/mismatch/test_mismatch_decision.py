@@ -161,6 +161,7 @@ def test_the_reason_states_the_figures_of_the_case():
     assert verdict.reason == (
         "the best candidate effect explains only 40 % of the residual in excess of the intact state"
     )
+    assert "explains only 0 % of" in judge([score(explained=-0.001)], 2.0, MismatchSettings()).reason  # not -0 %
     verdict = judge([score(worst=-9.0)], 2.0, MismatchSettings())
     assert verdict.reason == (
         "with soft at 3.0 m, recordings of one condition are predicted worse than without it "

@@ -55,7 +55,7 @@ class MisplacedSupports:
             f"({low:.0f} to {high:.0f}, 95 %, {count_of(self.n, 'test')}) {comparison} than in the track file. "
             "The diagnosis takes them there. Measure the distance of sensors and impacts to a sleeper. If sensors and "
             "impacts are where their files have them, change `from` of `extent` in the track file by "
-            f"{self.offset:+.2f} m"
+            f"{self.offset:+z.2f} m"
         ]
 
     def correct(self, campaign: CampaignInput) -> CampaignInput:

@@ -189,7 +189,7 @@ def _gain(finding: Mapping[str, Any]) -> str:
     before, after, error = (finding.get(k) for k in ("fit_before_pct", "fit_after_pct", "fit_gain_se_pct"))
     if before is None or after is None or error is None:
         return ""
-    return f": {after - before:+.1f} ± {Z95_EXACT * error:.1f} points"
+    return f": {after - before:+z.1f} ± {Z95_EXACT * error:.1f} points"
 
 
 def history_of_parameter(rows: Sequence[Mapping[str, Any]]) -> str:
