@@ -396,7 +396,7 @@ def sorted_statements(detail: str | None) -> list[str]:
     """
 
     def frequency(statement: str) -> float:
-        number, _, rest = statement.partition(" ")
-        return float(number) if rest.startswith("Hz ") and number.isdecimal() else 0.0
+        number, _, quantity = statement.partition(" ")
+        return float(number) if quantity.startswith("Hz ") and number.isdecimal() else 0.0
 
     return sorted((detail or "").split("; "), key=frequency)

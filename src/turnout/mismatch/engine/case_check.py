@@ -74,8 +74,8 @@ def checked_predictions(observations: Sequence[Observation], predictions: Any) -
         raise ValueError(f"predict must return a list of {len(observations)} arrays, one per observation, not {count}")
     for o, p in zip(observations, predictions):
         if not isinstance(p, np.ndarray) or p.dtype.kind not in "fiu" or p.shape != o.data.shape:
-            kind = f"{p.dtype} of shape {p.shape}" if isinstance(p, np.ndarray) else type(p).__name__
-            raise ValueError(f"the prediction of {o.name!r} must be real numbers of shape {o.data.shape}, not {kind}")
+            returned = f"{p.dtype} of shape {p.shape}" if isinstance(p, np.ndarray) else type(p).__name__
+            raise ValueError(f"the prediction of {o.name!r} must be real numbers of shape {o.data.shape}, not {returned}")
         if not np.all(np.isfinite(p)):
             first = int(np.argmin(np.isfinite(p)))
             raise SimulationError(f"the prediction of {o.name!r} is {p[first]} at sample {first} of {p.size}")
