@@ -64,6 +64,27 @@ class TurnoutTrack:
         """
         return self.tracks.get(route, self.track)
 
+    def with_moved_support(self, support: int, offset: float) -> TurnoutTrack:
+        """The turnout with one support elsewhere.
+
+        Parameters
+        ----------
+        support : int
+            Its index, in every track.
+        offset : float
+            Distance by which it moves along the track. [m]
+
+        Returns
+        -------
+        TurnoutTrack
+        """
+
+        def with_offset(track: Track) -> Track:
+            return replace(track, support=track.support + offset * (np.arange(track.support.size) == support))
+
+        tracks = {name: with_offset(track) for name, track in self.tracks.items()}
+        return replace(self, track=with_offset(self.track), tracks=tracks)
+
     def with_moved_supports(self, offset: float) -> TurnoutTrack:
         """The turnout with all supports elsewhere; rails, surfaces and locations stay.
 

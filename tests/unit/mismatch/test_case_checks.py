@@ -7,6 +7,7 @@ from examples.own_system import Mount, Pendulum, made_records, show
 
 from turnout.errors import SimulationError
 from turnout.mismatch import Candidate, Case, Nuisance, Observation, diagnose
+from turnout.mismatch.engine.joint_problem import JointProblem
 from turnout.physics import Parameter
 
 T = np.arange(200) / 100.0
@@ -68,6 +69,15 @@ def test_a_prediction_that_is_not_a_number_is_no_answer():
     """It was "none", with a probability of 0.93."""
     with pytest.raises(SimulationError, match="prediction of 'a' is nan at sample 3 of 200"):
         diagnose(Spring(lambda p: [np.where(np.arange(x.size) == 3, np.nan, x) for x in p]))
+
+
+def test_a_step_to_values_that_are_not_finite_is_a_simulation_that_fails():
+    """Derivatives that overflow give such a step; a model that rounds its values then ended the diagnosis."""
+    case = Spring()
+    case.predict = lambda values, terms, observations: [round(values["stiffness"]) * T for _ in observations]
+    joint = JointProblem(case, ())
+    assert joint.predict_or_none(np.array([np.nan])) is None and joint.predict_or_none(np.array([np.inf])) is None
+    assert joint.predict_or_none(np.array([1.0])) is not None
 
 
 def test_a_fit_avoids_values_at_which_the_simulation_diverges():

@@ -119,6 +119,24 @@ def test_the_search_for_the_nose_uses_no_held_out_recording(monkeypatch):
     assert set(calls) == {"b", "c"}
 
 
+def test_the_search_for_a_worn_nose_does_not_end_at_a_wrong_position_with_the_depth_of_the_file(monkeypatch):
+    """With the depth of the file a position 10 cm off correlates best, and from there no other depth is better."""
+
+    def correlation(self, values, passage):
+        place, depth = values["surface_0_place"], values["surface_0_depth"]
+        wrong = 0.75 * np.exp(-(((place + 0.1) / 0.05) ** 2) - (depth / 0.3) ** 2)
+        return max(wrong, 0.98 * np.exp(-((place / 0.1) ** 2) - ((depth - 0.6) / 0.25) ** 2))
+
+    monkeypatch.setattr(passage_alignment.PassageAligner, "correlation", correlation)
+    passage = SimpleNamespace(name="a", vehicle=SimpleNamespace(wheels=range(4)))
+    campaign = SimpleNamespace(passages=[passage], reserved=(), sensors_of=lambda p: ("A1",))
+    surface = RunningSurface(replace(FILED, spreads={NOSE: {"place": 0.002, "depth": 0.5}}), WAVES, ("main",))
+    aligner = passage_alignment.PassageAligner(campaign, SimpleNamespace(surface=surface))
+    values = passage_alignment.fit_surface(aligner, {})
+    # trials are 5 cm and a quarter of 0.5 apart
+    assert abs(values["surface_0_place"]) < 0.03 and values["surface_0_depth"] == pytest.approx(0.6, abs=0.13)
+
+
 def number(value, unit, prior=None):
     return {"value": value, "unit": unit, "source": "a drawing"} | ({"prior": prior} if prior else {})
 

@@ -75,7 +75,8 @@ def checked_predictions(observations: Sequence[Observation], predictions: Any) -
     for o, p in zip(observations, predictions):
         if not isinstance(p, np.ndarray) or p.dtype.kind not in "fiu" or p.shape != o.data.shape:
             returned = f"{p.dtype} of shape {p.shape}" if isinstance(p, np.ndarray) else type(p).__name__
-            raise ValueError(f"the prediction of {o.name!r} must be real, of shape {o.data.shape}, not {returned}")
+            expected = f"real numbers of shape {o.data.shape}"
+            raise ValueError(f"the prediction of {o.name!r} must be {expected}, not {returned}")
         if not np.all(np.isfinite(p)):
             first = int(np.argmin(np.isfinite(p)))
             raise SimulationError(f"the prediction of {o.name!r} is {p[first]} at sample {first} of {p.size}")

@@ -77,10 +77,12 @@ class JointProblem:
         Raises
         ------
         SimulationError
-            If the model cannot be simulated there, or a prediction is not finite.
+            If the model cannot be simulated there, or a parameter or prediction is not finite.
         ValueError
             If there is not one prediction for each observation, of the shape of its data.
         """
+        if not np.all(np.isfinite(theta)):  # derivatives of an extreme model may overflow
+            raise SimulationError("the parameters are not all finite")
         values, psi = self.split(theta)
         self.evaluations += 1
         predictions = self.case.predict(values, terms_of(self.candidates, psi), self.observations)

@@ -20,6 +20,7 @@ from turnout.mismatch.turnout.priors import CASE, RECEPTANCE
 from turnout.mismatch.turnout.rail_parameters import with_rail
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit
+from turnout.mismatch.turnout.support_scatter import support_errors, with_errors
 from turnout.mismatch.turnout.toe_position import with_toe
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.reasons import REASONS
@@ -157,6 +158,7 @@ def fit_hammer_start(predictor: Predictor, tests: ObservedTests, reserved: Colle
     values = {n.name: n.mean for n in nuisances}
     if all(name in reserved for name, _ in tests.observations):
         return HammerStart(predictor, tests, {}, None)
+    tests = _with_support_errors(predictor, tests, values, reserved)
     predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, values, reserved)
     for last in [False, True] if predictor.lifting else [True]:
         fitted = [o for name, o in with_errors_of_chairs.observations if name not in reserved]
@@ -164,6 +166,19 @@ def fit_hammer_start(predictor: Predictor, tests: ObservedTests, reserved: Colle
         if not last:
             predictor, with_errors_of_chairs = _with_lifting_chairs(predictor, tests, fit.values, reserved)
     return HammerStart(predictor, with_errors_of_chairs, fit.values, fit.cost / sum(o.data.size for o in fitted))
+
+
+def _with_support_errors(
+    predictor: Predictor, tests: ObservedTests, values: Values, reserved: Collection[str]
+) -> ObservedTests:
+    """Tests with the errors by single supports beside their positions, on the track of ``values``."""
+    pairs = list(tests.frf_pairs.values())
+    all_errors = support_errors(predictor, values, [o for _, o in tests.observations])
+    observations = [
+        (name, with_errors(o, errors, count_alike(pair, pairs, reserved)))
+        for (name, o), pair, errors in zip(tests.observations, pairs, all_errors)
+    ]
+    return replace(tests, observations=tuple(observations))
 
 
 def _with_lifting_chairs(

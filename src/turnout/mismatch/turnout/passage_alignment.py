@@ -7,19 +7,20 @@ where a few passages correlate best with the simulation below 30 Hz.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.fft import next_fast_len
 
 from turnout.errors import SimulationError
+from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout.campaign import CampaignInput, PassageInput
 from turnout.mismatch.turnout.channel_identity import Comparison
 from turnout.mismatch.turnout.passage_band import band_signals, limit_band, read_at
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.predictions import Values
 from turnout.mismatch.turnout.priors import ALIGNMENT, SIMULATION
-from turnout.mismatch.turnout.running_surface import POSITION_FIELDS
+from turnout.mismatch.turnout.running_surface import POSITION_FIELDS, SurfaceParameter
 from turnout.records import Recording
 from turnout.simulate.blade import is_on_blade
 from turnout.simulate.sensor import Sensor
@@ -215,27 +216,35 @@ def fit_surface(aligner: PassageAligner, values: Values) -> dict[str, float]:
         for u in sorted(surface.parameters, key=lambda u: u.field not in POSITION_FIELDS):
             if in_switch and u.field not in POSITION_FIELDS:  # the fit finds depths and lengths of tops as well
                 continue
-            centre, prior = surface_values[u.name], priors[u.name]
-            for by in _trial_steps(u.field, prior.sd, refine):
-                trial = {**surface_values, u.name: float(np.clip(centre + by, *prior.bounds))}
+            centre = surface_values
+            for step in _trial_steps(u, priors, refine, with_depth=not in_switch):
+                moved = {name: float(np.clip(centre[name] + by, *priors[name].bounds)) for name, by in step.items()}
+                trial = {**centre, **moved}
                 score = _log_posterior(aligner, {**values, **trial}, passages)
                 if score > best_score:
                     best_score, surface_values = score, trial
     return surface_values
 
 
-def _trial_steps(field: str, sd: float, refine: bool) -> list[float]:
-    if field not in POSITION_FIELDS:
-        return [f * sd * (0.5 if refine else 1.0) for f in ALIGNMENT.trial_factors]
+def _trial_steps(
+    u: SurfaceParameter, priors: Mapping[str, Nuisance], refine: bool, with_depth: bool
+) -> list[dict[str, float]]:
+    """Changes of a number of the surface to be tried, by name.
+
+    A position is first tried with the depth of its nose and with that of a worn one: with the depth of the file, a nose
+    that is worn may correlate best far from its position.
+    """
+    sd = priors[u.name].sd
+    if u.field not in POSITION_FIELDS:
+        return [{u.name: f * sd * (0.5 if refine else 1.0)} for f in ALIGNMENT.trial_factors]
     if refine:
-        return [
-            ALIGNMENT.position_step * k / ALIGNMENT.refinement
-            for k in range(-ALIGNMENT.n_fine_steps, ALIGNMENT.n_fine_steps + 1)
-            if k
-        ]
+        fine_steps = range(-ALIGNMENT.n_fine_steps, ALIGNMENT.n_fine_steps + 1)
+        return [{u.name: ALIGNMENT.position_step * k / ALIGNMENT.refinement} for k in fine_steps if k]
     step = min(ALIGNMENT.position_step, sd)
     n = int(ALIGNMENT.max_deviation * sd / step)
-    return [step * k for k in range(-n, n + 1) if k]
+    depth = f"{u.name.removesuffix(u.field)}depth"
+    depths = [{depth: f * priors[depth].sd} for f in (0.0, 1.0)] if with_depth and depth in priors else [{}]
+    return [{u.name: step * k, **change} for change in depths for k in range(-n, n + 1) if k or any(change.values())]
 
 
 def _log_posterior(aligner: PassageAligner, values: Values, passages: Sequence[PassageInput]) -> float:

@@ -19,6 +19,7 @@ from turnout.mismatch.turnout.candidates.catalogue import list_candidates
 from turnout.mismatch.turnout.case import TrackCase
 from turnout.mismatch.turnout.case_data import CaseData
 from turnout.mismatch.turnout.chair_scatter import chair_errors, with_chair_errors
+from turnout.mismatch.turnout.lifting_chairs import count_alike
 from turnout.mismatch.turnout.passage_model import Track1D
 from turnout.mismatch.turnout.passage_observation import AlignedPassage
 from turnout.mismatch.turnout.prediction import Predictor
@@ -26,6 +27,7 @@ from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.site import site_of
+from turnout.mismatch.turnout.support_scatter import support_errors, with_errors
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.records import Impact, Recording
 from turnout.simulate.hammer import Hammer, simulate_hammer
@@ -108,6 +110,11 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         for errors in chair_errors(predictor, values, [scaled]).values():
             observation = with_chair_errors(observation, scaled, errors)
         observations.append(observation)
+    predictor = predictor.with_recordings(pairs, aligned)
+    observations = [
+        with_errors(o, errors, count_alike(pairs[o.name], pairs.values(), ()))
+        for o, errors in zip(observations, support_errors(predictor, values, observations))
+    ]
     for a in aligned.values():
         data = predictor.predict_passage(values, (), a).reshape(len(a.sensors), -1)
         noise = NOISE_SHARE * np.std(data, axis=1)
@@ -115,9 +122,7 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         if predictor.track(a.passage.route).blade is not None:
             observation = passage_observation.with_chatter(observation)
         observations.append(replace(observation, modes=wheel_modes(predictor, values, a, observation.sigma)))
-    return CaseData(campaign, settings, site, pairs, aligned, tuple(observations)), predictor.with_recordings(
-        pairs, aligned
-    )
+    return CaseData(campaign, settings, site, pairs, aligned, tuple(observations)), predictor
 
 
 def _planned_campaign(plan: Plan) -> CampaignInput:

@@ -48,6 +48,9 @@ class TrackPriors:
     support_damping_sd: float = prior(
         0.15, "ln", "scatter from support to support: dampers were never measured singly", OSCARSSON)
     support_mass_sd: float = prior(0.03, "ln", "scatter of sleepers: they are cast alike", OSCARSSON)
+    support_position_sd: float = prior(
+        0.01, "m", "of a single sleeper from its place in the file: tolerances of new track are 1 to 2 cm",
+        SUPPORTS)
     rail_bending_sd: float = prior(
         0.015, "ln", "bending stiffness of the rail: wear and rolling tolerances", ERROR_MODES)
     rail_shear_sd: float = prior(
