@@ -21,6 +21,7 @@ from turnout.readers.entries import Entry, entries_of, step_entry
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_vocabulary import is_time_name
+from turnout.readers.record_borders import IMPACT_SHARE
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, RawFile, RawRecord, Source, number_or_text
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
@@ -103,11 +104,17 @@ def _fields(lines: Sequence[str], separator: str) -> dict[str, str]:
     return {cells[0].strip(): cells[1].strip() for cells in pairs if len(cells) > 1 and cells[0].strip()}
 
 
+HEADER_NAME = re.compile(rb"(?!nan\b|inf|x_value)[a-z]", re.IGNORECASE)  # at the beginning of a line: no row has it
+
+
 def _segments(data: bytes) -> list[int]:
-    """Offsets of the lines "Channels ..." at which the segments begin."""
+    """Offsets at which the headers of the segments begin; their line "Channels" need not be the first."""
     offsets, offset = [], data.find(END_OF_HEADER)
     while (offset := data.find(b"\nChannels", offset)) >= 0:
-        offsets.append(offset + 1)
+        start = offset + 1
+        while HEADER_NAME.match(data, above := data.rfind(b"\n", 0, start - 1) + 1):
+            start = above
+        offsets.append(start)
         offset += 1
     return offsets
 
@@ -147,7 +154,7 @@ def _records(
         segment.where,
     )  # fmt: skip
     n_row = len(columns[0]) if columns else 0
-    n_write, samples = _writes(source, segment, n_row, x)
+    n_write, samples = _writes(source, segment, columns, x)
     _check_lengths(source, segment, samples, columns, n_write)
     _check_starts(source, segment)
     units = fields.get("Y_Unit_Label", [])
@@ -216,19 +223,38 @@ def _seconds_per_x(x_unit: str) -> float:
     return float(unit.scale) if unit else 1.0
 
 
-def _writes(source: Source, segment: _Segment, n_row: int, x: np.ndarray | None) -> tuple[int, list[int]]:
-    """Number of writes under one header, and samples of each channel in one of them."""
+def _writes(
+    source: Source, segment: _Segment, columns: Sequence[np.ndarray], x: np.ndarray | None
+) -> tuple[int, list[int]]:
+    """Number of writes under one header, and samples of each channel in one of them.
+
+    Raises
+    ------
+    ReadError
+        If the rows are no whole number of writes, or a write has no impact: nothing tells it from a part of a record.
+    """
+    n_row = len(columns[0]) if columns else 0
     samples = segment.samples
     if not (samples and len(set(samples)) == 1 and samples[0] > 0 and n_row > samples[0]):
         return 1, samples
     if x is not None and len(x) == n_row and np.all(np.diff(x) > 0):  # one write, continued
         return 1, [n_row] * len(segment.names)
     n_write, remainder = divmod(n_row, samples[0])
+    remedy = "Set 'Segment headers: one header per segment' in LabVIEW, or copy the file again"
     if remainder:
         problem = f"{n_row} rows follow its header of {samples[0]} samples: no whole number of writes"
-        remedy = "Set 'Segment headers: one header per segment' in LabVIEW, or copy the file again"
+        raise source.error(segment.where, problem, remedy, reason="wrong_length")
+    if not any(_smallest_peak(column, n_write) >= IMPACT_SHARE for column in columns):
+        problem = f"{n_row} rows follow its header of {samples[0]} samples, and not each {samples[0]} have an impact"
+        problem = f"{problem}: they may be one record that LabVIEW wrote in parts"
         raise source.error(segment.where, problem, remedy, reason="wrong_length")
     return n_write, samples
+
+
+def _smallest_peak(column: np.ndarray, n_write: int) -> float:
+    """Smallest of the peaks of equal parts of a column, over the largest."""
+    peaks = np.abs(np.nan_to_num(column - np.nanmedian(column))).reshape(n_write, -1).max(axis=1)
+    return float(peaks.min() / peaks.max()) if peaks.max() > 0 else 0.0
 
 
 def _check_lengths(
