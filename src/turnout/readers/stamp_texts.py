@@ -27,6 +27,19 @@ DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[
 DURATION = re.compile(r" *P(?:(\d{1,5})D)?T(?:(\d{1,6})H)?(?:(\d{1,8})M)?(?:(\d{1,10})([.,]\d{1,12})?S)? *")
 # A fraction behind a colon has as many digits as ms, µs or ns; two would be frames of a film.
 FRACTION = re.compile(r"(\d{1,2}:\d{2}:\d{2}):(\d{9}|\d{6}|\d{3})(?:[.,](\d{3}|\d{6}))?(?!\d)")
+# Dates and times of day in Chinese, Japanese and Korean; "上午", "午前" and "오전" mean before noon.
+EAST_ASIAN_DAY = re.compile(
+    r"((?:19|20)\d{2})\s?[年년]\s?(\d{1,2})\s?[月월]\s?(\d{1,2})\s?[日일]\s*(?:[(（]\w+[)）]\s*)?"
+)
+EAST_ASIAN_CLOCK = re.compile(
+    r"(?:(?:(?P<am>上午|午前|오전)|(?P<pm>下午|午後|오후))\s?)?"
+    r"(?<![\d:+-])(\d{1,2})(?:\s?[时時点點시]\s?|:)(\d{1,2})(?:\s?[分분]\s?|:|(?!\d))(\d{1,2}(?:[.,]\d+)?)?(?:\s?[秒초])?"
+)
+EAST_ASIAN_MARK = re.compile("[年년时時点點시午오]")
+YEAR_MONTH_DAY = re.compile(
+    r" *((?:19|20)\d{2})\. ?(\d{1,2})\. ?(\d{1,2})\. +(?=[^\d]{0,3}\d{1,2}:)"
+)  # Korean, Hungarian
+ZONE_NAME = re.compile(r"(?<=\d|Z)\[[A-Za-z_]+(?:/[\w+-]+)*\]$")  # behind an offset, as Java and RFC 9557 print it
 # Beginnings of months in English, German, French, Danish, Italian and Spanish.
 MONTH_WORDS = {
     1: "jan gen ene", 2: "feb fev", 3: "mar mrz maer", 4: "apr avr abr", 5: "may mai maj mag", 6: "jun juin giu",
@@ -115,6 +128,7 @@ def plain_stamp(text: str) -> str:
         minutes, seconds = minutes + seconds // 60, seconds % 60
         hours, minutes = hours + minutes // 60, minutes % 60
         return f"{days + hours // 24} days {hours % 24:02}:{minutes:02}:{seconds:02}{match[5] or ''}"
+    text = YEAR_MONTH_DAY.sub(_with_dashes, with_western_marks(ZONE_NAME.sub("", text)))
     text = FRACTION.sub(lambda match: f"{match[1]}.{match[2]}{match[3] or ''}", text)
     if match := DIGITS_ALONE.match(text):
         text = "{}-{}-{}T{}:{}:{}".format(*match.groups()) + text[match.end() :]
@@ -122,6 +136,40 @@ def plain_stamp(text: str) -> str:
         if (match := alone.fullmatch(text)) and (day := _day_of(pattern, *match.groups())):
             return day.isoformat()
     return with_calendar_date(text)
+
+
+def with_western_marks(text: str) -> str:
+    """A time stamp with the words of Chinese, Japanese and Korean between its numbers replaced by dashes and colons.
+
+    Parameters
+    ----------
+    text : str
+        A cell or a value.
+
+    Returns
+    -------
+    str
+        Unchanged without such a word.
+
+    Examples
+    --------
+    >>> with_western_marks("2026年5月13日 0时30分05秒"), with_western_marks("2026-05-13 下午3:05:00")
+    ('2026-05-13 00:30:05', '2026-05-13 03:05:00 PM')
+    """
+    if not EAST_ASIAN_MARK.search(text):
+        return text
+    text = EAST_ASIAN_DAY.sub(_with_dashes, text)
+    return EAST_ASIAN_CLOCK.sub(_western_clock, text).strip()
+
+
+def _with_dashes(match: re.Match[str]) -> str:
+    return f"{match[1]}-{match[2]:0>2}-{match[3]:0>2} "
+
+
+def _western_clock(match: re.Match[str]) -> str:
+    hour, minute, second = match.groups()[2:]
+    half = " AM" if match["am"] else " PM" if match["pm"] else ""
+    return f"{hour:0>2}:{minute:0>2}:{second or '00':0>2}{half}"
 
 
 def with_calendar_date(text: str) -> str:

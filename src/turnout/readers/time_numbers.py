@@ -78,10 +78,11 @@ COUNTS = (
 # Counts whose numbers are also those of others: only the word declares them.
 DECLARED_ONLY = (_count("the modified Julian day 0", DAY, 40587, True, "mjd"),)
 UNREADABLE_WORDS = frozenset(("gps", "tai"))  # scales of time without leap seconds
+MAX_OFFSET = 14 * 3600  # s: no time zone is further from UTC, and each by whole quarters of an hour
 ORIGIN_YEARS = {"1601": "1601", "1899": "1899", "1900": "1899", "1904": "1904", "1970": "1970"}
 SINCE = re.compile(r"([^\W\d_]+) +(?:since|seit|depuis|siden|sedan|sinds|desde|dal|od) +(.+?)[\])]?$")
 ORIGIN = re.compile(
-    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(\.\d*)?)?)? ?(?:Z|UTC|[+-]0?0:?00)?",
+    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(\.\d*)?)?)? ?(?:Z|UTC)?(?:([+-]\d{1,2})(?::?(\d{2}))?)?",
 )
 # Digits that begin with a day of these years and go on: of 13 or 16 digits they may count ms or µs as well.
 DATE_IN_FRONT = re.compile(r"(?:199\d|20[0-5]\d)(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])\d")
@@ -212,14 +213,18 @@ def _declared_counts(declared: str) -> tuple[Count, ...] | None:
 
 
 def _count_since(unit: Fraction, origin: re.Match[str]) -> tuple[Count, ...]:
-    """The count of a unit [s] since a declared time, which is in UTC."""
-    *day_and_time, fraction = origin.groups()
+    """The count of a unit [s] since a declared time, which is in UTC or has an offset from it."""
+    *day_and_time, fraction, hours, minutes = origin.groups()
+    offset = 3600 * int(hours or 0) + 60 * int(f"{(hours or '+')[0]}{minutes or 0}")
     fields = [int(field or default) for field, default in zip(day_and_time, (0, 1, 1, 0, 0, 0))]
+    if abs(offset) > MAX_OFFSET or offset % 900:
+        return ()
     try:
         start = datetime(*fields)  # type: ignore[misc, arg-type]
     except ValueError:
         return ()
-    seconds = Fraction(round((datetime(1970, 1, 1) - start).total_seconds())) - Fraction(f"0{fraction or '.'}0")
+    seconds = Fraction(round((datetime(1970, 1, 1) - start).total_seconds()) + offset)
+    seconds -= Fraction(f"0{fraction or '.'}0")
     return (Count(origin[0], unit, seconds / unit, True, frozenset()),)
 
 

@@ -11,6 +11,7 @@ from turnout.errors import ReadError
 from turnout.readers.entries import Entry
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
+from turnout.readers.stamp_texts import with_western_marks
 from turnout.readers.stated_starts import DATE_WORD, OTHER, TIME_WORD, is_start_name
 from turnout.readers.time_numbers import SINCE
 from turnout.readers.time_texts import stated_time, time_of_vector
@@ -117,7 +118,7 @@ def _text_of_time(entry: Entry) -> str:
 def _moments(entries: Sequence[Entry]) -> Iterator[str]:
     """Entries with a date and a time of day of which no word before it speaks of another event."""
     for entry in entries:
-        text = entry.value[:MAX_TEXT]
+        text = with_western_marks(entry.value[:MAX_TEXT])
         match = MOMENT.search(text)
         if match and not _is_of_other(text[: match.start()]):
             yield _quotation(entry)
