@@ -8,7 +8,15 @@ from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
-from turnout.readers.entries import COLON, FREE_TEXT, Entry, decoded_json, entries_of, entries_of_text
+from turnout.readers.entries import (
+    COLON,
+    FREE_TEXT,
+    Entry,
+    decoded_json,
+    entries_of,
+    entries_of_text,
+    paired_statements,
+)
 from turnout.readers.entry_owners import container_of
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
@@ -29,6 +37,7 @@ NOT_BEHIND_NUMBER = "".join(rf"(?<!\s\d{{{n}}})" for n in range(1, 7))  # a digi
 # Behind a name; a comma within a number is a decimal mark.
 MARK = rf"(?:{COLON}|[=;\t]|{NOT_BEHIND_NUMBER},|,(?!\d))"
 HEAD_LINE = re.compile(rf"^#?\s*([^\W\d](?:[\w.'’-]| ++(?=[\w.'’-]))*+)(?:\s*+([\[(][^\])]*[\])]))?\s*{MARK}\s*(.*)$")
+LINE_OF_PAIRS = re.compile(r"([^:=;\t\d]+[/|&][^:=;\t\d]+?)\s*[:=;\t]\s*(.+)")  # names and numbers
 UNIT_BEHIND_COMMA = re.compile(r"^([^,:=;\t]+),\s*([^\W\d][^\s,:=;\t]*)(?=\s*[:=;\t]\s*[+-]?[.,]?\d)")
 
 
@@ -84,6 +93,9 @@ def entries_of_lines(
             continue
         if isinstance(mapping := decoded_json(text), Mapping):  # '# {"units": {"force": "kN"}}'
             yield from (e for e in entries_of(mapping, place) if not _is_of_condition(e))
+            continue
+        if (named := LINE_OF_PAIRS.match(text)) and (several := paired_statements(named[1], named[2].strip(separator))):
+            yield from (Entry(place, *pair) for pair in several)
             continue
         filled = cells if cells[0] else cells[1:]
         statements = [HEAD_LINE.match(cell) for cell in filled if re.search("[:=]", cell)]

@@ -3,6 +3,7 @@
 import re
 import unicodedata
 from collections.abc import Sequence
+from itertools import pairwise
 from mmap import mmap
 from typing import NamedTuple
 
@@ -133,6 +134,8 @@ def _complete_head(
     _check_row_above(texts, head_lines, cells, separator, source)
     _check_width(texts, cells, separator, len(head_lines), source)
     names, units, further, aliases, conflicts = names_and_units(texts, cells)
+    values_below, lines_of_values = _values_below_names(text_lines, separator, cells)
+    further = [name for name in further if name not in {entry.name for entry in values_below}]
     if further:
         problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
         where = f"line {len(head_lines) + 1}"
@@ -143,12 +146,15 @@ def _complete_head(
         if b and not any(rest) and a not in names and is_scale_name(a)
     }
     stated = [i for i, name in enumerate(names) if STATEMENT.fullmatch(name) and not cells[i]]
-    lines_of_entries = ["" if describes_columns(cells_of(t, separator), names, units) else t for t in head_lines]
+    lines_of_entries = [
+        "" if t in lines_of_values or describes_columns(cells_of(t, separator), names, units) else t for t in head_lines
+    ]
     # a word is no cell of a head, and where numbers have decimal commas a comma separates none
     separator_of_head = (";" if "," in "".join(cells) else ",") if separator == BLANK else separator
     entries = tuple(entries_of_lines(lines_of_entries, separator_of_head, names))
     for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
+    entries += values_below
     names = ["" if i in stated else name for i, name in enumerate(names)]
     conditions = _conditions(text_lines, separator, names)
     return Head({**conditions, **notes, **scales}, names, units, offset, separator, entries, aliases, conflicts)
@@ -198,6 +204,25 @@ def _value_of_condition(name: str, value: str, unit: str) -> float | str:
     """A condition with the unit in brackets behind its name: a text if it has a quantity, else a number if possible."""
     text = f"{value} {unit}".strip()
     return text if name in CONDITION_QUANTITIES else _value(text)
+
+
+def _values_below_names(
+    lines: Sequence[str], separator: str, cells: Sequence[str]
+) -> tuple[tuple[Entry, ...], frozenset[str]]:
+    """Entries beside the names of the columns, with their values in the line of words below them, and these lines.
+
+    As in "X,CH1,Increment" above "Sequence,VOLT,5E-05", they stand where the first row has no cell, or an empty one.
+    """
+    filled = [i for i, cell in enumerate(cells) if cell]
+    for title, line in pairwise(lines):
+        names, values = cells_of(title, separator), cells_of(line, separator)
+        words = [row[i] for row in (names, values) for i in filled if i < len(row)]
+        if len(filled) < 2 or len(words) < 2 * len(filled) or not all(words) or any(map(is_number, words)):
+            continue
+        pairs = [(a, b) for i, (a, b) in enumerate(zip(names, values)) if i not in filled and a and is_number(b)]
+        if entries := tuple(Entry(f"the line below {a!r}", a, b) for a, b in pairs if not is_number(a)):
+            return entries, frozenset((title, line))
+    return (), frozenset()
 
 
 STATEMENT = re.compile(r"[^\d\W][^=]*=\s*[+-]?\d.*")  # in place of a name, above cells that are empty
@@ -257,10 +282,11 @@ def _check_row_above(
 ) -> None:
     """ReadError if the line above the first line of numbers is a row of samples, with a cell that is no number.
 
-    Such a row has numbers, and the names of the columns stand above it. A text in its first cell alone is a label.
+    Such a row has numbers in columns of samples, and the names of the columns stand above it. A text in its first cell
+    alone is a label.
     """
     row = texts[-1] if texts and texts[-1] == cells_of(lines[-1], separator) else []
-    numbers = [is_number(cell) for cell in row]
+    numbers = [is_number(cell) and bool(sample) for cell, sample in zip(row, cells)]
     is_label = len(row) > 1 and not numbers[0] and all(n or not cell for n, cell in zip(numbers[1:], row[1:]))
     if len(row) != len(cells) or not any(numbers) or is_label:
         return

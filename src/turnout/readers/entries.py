@@ -139,8 +139,46 @@ def entries_of(variables: Mapping[Any, Any], place: str) -> Iterator[Entry]:
             for i, v in enumerate(value):
                 if isinstance(v, Mapping):
                     yield from entries_of(v, f"{path}[{i}]")
+        elif pairs := paired_statements(name, value):
+            yield from (Entry(path, *pair) for pair in pairs)
         elif value is not None and not isinstance(value, ReadError) and getattr(value, "size", 1) <= MAX_ENTRIES:
             yield Entry(path, name, value)
+
+
+PAIR_MARK = re.compile(r"\s*[/|&]\s*")
+BEGINS_WITH_NUMBER = re.compile(r"[+-]?[.,]?\d")
+
+
+def paired_statements(name: str, value: Any) -> tuple[tuple[str, str], ...]:
+    """Names and values of an entry that states several numbers, "Block length/delta: 64 / 5E-05".
+
+    Parameters
+    ----------
+    name : str
+        Name of the entry.
+    value : any
+        Its value.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Empty without as many numbers as names; a unit such as "mV/g" is none of two names.
+
+    Examples
+    --------
+    >>> paired_statements("Rate/Resolution", "25600 Hz / 24 bit"), paired_statements("Panel/Track", "CP/2")
+    ((('Rate', '25600 Hz'), ('Resolution', '24 bit')), ())
+    """
+    if not isinstance(value, str) or len(value) > MAX_PAIRED or not PAIR_MARK.search(name):
+        return ()
+    names, values = PAIR_MARK.split(name.strip()), PAIR_MARK.split(value.strip())
+    are_words = all(re.search(r"[^\W\d_]{2}", word) for word in names) and not is_of_drawing(name)
+    if len(names) != len(values) or not are_words or not all(map(BEGINS_WITH_NUMBER.match, values)):
+        return ()
+    return tuple(zip(names, values))
+
+
+MAX_PAIRED = 80  # characters of such a value
 
 
 def decoded_json(text: str) -> Any:

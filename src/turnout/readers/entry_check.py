@@ -16,6 +16,7 @@ from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, w
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
+from turnout.readers.scale_vocabulary import is_time_per_division
 from turnout.readers.sensitivity_comparison import other_sensitivities, uncompared_sensitivities
 from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_scales import without_checked_signs
@@ -75,7 +76,7 @@ class EntryCheck:
         return text.partition(": ")[0].strip().casefold() in self.checked
 
     def without_checked(self, record: RawRecord) -> RawRecord:
-        """The record without the entries that the layout declares checked: they state nothing about it.
+        """The record without entries that state nothing about it: by the layout, or about divisions of a screen.
 
         Parameters
         ----------
@@ -87,15 +88,17 @@ class EntryCheck:
         RawRecord
             The same record if there are none.
         """
-        if not self.checked:
+        screen = {e.name.strip().casefold() for e in record.entries if is_time_per_division(e.name, e.value)}
+        if not self.checked and not screen:
             return record
         undecided = {i: without_checked_signs(text, self.checked) for i, text in record.undecided.items()}
         if undecided != dict(record.undecided):
             record = replace(record, undecided={i: text for i, text in undecided.items() if text})
-        entries = tuple(e for e in record.entries if e.name.strip().casefold() not in self.checked)
+        names = self.checked | screen
+        entries = tuple(e for e in record.entries if e.name.strip().casefold() not in names)
         if len(entries) == len(record.entries):
             return record
-        dropped = {" ".join(str(e.value).split()) for e in record.entries if e.name.strip().casefold() in self.checked}
+        dropped = {" ".join(str(e.value).split()) for e in record.entries if e.name.strip().casefold() in names}
         zones = [text for text in record.unread_zone.split(OR) if text not in dropped and not self.is_checked(text)]
         return replace(record, entries=entries, unread_zone=OR.join(zones))
 

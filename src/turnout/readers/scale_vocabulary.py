@@ -156,6 +156,8 @@ def scale_meaning(name: str) -> str:
     >>> [scale_meaning(n) for n in ("gain", "DC offset", "Polarity", "adc_to_volt", "Trigger polarity", "Crest factor")]
     ['factor', 'possibly offset', 'inversion', 'possibly factor', '', '']
     """
+    if is_time_per_division(name):
+        return ""
     word = plain_word(name)
     stem = word.rstrip("0123456789")
     if stem in FACTOR_WORDS or stem in OFFSET_WORDS:
@@ -249,6 +251,40 @@ def is_of_drawing(text: str) -> bool:
         True for "1:500 map" and the like.
     """
     return any(DRAWN.fullmatch(word) for word in words_of(text))
+
+
+# The time that a division of a screen stands for: "Time/div: 1 ms", "Points/div: 25.6", "Timebase: 5 ms/div".
+DIVISION = r"(?:\s?/\s?|\s(?:per|pro)\s)div(?:s|isions?)?\b"
+NAME_PER_DIVISION = re.compile(
+    rf"(?:time|zeit|temps|tid|s|[mun]s|sec|seconds?|points|pts|samples|timebase|horizontal)\b.*{DIVISION}.*",
+    re.IGNORECASE,
+)
+TIME_PER_DIVISION = re.compile(rf"\s*[\d.,]+(?:[eE][+-]?\d+)?\s?(?:s|[mnuµμ]s|sec){DIVISION}\s*", re.IGNORECASE)
+
+
+def is_time_per_division(name: str, value: object = "") -> bool:
+    """Whether an entry states how much time a division of a screen stands for, which is about no sample.
+
+    Parameters
+    ----------
+    name : str
+        Name of the entry.
+    value : object
+        Its value.
+
+    Returns
+    -------
+    bool
+        False for volts per division, which may be a scale.
+
+    Examples
+    --------
+    >>> [is_time_per_division(*e) for e in (("Time/div", "1 ms"), ("Timebase", "5 ms/div"), ("Volts/div", "1 V"))]
+    [True, True, False]
+    """
+    text = value if isinstance(value, str) else ""
+    is_line = len(re.findall(r"\d+", text)) == 1 and NAME_PER_DIVISION.fullmatch(text.strip())  # "TIME/DIV,500us"
+    return bool(is_line or TIME_PER_DIVISION.fullmatch(text) or NAME_PER_DIVISION.fullmatch(name.strip()))
 
 
 SCALE_OF_DRAWING = re.compile(r"(?:drawing|map|plan)?scale|massstab|echelle|escala|scala|skala")

@@ -82,7 +82,8 @@ MAX_OFFSET = 14 * 3600  # s: no time zone is further from UTC, and each by whole
 ORIGIN_YEARS = {"1601": "1601", "1899": "1899", "1900": "1899", "1904": "1904", "1970": "1970"}
 SINCE = re.compile(r"([^\W\d_]+) +(?:since|seit|depuis|siden|sedan|sinds|desde|dal|od) +(.+?)[\])]?$")
 ORIGIN = re.compile(
-    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(\.\d*)?)?)? ?(?:Z|UTC)?(?:([+-]\d{1,2})(?::?(\d{2}))?)?",
+    r"(\d{4})(?:-(\d{1,2})-(\d{1,2}))?(?:[ T](\d{1,2}):(\d{1,2})(?::(\d{1,2})(\.\d*)?)?)?"
+    r" ?(?:Z|UTC)?(?:([+-]\d{1,2})(?::?(\d{2}))?)?",
 )
 # Digits that begin with a day of these years and go on: of 13 or 16 digits they may count ms or µs as well.
 DATE_IN_FRONT = re.compile(r"(?:199\d|20[0-5]\d)(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01])\d")
