@@ -81,9 +81,9 @@ BESIDE_DURATION = frozenset("total time length of the s sec second seconds min".
 RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
 # How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
 CONVERSION = re.compile(
-    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?:(?!1(?![\d.,]))\d|[-\u2212]\s?1(?![\d.,]|\s?[cmk]?m\b))|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)])|-?fach|-?fold)"
+    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?:(?!1(?![\d.,]))\d|[-\u2212]\s?1(?![\d.,]|\s?[cmk]?m\b))|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)]|\s?[+-]\s?\d)|-?fach|-?fold)"
     r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:re)?scaled\b[^\d;,]{0,8}\d"
-    r"|\bslope\b[^;]{1,20}\b(?:intercept|offset)\b|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?\*|\*\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
+    r"|\bslope\b[^;]{1,20}\b(?:intercept|offset)\b|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?[*·⋅]|[*·⋅]\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
     rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
     r"|(?:/\s?|\bper\s)(?:bit|lsb|count|digit|code|step|adu|div)s?\b|\b(?-i:Q)\d{1,2}(?:\.\d{1,2})?\b",
     re.IGNORECASE,

@@ -29,16 +29,12 @@ from turnout.readers.recording_versions import check_groups
 from turnout.readers.source import COPY_AGAIN, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_in_columns
 from turnout.readers.start_times import start_fields
-from turnout.readers.stated_scales import scale_text, without_drawings
 from turnout.readers.tdms_abscissas import UNIT_NAME, check_steps, seconds_of_abscissa, unit_of_abscissa, unknown_unit
+from turnout.readers.tdms_scales import SCALE_TYPE, stated_scale
 from turnout.readers.time_texts import parse_time
 
 nptdms.log.log_manager.console_handler.setLevel("ERROR")  # turnout.readers passes the warnings on
 BIG_ENDIAN = 1 << 6  # bit of the mask in the lead-in
-# Kinds of scale that npTDMS applies; of any other it only warns, and returns the raw numbers.
-KNOWN_SCALES = frozenset("Polynomial Linear RTD Strain Table Thermistor Thermocouple Add Subtract AdvancedAPI".split())
-SCALE_TYPE = re.compile(r"NI_Scale\[(\d+)\]_Scale_Type")
-APPLIED_PREFIXES = ("wf_", "NI_")  # properties of the time axis and of the scales that npTDMS applies
 LEAD_IN = 28  # bytes: tag, mask, version, offset of the next segment, offset of the raw data
 UNFINISHED_SEGMENT = 0xFFFFFFFFFFFFFFFF
 
@@ -314,9 +310,7 @@ def _complete_record(
     samples = [_scaled_numbers(c, where, source) for c in channels]
     facts = Metadata({**tdms.properties, **groups[channels[0].group_name], **channels[0].properties}, source)
     undecided = {
-        i: text
-        for i, c in enumerate(channels)
-        if (text := _scale_text(c.properties, groups[c.group_name], tdms.properties))
+        i: text for i, c in enumerate(channels) if (text := stated_scale(c, groups[c.group_name], tdms.properties))
     }
     return RawRecord(
         names=tuple(c.name for c in channels),
@@ -344,23 +338,6 @@ def _is_remark(channel: nptdms.TdmsChannel, channels: Sequence[nptdms.TdmsChanne
     """Whether a channel holds text of another length than the channels with a time axis beside it."""
     lengths = {len(c) for c in channels if "wf_increment" in c.properties}
     return channel.data_type is nptdms.types.String and bool(lengths) and len(channel) not in lengths
-
-
-def _scale_text(*levels: Mapping[str, Any]) -> str:
-    """What the properties of a channel, its group and the file state of a scale that npTDMS does not apply."""
-    for properties in levels:
-        kinds = {int(m[1]): str(v) for k, v in properties.items() if (m := SCALE_TYPE.fullmatch(k))}
-        count = properties.get("NI_Number_Of_Scales", len(kinds))
-        if not str(count).isdigit() or not kinds or properties.get("NI_Scaling_Status") == "scaled":
-            continue
-        if (last := max(kinds)) >= int(count) and "NI_Number_Of_Scales" in properties:
-            return f"the file states the scale {kinds[last]!r} and a number of scales of {count}: it is not applied"
-        if unknown := sorted(set(kinds.values()) - KNOWN_SCALES):
-            return f"the file states the scale {', '.join(map(repr, unknown))}, which npTDMS cannot apply"
-        break
-    shown = [without_drawings(level) for level in levels[:0:-1]] + [levels[0]]
-    merged = {k: v for level in shown for k, v in level.items() if not k.startswith(APPLIED_PREFIXES)}
-    return scale_text(merged)
 
 
 def _entries(
