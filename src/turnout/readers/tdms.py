@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from datetime import UTC, timedelta
+from itertools import combinations, starmap
 from typing import Any, BinaryIO
 
 import nptdms
@@ -173,7 +174,7 @@ def _records_of_groups(groups: Sequence[nptdms.TdmsGroup], source: Source) -> li
         )
     for groups_of_record in records:
         axes = [_time_axis(g.channels()[0], source) for g in groups_of_record]
-        if any(axis != axes[0] for axis in axes):
+        if not all(starmap(_are_one_axis, combinations(axes, 2))):
             listed = "; ".join(f"{g.name!r}: {_axis_text(*axis)}" for g, axis in zip(groups_of_record, axes))
             remedy = f"Start all tasks by one trigger at one rate. {export}"
             raise source.error("the groups", f"{problem}their time axes differ ({listed})", remedy, "clock_drift")
@@ -205,6 +206,16 @@ def _time_axis(channel: nptdms.TdmsChannel, source: Source) -> tuple[int, float,
     facts = Metadata(channel.properties, source)
     step = (facts.number(("wf_increment",)) or 0.0) * seconds_of_abscissa(channel.properties)
     return len(channel), step, facts.record_value(("wf_start_time",), 0, 1)
+
+
+def _are_one_axis(first: tuple[int, float, Any], second: tuple[int, float, Any]) -> bool:
+    """Whether two time axes have the same samples: starts that are stated differ by half a step at most."""
+    (*size, start), (*other_size, other_start) = first, second
+    if size != other_size or start is None or other_start is None:
+        return size == other_size
+    if not isinstance(start, np.datetime64) or not isinstance(other_start, np.datetime64):
+        return bool(start == other_start)
+    return bool(abs(start - other_start) / np.timedelta64(1, "s") <= 0.5 * first[1])
 
 
 MAX_OFFSET = 1e5  # s: a day; what is more is no time from the time stamp to the first sample

@@ -4,6 +4,7 @@ import nptdms
 import numpy as np
 import pytest
 
+from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 
@@ -95,3 +96,32 @@ def test_only_channels_in_use_are_sampled_over_the_time(unit, step, tmp_path):
         result = read("a.tdms", tmp_path, description)
         assert len(result.recordings) == n_record and len(result.errors) == 1 - n_record
         assert n_record or "and not over the time" in str(result.errors[0])
+
+
+GROUPS = ("Accel", "Hammer", "Spare")
+
+
+@pytest.mark.parametrize(
+    ("starts", "are_one"),
+    [
+        *[((0.0, 2e-5, None), True), ((None, 0.0, None), True), ((0.0, None, 2e-5), True)],
+        *[((0.0, None, 3e-5), False), ((None, 0.0, 1e-3), False), ((0.0, 0.0, -1.0), False)],
+    ],
+)
+def test_groups_of_tasks_may_start_half_a_sample_apart_or_state_no_start(starts, are_one, tmp_path):
+    """Each task of one trigger has a time stamp of its own, or none."""
+    origin = np.datetime64("2026-05-13T08:00:00", "us")
+    samples = dict(zip(("rail", "force", "spare"), np.random.default_rng(3).normal(size=(3, 200))))
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as file:
+        for group, start, (name, values) in zip(GROUPS, starts, samples.items()):
+            stamp = {} if start is None else {"wf_start_time": origin + np.timedelta64(round(1e6 * start), "us")}
+            file.write_segment([nptdms.ChannelObject(group, name, values, {"wf_increment": 5e-5, **stamp})])
+    sensors = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
+    description = RawDescription((*sensors, RawChannel("spare", "spare", "ignored")), rate=20000.0)
+    if not are_one:
+        with pytest.raises(ReadError, match="their time axes differ"):
+            read("a.tdms", tmp_path, description)
+        return
+    (recording,) = read("a.tdms", tmp_path, description).recordings
+    np.testing.assert_array_equal(recording.signal("rail"), samples["rail"])
+    assert abs((recording.started_at - origin.item()).total_seconds()) < 1e-3
