@@ -33,6 +33,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
 from turnout.readers.clock_texts import is_clock_or_date
+from turnout.readers.csv_blank_rows import blank_end_remarks, end_without_blank_rows
 from turnout.readers.csv_cells import (
     BLANK,
     BREAK_IN_CELL,
@@ -88,7 +89,9 @@ def read_raw(source: Source) -> RawFile:
     if not lazy or has_other_notation(source.head) or BREAK_IN_CELL.search(source.head):
         lazy, data = False, with_whole_cells(with_plain_numbers(data[:end]))
         end = len(data)
-    end, further_remarks = _end_of_rows(data, _end_of_text(data, end), source)
+    end_of_text = end_without_blank_rows(data, end)
+    blank_rows = data[end_of_text:end]
+    end, further_remarks = _end_of_rows(data, end_of_text, source)
     remarks += further_remarks
     if isinstance(data, bytes):
         data = data[:end]
@@ -102,6 +105,7 @@ def read_raw(source: Source) -> RawFile:
     raw = _read_table(data, end, lazy, head, source)
     if data[end - 1 : end] not in (b"\n", b"\r"):
         remarks += _short_record_remarks(raw.records, source)
+    remarks += blank_end_remarks(blank_rows, raw.records, source)
     return replace(raw, remarks=remarks + raw.remarks)
 
 
@@ -270,16 +274,6 @@ def _end_of_content(data: bytes | mmap, source: Source) -> tuple[int, tuple[Read
     else:
         end = len(data)
     return end - (data[end - 1 : end] == END_OF_FILE), remarks
-
-
-EMPTY_LINE = re.compile(rb"[;,\t| \"\r]*")
-
-
-def _end_of_text(data: bytes | mmap, end: int) -> int:
-    """Byte behind the last line with content: spreadsheets write rows of separators alone below the table."""
-    while (start := data.rfind(b"\n", 0, max(end - 1, 0)) + 1) and EMPTY_LINE.fullmatch(data[start:end].rstrip(b"\n")):
-        end = start
-    return end
 
 
 END_OF_FILE = b"\x1a"  # the mark with which programs of DOS end a text

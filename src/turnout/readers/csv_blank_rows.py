@@ -2,16 +2,72 @@
 
 import re
 from collections.abc import Sequence
+from mmap import mmap
 
 import numpy as np
 import pyarrow as pa
 
+from turnout.errors import ReadError
 from turnout.readers.record_columns import may_number_records
-from turnout.readers.source import Source
+from turnout.readers.source import RawRecord, Source
+from turnout.readers.stated_counts import stated_counts
 
 SEPARATORS_AND_BLANKS = b';,\t| "\r'
 BLANK_ROW = re.compile(rb'^[;,\t| "\r]+$', re.MULTILINE)
 REMEDY = "Delete them if they are no samples; export each record to a file, or number them in a column 'record'"
+
+
+EMPTY_LINE = re.compile(rb"[;,\t| \"\r]*")
+MIN_LOST_ROWS = 32  # rows of separators below the samples: fewer lost samples are under 2 ms of a decay at usual rates
+
+
+def end_without_blank_rows(data: bytes | mmap, end: int) -> int:
+    """Byte behind the last line with content: spreadsheets write rows of separators alone below the table.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the text.
+    end : int
+        Byte behind the text.
+
+    Returns
+    -------
+    int
+        ``end`` if its last line has content.
+    """
+    while (start := data.rfind(b"\n", 0, max(end - 1, 0)) + 1) and EMPTY_LINE.fullmatch(data[start:end].rstrip(b"\n")):
+        end = start
+    return end
+
+
+def blank_end_remarks(rows: bytes, records: Sequence[RawRecord | ReadError], source: Source) -> tuple[ReadError, ...]:
+    """Remark on rows of separators below the samples: a logger may have written them in place of its last samples.
+
+    Parameters
+    ----------
+    rows : bytes
+        The rows without content behind the last one with content.
+    records : sequence of RawRecord or ReadError
+        Records of the file.
+    source : Source
+        The text file.
+
+    Returns
+    -------
+    tuple of ReadError
+        Empty for few rows, for empty lines, and if the file states as many samples as it has.
+    """
+    n_row = sum(1 for line in rows.splitlines() if line.strip(b" \r\n"))
+    read = [record for record in records if isinstance(record, RawRecord) and record.samples]
+    n_samples = {len(record.samples[0]) for record in read}
+    if n_row < MIN_LOST_ROWS or any(stated_counts(record) & {*n_samples, sum(n_samples)} for record in read):
+        return ()
+    problem = f"{n_row} rows of separators stand below its last sample: they may be in place of lost samples"
+    return (source.error("the end", problem, BLANK_END_REMEDY, reason="entry_unknown"),)
+
+
+BLANK_END_REMEDY = "Compare the number of samples with the logger's own program; delete these rows if none is missing"
 
 
 def with_empty_lines(rows: bytes) -> bytes:

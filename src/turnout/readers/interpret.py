@@ -33,7 +33,7 @@ from turnout.readers.sample_faults import (
 from turnout.readers.simultaneous_records import simultaneous_errors
 from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
-from turnout.readers.stated_counts import missing_samples, unfilled_buffer
+from turnout.readers.stated_counts import missing_samples, surplus_samples, unfilled_buffer
 from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unread_starts import is_of_other_day
@@ -81,10 +81,12 @@ def convert_records(
     order_errors = check_order(starts, source)
     start_of = dict(starts)
     assignments, entry_check = Assignments(description.channels, source), EntryCheck(description, source)
-    n_total = sum(len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples))
     is_whole = all(isinstance(r, RawRecord) for r in raw.records)
     limit = max_duration if source.lazy and description.kind == "passage" else None
-    conversion = _Conversion(len(raw.records), assignments, entry_check, description, source, limit)
+    lengths = [len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples)]
+    conversion = _Conversion(
+        len(raw.records), min(lengths, default=0), assignments, entry_check, description, source, limit
+    )
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
@@ -92,7 +94,7 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             record = entry_check.without_checked(record)
-            if is_whole and (problem := missing_samples(record, n_total)):
+            if is_whole and (problem := missing_samples(record, sum(lengths))):
                 raise source.error(f"record {k + 1} of {len(raw.records)}", problem, COPY_AGAIN, reason="truncated")
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
@@ -186,10 +188,11 @@ def _copy_or_correct(key: str, promised: int | None) -> str:
 class _Conversion:
     """What the ``n_record`` records of a file have in common.
 
-    A record that is longer than ``max_duration`` [s] stays in the file.
+    The shortest has ``n_shortest`` samples. A record that is longer than ``max_duration`` [s] stays in the file.
     """
 
     n_record: int
+    n_shortest: int
     assignments: Assignments
     entry_check: EntryCheck
     description: RawDescription
@@ -246,6 +249,10 @@ class _Conversion:
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
         of_marks += _axes_remarks(record, checked, where, source)
+        problem, name = surplus_samples(record, self.n_shortest, self.n_record)
+        if problem and not description.n_samples:
+            remedy = f"Find out what the others are; if it counts something else, write 'checked_entries: {name}'"
+            of_marks.append(source.error(where, problem, f"{remedy} into the layout", reason="entry_unknown"))
         channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors

@@ -313,7 +313,8 @@ def _entries(fields: Mapping[str, list[str]], x_unit: str) -> Iterator[Entry]:
             yield step_entry("header of the segment: Delta_X", step, x_unit)
             continue
         for value in dict.fromkeys(value for value in values if value):
-            yield Entry(f"header of the segment: {name}", name, value)
+            # of several writes under one header it counts the first
+            yield Entry(f"header of the segment: {name}", name, value, is_defined=name == "Samples")
 
 
 def _date_and_time(date: str, clock: str) -> str:

@@ -4,9 +4,11 @@ A number of valid samples that is less than theirs is that of a buffer that was 
 """
 
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any
 
+from turnout.readers.entries import Entry
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.rate_units import words_of
 from turnout.readers.source import RawRecord
@@ -39,6 +41,57 @@ def missing_samples(record: RawRecord, n_sample: int) -> str:
         if "_".join(words_of(entry.name)) in COUNT_NAMES and (promised := _whole_number(entry.value)) > n_sample:
             return f"the file ends after {n_sample} of the {promised} samples that {entry.place} states"
     return ""
+
+
+def stated_counts(record: RawRecord) -> frozenset[int]:
+    """Numbers of samples that the metadata of a record state.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+
+    Returns
+    -------
+    frozenset of int
+        Without those that the format itself defines.
+    """
+    return frozenset(number for _, number in _counts(record))
+
+
+def surplus_samples(record: RawRecord, n_sample: int, n_record: int = 1) -> tuple[str, str]:
+    """A stated number of samples that is less than those of the record: they may be of two recordings, or of a buffer.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as it is in the file.
+    n_sample : int
+        Samples of the shortest record of the file.
+    n_record : int
+        Records of the file.
+
+    Returns
+    -------
+    tuple of (str, str)
+        The problem, for a message, and the name of the entry; "" if a number is that of the samples, the last index,
+        the channels or the records.
+    """
+    counts = tuple(_counts(record))
+    explained = {n_sample, n_sample - 1, n_sample * n_record, n_record, len(record.names)}
+    for entry, number in counts:
+        if 0 < number < n_sample and not explained & {n for _, n in counts}:
+            place = f"{entry.name!r} in {entry.place}" if entry.place else repr(entry.name)
+            return f"{place} is {number}, and there are {n_sample} samples", entry.name
+    return "", ""
+
+
+def _counts(record: RawRecord) -> Iterator[tuple[Entry, int]]:
+    """Entries that are called a number of samples, with the number."""
+    for entry in record.entries:
+        is_count = not entry.is_defined and "_".join(words_of(entry.name)) in COUNT_NAMES
+        if is_count and (number := _whole_number(entry.value)):
+            yield entry, number
 
 
 def unfilled_buffer(record: RawRecord, n_sample: int, n_record: int = 1) -> str:
