@@ -2,12 +2,12 @@
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from mmap import mmap
 from typing import NamedTuple
 
-from turnout.readers.attached_units import TIME_WORDS, name_and_unit, unit_behind_mark
+from turnout.readers.attached_units import TIME_WORDS, is_known, name_and_unit, unit_behind_mark
 from turnout.readers.csv_blank_rows import BLANK_ROW
 from turnout.readers.csv_cells import (
     BLANK,
@@ -133,8 +133,10 @@ def _complete_head(
     texts += _commented_names(head_lines[-MAX_LINES_OF_NAMES:], texts, len(cells), separator)
     _check_row_above(texts, head_lines, cells, separator, source)
     _check_width(texts, cells, separator, len(head_lines), source)
-    names, units, further, aliases, conflicts = names_and_units(texts, cells)
     values_below, lines_of_values = _values_below_names(text_lines, separator, cells)
+    if values_below:
+        texts = list(_without_values(texts, [cells_of(line, separator) for line in lines_of_values], cells))
+    names, units, further, aliases, conflicts = names_and_units(texts, cells)
     further = [name for name in further if name not in {entry.name for entry in values_below}]
     if further:
         problem = f"{len(names) + len(further)} columns have a name and the rows have {len(cells)} cells"
@@ -155,6 +157,7 @@ def _complete_head(
     for i in stated:  # "CH1(V),CH2(V),t0 = -0.01,tInc = 5e-05"
         entries += tuple(entries_of_text(names[i], f"the name of column {i + 1}"))
     entries += values_below
+    stated += [i for i, name in enumerate(names) if not cells[i] and name in {entry.name for entry in values_below}]
     names = ["" if i in stated else name for i, name in enumerate(names)]
     conditions = _conditions(text_lines, separator, names)
     return Head({**conditions, **notes, **scales}, names, units, offset, separator, entries, aliases, conflicts)
@@ -223,6 +226,19 @@ def _values_below_names(
         if entries := tuple(Entry(f"the line below {a!r}", a, b) for a, b in pairs if not is_number(a)):
             return entries, frozenset((title, line))
     return (), frozenset()
+
+
+def _without_values(
+    texts: Sequence[list[str]], lines_of_values: Sequence[list[str]], cells: Sequence[str]
+) -> Iterator[list[str]]:
+    """Cells of the lines above the rows; of the line with values below names the units alone, if it has some."""
+    for line in texts:
+        is_of_values = line in lines_of_values and any(map(is_number, line))
+        words = [word for word, cell in zip(line, cells) if cell]
+        if not is_of_values:
+            yield line
+        elif 2 * sum(is_known(word.strip("[]() ")) for word in words) >= len(words):
+            yield ["" if is_number(cell) else cell for cell in line]
 
 
 STATEMENT = re.compile(r"[^\d\W][^=]*=\s*[+-]?\d.*")  # in place of a name, above cells that are empty

@@ -81,6 +81,7 @@ def convert_records(
     order_errors = check_order(starts, source)
     start_of = dict(starts)
     assignments, entry_check = Assignments(description.channels, source), EntryCheck(description, source)
+    n_total = sum(_lengths(raw))
     is_whole = all(isinstance(r, RawRecord) for r in raw.records)
     limit = max_duration if source.lazy and description.kind == "passage" else None
     lengths = [len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples)]
@@ -94,7 +95,7 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             record = entry_check.without_checked(record)
-            if is_whole and (problem := missing_samples(record, sum(lengths))):
+            if is_whole and (problem := missing_samples(record, n_total)):
                 raise source.error(f"record {k + 1} of {len(raw.records)}", problem, COPY_AGAIN, reason="truncated")
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
@@ -124,6 +125,15 @@ def convert_records(
     return tuple(recordings), tuple(errors)
 
 
+def _lengths(raw: RawFile) -> list[int]:
+    """Samples of each record that was read."""
+    return [len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples)]
+
+
+def _shortest(raw: RawFile) -> int:
+    return min(_lengths(raw), default=0)
+
+
 def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     """Errors about a raw file that need no layout: what ``convert_records`` would report or reject.
 
@@ -143,6 +153,11 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     yield from raw.remarks
     first = next((r for r in raw.records if isinstance(r, RawRecord)), None)
     yield from [] if first is None else _axes_remarks(first, (), f"record 1 of {len(raw.records)}", source)
+    yield from (
+        []
+        if first is None
+        else _surplus_remarks(first, _shortest(raw), len(raw.records), f"record 1 of {len(raw.records)}", source)
+    )
     yield from lost_entry_errors(raw.records, source)
     records = [(k, record) for k, record in enumerate(raw.records) if isinstance(record, RawRecord)]
     unread = {k: record.unread_start for k, record in records if record.unread_start}
@@ -249,10 +264,8 @@ class _Conversion:
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
         of_marks += _axes_remarks(record, checked, where, source)
-        problem, name = surplus_samples(record, self.n_shortest, self.n_record)
-        if problem and not description.n_samples:
-            remedy = f"Find out what the others are; if it counts something else, write 'checked_entries: {name}'"
-            of_marks.append(source.error(where, problem, f"{remedy} into the layout", reason="entry_unknown"))
+        if not description.n_samples:
+            of_marks += _surplus_remarks(record, self.n_shortest, self.n_record, where, source)
         channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
@@ -265,6 +278,16 @@ def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, sourc
         if name.strip().casefold() not in checked:
             remedy = f"{AXES_REMEDY}; if it is right, write 'checked_entries: {name}' into the layout"
             yield source.error(f"{where}, variable {name!r}", problem, remedy, reason="entry_unknown")
+
+
+def _surplus_remarks(
+    record: RawRecord, n_shortest: int, n_record: int, where: str, source: Source
+) -> Iterator[ReadError]:
+    """Remark on a stated number of samples that is less than that of the shortest record."""
+    problem, name = surplus_samples(record, n_shortest, n_record)
+    if problem:
+        remedy = f"Find out what the others are; if it counts something else, write 'checked_entries: {name}'"
+        yield source.error(where, problem, f"{remedy} into the layout", reason="entry_unknown")
 
 
 def _measurement(record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float) -> Measurement:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_readers_notations_of_starts import WRITERS
 
-from turnout.readers import read
+from turnout.readers import names_and_units, read
 from turnout.records import RawChannel, RawDescription
 
 TRUE, OTHER = 25600.0, 20000.0
@@ -98,3 +98,10 @@ def test_a_division_of_a_screen_is_about_no_sample(line, tmp_path):
 @pytest.mark.parametrize("line", ["Timebase: 39.0625 us/pt", "Time/div 1 ms, Fs: 25600", "Time/point: 39.0625 us"])
 def test_a_time_of_a_sample_beside_a_division_is_compared(line, tmp_path):
     assert not head_file(tmp_path, line).recordings
+
+
+@pytest.mark.parametrize("kind", VALUES_BELOW_NAMES)
+def test_the_names_are_those_above_the_values(kind, tmp_path):
+    scope_file(tmp_path, kind, ",")
+    names = [name for name, _ in names_and_units("a.csv", tmp_path)]
+    assert names in (["CH1", "CH2"], ["X", "CH1", "CH2"])  # a time in seconds is no channel

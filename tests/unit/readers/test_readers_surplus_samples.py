@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from test_readers_notations_of_starts import LAYOUT, NOISE, WRITERS
 
-from turnout.readers import read
+from turnout.readers import read, read_unconverted
+from turnout.readers.interpret import errors_without_layout
 
 N = NOISE.shape[1]
 COUNT = "number_of_samples"
@@ -61,3 +62,10 @@ def test_few_such_rows_and_empty_lines_are_accepted(end, tmp_path):
 @pytest.mark.parametrize("name", ["Number of samples", "Anzahl Messwerte"])
 def test_a_stated_number_of_samples_explains_them(name, tmp_path):
     assert text_with_end(tmp_path, 300 * ";\n", f"fs: 20000\n{name}: {N}") == ()
+
+
+def test_fewer_stated_samples_need_no_layout(tmp_path):
+    WRITERS[0](tmp_path / "a", COUNT, N // 2)
+    source, _, raw = read_unconverted("a.csv", tmp_path)
+    (error,) = errors_without_layout(raw, source)
+    assert f"is {N // 2}, and there are {N} samples" in error.problem
