@@ -198,6 +198,7 @@ def axle_counts(envelopes: SensorEnvelopes, motion: Motion, settings: PassageSet
 
 
 MIN_CORRELATION = 0.25  # least correlation of the residual between sensors
+N_FASTER = 9  # trials of a motion faster than any train, with its limits: waves of an impact
 MIN_LEVEL_SHARE = 0.1  # least level of the second train along its own motion, in half of the sensors, over the first's
 
 
@@ -206,9 +207,9 @@ def second_train(envelopes: SensorEnvelopes, passage: Passage, settings: Passage
 
     The common level of all sensors along the known train is subtracted from each: the lower median. A second train
     stays in the residual, since at every sensor it is elsewhere along the first. An impact at a fixed position, as at
-    the crossing's nose, stays too, at the sensors beside it or at all at one moment. So half of the sensors must
-    record the second train at a tenth of the first one's level, each at its own time. Needs three sensors, else there
-    is no finding.
+    the crossing's nose, stays too, at the sensors beside it or at all at nearly one moment: its waves are faster than
+    any train. So half of the sensors must record the second train at a tenth of the first one's level, and no faster
+    motion may be more coherent. Needs three sensors, else there is no finding.
 
     Parameters
     ----------
@@ -229,14 +230,15 @@ def second_train(envelopes: SensorEnvelopes, passage: Passage, settings: Passage
     motion = passage.train_motion
     residual = without_train(envelopes, motion)
     slowness = slowness_grid(settings)
-    correlations = correlation_at(np.append(slowness, 0.0), residual, envelopes.levels.step, envelopes.positions)
-    correlation, simultaneous = correlations[:-1], float(correlations[-1])
+    faster = float(np.abs(slowness).min()) * np.linspace(-1.0, 1.0, N_FASTER)[1:-1]
+    correlations = correlation_at(np.append(slowness, faster), residual, envelopes.levels.step, envelopes.positions)
+    correlation, of_impacts = correlations[: slowness.size], float(correlations[slowness.size :].max())
     own_slowness = motion.direction / motion.speed
     is_other = np.abs(slowness - own_slowness) > 0.15 * abs(own_slowness)
     own_correlation = correlation[~is_other].max(initial=0.0)
     peak = int(np.argmax(np.where(is_other, correlation, -np.inf)))
     strength = float(correlation[peak])
-    if strength < MIN_CORRELATION or strength < 1.2 * own_correlation or strength < simultaneous:
+    if strength < MIN_CORRELATION or strength < 1.2 * own_correlation or strength < of_impacts:
         return []
     direction = 1 if slowness[peak] > 0 else -1
     second = Motion(1.0 / abs(slowness[peak]), 0.0, 0.0, direction)
