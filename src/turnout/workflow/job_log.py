@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
+END = "the job ended by an error"  # the first line of that error in a log
+
 
 @contextmanager
 def job_log(log: PathLike | str) -> Iterator[None]:
@@ -32,7 +34,7 @@ def job_log(log: PathLike | str) -> Iterator[None]:
         yield
     except Exception:
         program.removeHandler(to_screen)  # the interpreter prints the traceback
-        program.exception("the job ended by an error")
+        program.exception(END)
         raise
     finally:
         for handler in (to_file, to_screen):

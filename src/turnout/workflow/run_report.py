@@ -10,6 +10,7 @@ from turnout.errors import RegistryError
 from turnout.files import changed_at
 from turnout.registry.database import open_registry
 from turnout.registry.generation import GENERATION_FILE
+from turnout.workflow.job_log import END
 
 LOGS = Path(".snakemake/log")
 VERDICT = Path("logs/verdict.log")
@@ -59,10 +60,14 @@ def failure_reason(since: int = 0) -> str:
 
 
 def _error_in(log: Path, since: int) -> str:
-    """Exception that ended a job, with a colon before it; "" if its log has none, such as a log of an earlier run."""
+    """Exception that ended a job, with a colon before it.
+
+    "" if its log has none: it is of an earlier run, or the job was killed. Errors of units do not end a job.
+    """
     if not log.exists() or changed_at(log) < since:
         return ""
-    exceptions = EXCEPTION.findall(log.read_text(encoding="utf-8", errors="replace"))
+    _, marker, end = log.read_text(encoding="utf-8", errors="replace").rpartition(f"ERROR {END}\n")
+    exceptions = EXCEPTION.findall(end) if marker else []
     return f": {exceptions[-1][:MAX_REASON_LENGTH]}" if exceptions else ""
 
 

@@ -236,6 +236,16 @@ def test_the_reason_of_a_failed_rule_is_the_error_that_ended_its_job(folder):
     assert failure_reason(since=2 * 10**9) == reason
 
 
+def test_the_error_of_a_unit_is_not_stated_as_that_of_a_job_that_was_killed(folder):
+    """The log has the traceback of a unit that failed; a job that is killed, as for its memory, adds none."""
+    with job_log("logs/hammer.log"):
+        logging.getLogger("turnout.workflow").error(
+            "t1/A7: internal error\nTraceback (most recent call last):\nKeyError: 3"
+        )
+    write("run", ERROR.format(rule="hammer", job=4))
+    assert failure_reason() == "rule hammer failed, see logs/hammer.log"
+
+
 def test_a_failed_night_states_which_disk_is_nearly_full(folder, monkeypatch):
     (folder / "snakemake.py").write_text("raise SystemExit(1)")
     values = {"f_frsize": 4096, "f_bavail": 300, "f_files": 10**6, "f_favail": 10**6}
