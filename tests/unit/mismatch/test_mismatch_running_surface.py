@@ -58,6 +58,19 @@ def test_the_shape_of_a_nose_is_uncertain_if_its_depth_is():
         assert {u.field: u.spread for u in surface.parameters} == spread | more
 
 
+@pytest.mark.parametrize("nose", [replace(NOSE, power=1.0), replace(NOSE, power=1.005), replace(NOSE, share=0.97)])
+def test_a_nose_at_the_limit_of_its_shape_has_nuisances(nose):
+    """A V, or a nose whose flank is nearly all before the kink: both limits of the prior include the file's number."""
+    surface = RunningSurface(
+        replace(FILED, spreads={nose: SPREADS[NOSE]}, routes={"main": ((nose,),)}), WAVES, ("main",)
+    )
+    priors = {n.name: n for n in surface.nuisances()}
+    for end in (0, 1):
+        values = {name: n.bounds[end] for name, n in priors.items() if "place" not in name}
+        ((changed,),) = surface.surfaces("main", {**dict.fromkeys(priors, 0.0), **values})
+        assert changed.power >= 1.0 and 0.0 < changed.share < 1.0
+
+
 def test_a_surface_has_its_given_numbers():
     surface = RunningSurface(FILED, WAVES, ("main",))
     values = dict.fromkeys(surface.names, 0.0)

@@ -69,10 +69,10 @@ class SurfaceParameter:
             getattr(self.component, self.field),
             (-TRACK.bound_sds * self.spread, TRACK.bound_sds * self.spread),
         )
-        if self.field == "share":
-            bounds = bounds[0], -0.05 - np.log(value)
-        elif self.field == "power":
-            bounds = 0.01 - np.log(value), bounds[1]
+        if self.field == "share":  # below 0.95, or the file's where that is larger
+            bounds = bounds[0], max(-0.05 - np.log(value), 0.0)
+        elif self.field == "power":  # above a V, or a V as in the file
+            bounds = min(0.01 - np.log(value), 0.0), bounds[1]
         return Nuisance(
             self.name, "-", 0.0, self.spread, None, bounds, f"ln {description}", can_mask=False, group="surface"
         )
