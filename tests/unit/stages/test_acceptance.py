@@ -16,10 +16,10 @@ from turnout.mismatch.engine.candidate import EffectSite
 from turnout.mismatch.engine.fit import Fit
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.turnout import TrackCase
-from turnout.mismatch.turnout.accepted_effects import effects_on
+from turnout.mismatch.turnout.accepted_effects import AcceptedEffects, effects_on
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.predicted_case import PredictedCase
-from turnout.simulate import load_track, simulate_hammer
+from turnout.simulate import load_track, simulate_hammer, uniform_track
 from turnout.stages import mismatch
 from turnout.stages.accept_finding import accept
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
@@ -385,3 +385,28 @@ def test_a_missing_or_ambiguous_finding_is_an_error(tmp_path, monkeypatch, effec
     monkeypatch.setattr(results, "_registry_rows", lambda table: [])
     with pytest.raises(SimulationError, match=re.escape(message)):
         results.finding(finding_id)
+
+
+def test_every_possible_value_of_an_accepted_effect_has_a_prior():
+    """A gain of 0 or a dip without sharpness has no share of itself as its standard deviation."""
+    for effect in physics.TERMS:
+        for p in effect.parameters:
+            for value in (*p.bounds, p.neutral, 0.0):
+                if p.bounds[0] <= value <= p.bounds[1]:
+                    accepted = AcceptedEffects((AcceptedEffect(effect.name, {}, {p.name: (value, None)}),))
+                    (nuisance,) = accepted.nuisances
+                    assert nuisance.mean == value and nuisance.sd > 0.0
+
+
+def test_accepted_effects_of_one_kind_at_one_position_have_nuisances_of_their_own():
+    """As a pad that was accepted as a finding, and again as a change; dips 3 cm apart have one name as well."""
+    dips = tuple(
+        AcceptedEffect("surface_dip", {"place": x}, {"depth": (d, None)}) for x, d in ((12.01, 1e-3), (12.04, 2e-3))
+    )
+    accepted = effects_on(uniform_track(24.0), dips)
+    first, second = (n.name for n in accepted.nuisances)
+    assert first == "surface_dip[12.0 m].depth" != second
+    assert [t.depth for t in accepted.terms({first: 3e-3, second: 4e-3})] == [3e-3, 4e-3]
+    nuisances = accepted.nuisances
+    fit = SimpleNamespace(values={first: 3e-3, second: 4e-3}, covariance=np.diag([1e-8, 4e-8]))
+    assert [(e["value"], e["se"]) for e in accepted.estimates(nuisances, fit)] == [(3e-3, 1e-4), (4e-3, 2e-4)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -81,7 +82,16 @@ class AcceptedEffects:
     @property
     def nuisances(self) -> tuple[Nuisance, ...]:
         """One nuisance per parameter, () if these are fixed."""
-        return () if self.fixed is not None else tuple(n for effect in self.effects for n in _nuisances(effect))
+        if self.fixed is not None:
+            return ()
+        return tuple(n for label, effect in zip(self._labels, self.effects) for n in _nuisances(label, effect))
+
+    @cached_property
+    def _labels(self) -> tuple[str, ...]:
+        """Key of each effect; a key that came before has a number, as those of two flats of one train."""
+        keys = [effect.key for effect in self.effects]
+        repetitions = [keys[:k].count(key) for k, key in enumerate(keys)]
+        return tuple(f"{key} ({n + 1})" if n else key for key, n in zip(keys, repetitions))
 
     def fixed_at(self, values: Mapping[str, float]) -> AcceptedEffects:
         """The same effects with their parameters fixed at ``values``.
@@ -114,8 +124,8 @@ class AcceptedEffects:
         assert self.track is not None
         at = values if self.fixed is None else self.fixed
         return tuple(
-            effect.term(self.track, {p.name: float(at[_name(effect, p)]) for p in effect.parameters})
-            for effect in self.effects
+            effect.term(self.track, {p.name: float(at[_name(label, p)]) for p in effect.parameters})
+            for label, effect in zip(self._labels, self.effects)
         )
 
     def without(self, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
@@ -172,9 +182,9 @@ class AcceptedEffects:
         """
         index = {n.name: k for k, n in enumerate(nuisances)}
         estimates = []
-        for effect in self.effects:
+        for label, effect in zip(self._labels, self.effects):
             for p in effect.parameters:
-                name = _name(effect, p)
+                name = _name(label, p)
                 se = float(np.sqrt(max(fit.covariance[index[name], index[name]], 0.0)))
                 estimates.append(
                     {
@@ -210,20 +220,20 @@ def effects_on(track: Track, accepted: Iterable[AcceptedEffect]) -> AcceptedEffe
     return AcceptedEffects(effects, track) if effects else NO_EFFECTS
 
 
-def _name(effect: AcceptedEffect, parameter: Parameter) -> str:
-    return f"{effect.key}.{parameter.name}"
+def _name(label: str, parameter: Parameter) -> str:
+    return f"{label}.{parameter.name}"
 
 
-def _nuisances(effect: AcceptedEffect) -> Iterator[Nuisance]:
+def _nuisances(label: str, effect: AcceptedEffect) -> Iterator[Nuisance]:
     for p in effect.parameters:
         value, error = effect.values[p.name]
         sd = max(_prior_sd(p, value), ACCEPTED.min_errors * (error or 0.0))
-        yield Nuisance(_name(effect, p), p.unit, value, sd, bounds=p.bounds, meaning=p.meaning)
+        yield Nuisance(_name(label, p), p.unit, value, sd, bounds=p.bounds, meaning=p.meaning)
 
 
 def _prior_sd(p: Parameter, value: float) -> float:
     """Prior sd of an accepted value: a share of its distance from neutral, or of itself if neutral means no limit."""
-    if abs(p.neutral) > ACCEPTED.max_neutral_ratio * abs(value):
+    if abs(p.neutral) > ACCEPTED.max_neutral_ratio * abs(value) > 0.0:
         return ACCEPTED.sd_share * abs(value)
     return max(ACCEPTED.sd_share * abs(value - p.neutral), ACCEPTED.min_sd_share * (p.bounds[1] - p.bounds[0]))
 
