@@ -131,6 +131,10 @@ class SimulationError(TurnoutError):
     """A simulation cannot continue; the message names time, position and value."""
 
 
+class CaseError(TurnoutError, ValueError):
+    """A case of the diagnosis contradicts itself, or a part of it cannot be fitted; the message names the part."""
+
+
 class RegistryError(TurnoutError):
     """The registry rejects rows or cannot be used; the message names table, row, column and value."""
 

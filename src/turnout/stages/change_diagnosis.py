@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.errors import SimulationError
+from turnout.errors import CaseError, SimulationError
 from turnout.mismatch.calibrated import (
     ModelAnswer,
     StateParameter,
@@ -101,7 +101,7 @@ def change_unit(
     }  # fmt: skip
     try:
         row |= _diagnose(unit, turnout, raw_root, context or {}, algo, labels)
-    except (SimulationError, np.linalg.LinAlgError) as error:
+    except (CaseError, SimulationError, np.linalg.LinAlgError) as error:
         row |= {"verdict": "no_decision", "sentence": f"no diagnosis: {error}"[:1000]}
     return {"change_findings": [row]}
 
@@ -185,7 +185,7 @@ def _fitted_visits(
             campaign = replace(group.campaign, reserved=names_beyond(group.campaign, MAX_FITTED_AXLES))
             try:
                 store_visit(folder, group, case_of(group, campaign, turnout, accepted), "", about)
-            except (SimulationError, np.linalg.LinAlgError) as error:
+            except (CaseError, SimulationError, np.linalg.LinAlgError) as error:
                 notes.append(f"visit {label}: {error}")
     return read_visits(folder, turnout.id, by_content(versions)), notes
 

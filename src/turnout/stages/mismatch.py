@@ -12,7 +12,7 @@ import numpy as np
 from turnout.config.merge import digest
 from turnout.config.turnout import TurnoutConfig
 from turnout.content import sha256_of
-from turnout.errors import ReadError, SimulationError, TurnoutError
+from turnout.errors import CaseError, ReadError, SimulationError, TurnoutError
 from turnout.mismatch.engine.diagnose import diagnose
 from turnout.mismatch.turnout import TrackCase
 from turnout.records import Unit
@@ -222,7 +222,7 @@ def _diagnose_group(
             stored_visits.store_visit(folder, group, case, answer, stored_about, fits)
         elif is_in_model:  # such a visit does not change the belief
             stored_visits.store_answer(folder, group, case, answer, stored_about)
-    except (SimulationError, np.linalg.LinAlgError) as error:
+    except (CaseError, SimulationError, np.linalg.LinAlgError) as error:
         reasons = [f"sections {', '.join(group.labels)}: {error}", *map(str, about["notes"])]
         return {"quarantine": [_undiagnosed_row(None, turnout, "; ".join(reasons)[:1000], group)]}
     replay.discard()

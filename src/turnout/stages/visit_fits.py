@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from turnout.errors import SimulationError
+from turnout.errors import CaseError, SimulationError
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.further_passages import names_beyond
 from turnout.stages.mismatch_groups import groups, neighbours_of
@@ -142,7 +142,7 @@ def _fit_visit(
                 continue
             fit = fit_group(group, case, turnout.settings["mismatch"], about["without"], start=start)
             fitted.append(fit if start else fit.without_jacobian())
-        except (SimulationError, np.linalg.LinAlgError) as error:
+        except (CaseError, SimulationError, np.linalg.LinAlgError) as error:
             if stores:
                 store_failure(folder, group, str(error), answer or "", {**about, "notes": notes})
     return fitted, [] if usable else summary_of_notes(notes)

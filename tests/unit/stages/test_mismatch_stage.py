@@ -394,3 +394,13 @@ def test_notes_of_a_visit_are_stored_as_text_with_its_information(tmp_path, monk
         ["2024-05-07", "too short", True],
         ["2024-05-07", "no force", False],
     ]
+
+
+def test_a_case_that_contradicts_itself_is_reported_for_its_group_and_ends_no_diagnosis(tmp_path, monkeypatch):
+    monkeypatch.setattr(mismatch, "TrackCase", lambda *_, **__: SimpleNamespace(observations=(), reserved=()))
+    about = {"visit": "2024-05-07", "identity": "a", "changes": (), "every_group": ["A1"], "notes": []}
+    group = SimpleNamespace(labels=("A1",), route="main", campaign=None, neighbours=("A1",))
+    turnout = SimpleNamespace(id="t1", raw="t1", settings={"mismatch": None})
+    rows = mismatch._diagnose_group(group, turnout, (), about, mismatch.Options(fits=str(tmp_path)), (0, 1))
+    (row,) = rows.pop("quarantine")
+    assert "sections A1: the case has no observations" in row["found"] and not rows

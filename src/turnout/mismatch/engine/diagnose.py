@@ -126,7 +126,7 @@ def diagnose(
     ------
     SimulationError
         If the base model cannot be simulated.
-    ValueError
+    CaseError
         If the parts of the case contradict each other, or a prediction has not the shape of its recording.
     """
     check_case(case)

@@ -78,7 +78,7 @@ class JointProblem:
         ------
         SimulationError
             If the model cannot be simulated there, or a parameter or prediction is not finite.
-        ValueError
+        CaseError
             If there is not one prediction for each observation, of the shape of its data.
         """
         if not np.all(np.isfinite(theta)):  # derivatives of an extreme model may overflow

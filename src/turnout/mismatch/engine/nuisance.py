@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from turnout.errors import CaseError
+
 
 @dataclass(frozen=True)
 class Nuisance:
@@ -22,7 +24,7 @@ class Nuisance:
 
     Raises
     ------
-    ValueError
+    CaseError
         If the mean is not finite or outside the bounds, or the standard deviation is not finite and above 0.
     """
 
@@ -44,13 +46,11 @@ class Nuisance:
         low, high = self.bounds
         what = f"nuisance parameter {self.name!r}"
         if not all(isinstance(x, Real) for x in (self.mean, self.sd, low, high)):
-            raise ValueError(f"{what}: mean {self.mean!r}, sd {self.sd!r} and bounds {self.bounds!r} must be numbers")
+            raise CaseError(f"{what}: mean {self.mean!r}, sd {self.sd!r} and bounds {self.bounds!r} must be numbers")
         if not np.isfinite(self.mean) or not low <= self.mean <= high or not low < high:
-            raise ValueError(
-                f"{what}: the mean {self.mean:g} must be finite and within the bounds {low:g} and {high:g}"
-            )
+            raise CaseError(f"{what}: the mean {self.mean:g} must be finite and within the bounds {low:g} and {high:g}")
         if not 0.0 < self.sd < np.inf:
-            raise ValueError(
+            raise CaseError(
                 f"{what}: the standard deviation {self.sd:g} must be finite and above 0; a number that is known "
                 "exactly is no nuisance parameter but a constant of the simulation"
             )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from turnout.errors import CaseError
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -47,18 +48,18 @@ class Observation:
         data = np.asarray(self.data, dtype=float)
         sigma = np.broadcast_to(np.asarray(self.sigma, dtype=float), data.shape)
         if data.ndim != 1 or not np.all(np.isfinite(data)):
-            raise ValueError(f"observation {self.name!r}: data must be one row of finite numbers")
+            raise CaseError(f"observation {self.name!r}: data must be one row of finite numbers")
         if data.size % self.rows:
-            raise ValueError(f"observation {self.name!r}: {data.size} samples are no {self.rows} rows of equal length")
+            raise CaseError(f"observation {self.name!r}: {data.size} samples are no {self.rows} rows of equal length")
         if not data.size:
-            raise ValueError(f"observation {self.name!r} has no samples")
+            raise CaseError(f"observation {self.name!r} has no samples")
         if not np.all((sigma > 0.0) & np.isfinite(sigma)):
-            raise ValueError(
+            raise CaseError(
                 f"observation {self.name!r}: sigma must be finite and above 0. A share of the rms is 0 where all data "
                 "are equal: state the noise of the sensor"
             )
         if not 0.0 < self.effective <= 1.0:
-            raise ValueError(f"observation {self.name!r}: effective is {self.effective}; it must be above 0, at most 1")
+            raise CaseError(f"observation {self.name!r}: effective is {self.effective}; it must be above 0, at most 1")
         object.__setattr__(self, "data", data)
         object.__setattr__(self, "sigma", sigma)
 
