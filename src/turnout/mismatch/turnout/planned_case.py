@@ -106,14 +106,16 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         h = h[: receptance_observation.LINES.size] + 1j * h[receptance_observation.LINES.size :]
         pairs[pair.name] = scaled = receptance_observation.with_magnitude(pair, np.abs(h))
         error = NOISE_SHARE * np.abs(h)
-        observation = receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance)
-        for errors in chair_errors(predictor, values, [scaled]).values():
-            observation = with_chair_errors(observation, scaled, errors)
-        observations.append(observation)
+        observations.append(receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance))
     predictor = predictor.with_recordings(pairs, aligned)
     observations = [
         with_errors(o, errors, count_alike(pairs[o.name], pairs.values(), ()))
         for o, errors in zip(observations, support_errors(predictor, values, observations))
+    ]
+    errors_of_chairs = chair_errors(predictor, values, list(pairs.values()))
+    observations = [
+        with_chair_errors(o, pairs[o.name], errors_of_chairs[o.name]) if o.name in errors_of_chairs else o
+        for o in observations
     ]
     for a in aligned.values():
         data = predictor.predict_passage(values, (), a).reshape(len(a.sensors), -1)

@@ -51,6 +51,8 @@ class TrackPriors:
     support_position_sd: float = prior(
         0.01, "m", "of a single sleeper from its place in the file: tolerances of new track are 1 to 2 cm",
         SUPPORTS)
+    support_position_step: float = prior(
+        0.005, "m", "of a difference quotient by the position of a support", "numerical")
     rail_bending_sd: float = prior(
         0.015, "ln", "bending stiffness of the rail: wear and rolling tolerances", ERROR_MODES)
     rail_shear_sd: float = prior(

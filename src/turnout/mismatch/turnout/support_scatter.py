@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.turnout.predictions import Values
 
-STEP = 0.5 * TRACK.support_position_sd  # m, of the difference quotient
-
 
 def support_errors(predictor: Predictor, values: Values, observations: Sequence[Observation]) -> list[np.ndarray]:
     """Errors of receptances by the positions of single supports, at one standard deviation each.
@@ -52,7 +50,7 @@ def support_errors(predictor: Predictor, values: Values, observations: Sequence[
         with suppress(SimulationError):
             moved = _with_moved_support(predictor, support).predict(values, (), observations)
             for column, before, after in zip(columns, filed, moved):
-                column.append((after - before) * TRACK.support_position_sd / STEP)
+                column.append((after - before) * TRACK.support_position_sd / TRACK.support_position_step)
     return [np.column_stack(c) if c else np.zeros((o.data.size, 0)) for c, o in zip(columns, observations)]
 
 
@@ -77,6 +75,6 @@ def with_errors(observation: Observation, errors: np.ndarray, n_alike: int = 1) 
 
 def _with_moved_support(predictor: Predictor, support: int) -> Predictor:
     site = predictor.site
-    turnout = site.nominal.turnout.with_moved_support(support, STEP)
+    turnout = site.nominal.turnout.with_moved_support(support, TRACK.support_position_step)
     moved = replace(site, nominal=replace(site.nominal, turnout=turnout))
     return Predictor(moved, predictor.solver).with_recordings(predictor.frf_pairs, {})
