@@ -9,7 +9,7 @@ from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import TRACK
-from turnout.mismatch.turnout.support_scatter import support_errors, with_errors
+from turnout.mismatch.turnout.support_scatter import support_errors
 
 POSITIONS = (21.6, 24.0)
 
@@ -71,7 +71,7 @@ def test_a_bay_that_is_three_centimetres_shorter_leaves_no_more_than_other_error
 def test_errors_of_tests_at_one_position_are_counted_once():
     """Two tests with an error of √2 each give their mean the error of one."""
     plain = Observation("a", "a", np.zeros(2), 1e-3)
-    twice = with_errors(plain, np.array([[1.0], [1.0]]), 2)
+    twice = plain.with_errors(np.array([[1.0], [1.0]]), 2)
     np.testing.assert_allclose(twice.modes, np.sqrt(2.0) * np.ones((2, 1)), rtol=1e-12, atol=0.0)
-    again = with_errors(twice, np.array([[0.0], [3.0]]))
+    again = twice.with_errors(np.array([[0.0], [3.0]]))
     np.testing.assert_allclose(again.modes[:, 1], [0.0, 3.0], rtol=1e-12, atol=0.0)

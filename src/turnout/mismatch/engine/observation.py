@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -117,6 +117,26 @@ class Observation:
         projection = directions.T @ scaled.astype(directions.dtype)
         projection *= (shrinkage if values.ndim == 1 else shrinkage[:, None]).astype(directions.dtype)
         return scaled - directions @ projection
+
+    def with_errors(self, errors: np.ndarray, n_alike: int = 1) -> Observation:
+        r"""The observation with further error modes, which several observations have in common.
+
+        The mean of ``n_alike`` observations with one error errs by it as one of them does. As errors of observations
+        are independent, each has :math:`\sqrt n` times its size.
+
+        Parameters
+        ----------
+        errors : (n, m) array of float
+            In the unit of the data.
+        n_alike : int
+            Observations with this error, this one included.
+
+        Returns
+        -------
+        Observation
+        """
+        known = () if self.modes is None else (self.modes,)
+        return replace(self, modes=np.column_stack([*known, np.sqrt(n_alike) * errors]))
 
     @property
     def n_effective(self) -> float:

@@ -11,7 +11,6 @@ with independent normal deviations :math:`\xi_l, \eta_l` of each chair. Each is 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,9 +64,7 @@ def chair_errors(predictor: Predictor, values: Values, pairs: Sequence[FrfPair])
 
 
 def with_chair_errors(observation: Observation, pair: FrfPair, errors: np.ndarray, n_alike: int = 1) -> Observation:
-    """The observation with the errors by single chairs as modes; several tests have them in common.
-
-    See ``lifting_chairs.with_lifting_error`` for the latter.
+    """The observation with the errors by single chairs as modes, which several tests have in common.
 
     Parameters
     ----------
@@ -84,6 +81,4 @@ def with_chair_errors(observation: Observation, pair: FrfPair, errors: np.ndarra
     -------
     Observation
     """
-    errors = np.sqrt(n_alike) * errors
-    old = () if observation.modes is None else (observation.modes,)
-    return replace(observation, modes=np.column_stack([*old, split_complex(scale_lines(pair, errors))]))
+    return observation.with_errors(split_complex(scale_lines(pair, errors)), n_alike)

@@ -219,10 +219,9 @@ def count_alike(pair: FrfPair, pairs: Iterable[FrfPair], reserved: Collection[st
 
 
 def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarray, n_alike: int = 1) -> Observation:
-    r"""The observation with the error of a change as modes: a share of its size, smooth over frequency.
+    """The observation with the error of a change as modes: a share of its size, smooth over frequency.
 
-    The same chairs open alike at each visit. So ``n_alike`` tests have one error in common, and their mean errs by it
-    as one test does. As errors of observations are independent, each has :math:`\sqrt n` times its size.
+    The same chairs open alike at each visit, so ``n_alike`` tests have one error in common.
 
     Parameters
     ----------
@@ -243,9 +242,7 @@ def with_lifting_error(observation: Observation, pair: FrfPair, change: np.ndarr
     size = np.abs(receptance_observation.scale_lines(pair, change))
     if not np.any(size):
         return observation
-    share = RECEPTANCE.lifting_error * np.sqrt(n_alike)
-    size = share * receptance_observation.local_rms(pair.frequency, size)
+    size = RECEPTANCE.lifting_error * receptance_observation.local_rms(pair.frequency, size)
     errors = size[:, None] * receptance_observation.smooth_functions(pair.frequency)
     split = receptance_observation.split_complex
-    old = () if observation.modes is None else (observation.modes,)
-    return replace(observation, modes=np.column_stack([*old, split(errors + 0j), split(1j * errors)]))
+    return observation.with_errors(np.column_stack([split(errors + 0j), split(1j * errors)]), n_alike)

@@ -20,7 +20,7 @@ from turnout.mismatch.turnout.priors import CASE, RECEPTANCE
 from turnout.mismatch.turnout.rail_parameters import with_rail
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.saturation import SaturationLimit
-from turnout.mismatch.turnout.support_scatter import support_errors, with_errors
+from turnout.mismatch.turnout.support_scatter import support_errors
 from turnout.mismatch.turnout.toe_position import with_toe
 from turnout.mismatch.turnout.track_parameters import track_with
 from turnout.reasons import REASONS
@@ -175,7 +175,7 @@ def _with_support_errors(
     pairs = list(tests.frf_pairs.values())
     all_errors = support_errors(predictor, values, [o for _, o in tests.observations])
     observations = [
-        (name, with_errors(o, errors, count_alike(pair, pairs, reserved)))
+        (name, o.with_errors(errors, count_alike(pair, pairs, reserved)))
         for (name, o), pair, errors in zip(tests.observations, pairs, all_errors)
     ]
     return replace(tests, observations=tuple(observations))

@@ -27,7 +27,7 @@ from turnout.mismatch.turnout.priors import SIMULATION
 from turnout.mismatch.turnout.receptance_observation import FrfPair
 from turnout.mismatch.turnout.receptance_samples import PairSamples
 from turnout.mismatch.turnout.site import site_of
-from turnout.mismatch.turnout.support_scatter import support_errors, with_errors
+from turnout.mismatch.turnout.support_scatter import support_errors
 from turnout.mismatch.turnout.wheel_roughness import wheel_modes
 from turnout.records import Impact, Recording
 from turnout.simulate.hammer import Hammer, simulate_hammer
@@ -109,7 +109,7 @@ def planned_data(plan: Plan, settings: MismatchSettings, solver: Track1D) -> tup
         observations.append(receptance_observation.observation_of(scaled, h, error, settings.pair_tolerance))
     predictor = predictor.with_recordings(pairs, aligned)
     observations = [
-        with_errors(o, errors, count_alike(pairs[o.name], pairs.values(), ()))
+        o.with_errors(errors, count_alike(pairs[o.name], pairs.values(), ()))
         for o, errors in zip(observations, support_errors(predictor, values, observations))
     ]
     errors_of_chairs = chair_errors(predictor, values, list(pairs.values()))

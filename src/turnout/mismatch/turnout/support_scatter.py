@@ -54,25 +54,6 @@ def support_errors(predictor: Predictor, values: Values, observations: Sequence[
     return [np.column_stack(c) if c else np.zeros((o.data.size, 0)) for c, o in zip(columns, observations)]
 
 
-def with_errors(observation: Observation, errors: np.ndarray, n_alike: int = 1) -> Observation:
-    """The observation with errors that several tests have in common as modes.
-
-    Parameters
-    ----------
-    observation : Observation
-    errors : (n, m) array of float
-        In the unit of the observation.
-    n_alike : int
-        Tests with impacts at this position and this sensor, see ``lifting_chairs.with_lifting_error``.
-
-    Returns
-    -------
-    Observation
-    """
-    old = () if observation.modes is None else (observation.modes,)
-    return replace(observation, modes=np.column_stack([*old, np.sqrt(n_alike) * errors]))
-
-
 def _with_moved_support(predictor: Predictor, support: int) -> Predictor:
     site = predictor.site
     turnout = site.nominal.turnout.with_moved_support(support, TRACK.support_position_step)
