@@ -15,6 +15,7 @@ from turnout.simulate.track import PER_SUPPORT, Track
 from turnout.simulate.wheel_path import PathPart, Surfaces
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Any
 
 
@@ -82,8 +83,7 @@ class TurnoutTrack:
         def with_offset(track: Track) -> Track:
             return replace(track, support=track.support + offset * (np.arange(track.support.size) == support))
 
-        tracks = {name: with_offset(track) for name, track in self.tracks.items()}
-        return replace(self, track=with_offset(self.track), tracks=tracks)
+        return self._with_each_track(with_offset)
 
     def with_moved_supports(self, offset: float) -> TurnoutTrack:
         """The turnout with all supports elsewhere; rails, surfaces and locations stay.
@@ -109,8 +109,11 @@ class TurnoutTrack:
             blade = track.blade and track.blade.with_moved_end(offset)
             return replace(track, support=track.support + offset, blade=blade)
 
-        tracks = {name: with_offset(track) for name, track in self.tracks.items()}
-        return replace(self, track=with_offset(self.track), tracks=tracks)
+        return self._with_each_track(with_offset)
+
+    def _with_each_track(self, change: Callable[[Track], Track]) -> TurnoutTrack:
+        tracks = {name: change(track) for name, track in self.tracks.items()}
+        return replace(self, track=change(self.track), tracks=tracks)
 
     def is_divided_at(self, position: float) -> bool:
         """Whether the routes have separate supports at ``position`` [m], as behind a crossing.

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.observation import Observation
-from turnout.mismatch.turnout.planned_case import PlannedCase, small_plan
+from turnout.mismatch.turnout.case import TrackCase
+from turnout.mismatch.turnout.observed_tests import observe_tests
+from turnout.mismatch.turnout.planned_case import PlannedCase, measured_campaign, small_plan
 from turnout.mismatch.turnout.prediction import Predictor
 from turnout.mismatch.turnout.priors import TRACK
 from turnout.mismatch.turnout.support_scatter import support_errors
@@ -75,3 +78,13 @@ def test_errors_of_tests_at_one_position_are_counted_once():
     np.testing.assert_allclose(twice.modes, np.sqrt(2.0) * np.ones((2, 1)), rtol=1e-12, atol=0.0)
     again = twice.with_errors(np.array([[0.0], [3.0]]))
     np.testing.assert_allclose(again.modes[:, 1], [0.0, 3.0], rtol=1e-12, atol=0.0)
+
+
+def test_recorded_tests_have_the_errors_of_every_support():
+    campaign = measured_campaign(small_plan((15.0,), passages=False, hammer_positions=POSITIONS), (), 3)
+    recorded = TrackCase(campaign, families=("local_pad",))
+    for (_, plain), o in zip(
+        observe_tests(campaign, MismatchSettings().pair_tolerance).observations, recorded.observations
+    ):
+        assert plain.name == o.name
+        assert o.modes.shape[1] == plain.modes.shape[1] + len(recorded.data.site.nominal.effect_supports)
