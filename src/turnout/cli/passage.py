@@ -129,7 +129,7 @@ def _show(
     if fits:
         print("\n".join(_fit_lines(fits, settings)))
     if out and passage.n_axle:
-        _write_page(out, recording, passage, fits, _train_lines(recording, passage))
+        _write_page(out, turnout.id, recording, passage, fits, _train_lines(recording, passage))
     return bool(passage.n_axle)
 
 
@@ -198,7 +198,12 @@ def _fit_lines(fits: Mapping[str, ChannelFit | str], settings: PassageSettings) 
 
 
 def _write_page(
-    path: str, recording: Recording, passage: Passage, fits: Mapping[str, ChannelFit | str], lines: list[str]
+    path: str,
+    turnout_id: str,
+    recording: Recording,
+    passage: Passage,
+    fits: Mapping[str, ChannelFit | str],
+    lines: list[str],
 ) -> None:
     """The page of a passage, with panels of every sensor that recorded the train."""
     import numpy as np
@@ -212,7 +217,7 @@ def _write_page(
         samples = recording.signal(name)
         prediction = None if fit is None or isinstance(fit, str) else fit
         sensors.append(SensorPassage(name, samples - np.median(samples), recording.rate, np.sort(times), prediction))
-    write_text(path, passage_page(recording.source, lines, sensors))
+    write_text(path, passage_page(f"{turnout_id}, {recording.source}", lines, sensors))
 
 
 def score_basis(settings: PassageSettings) -> str:

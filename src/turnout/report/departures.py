@@ -8,7 +8,7 @@ import numpy as np
 
 from turnout.constants import Z95
 from turnout.counts import count_of
-from turnout.report.formatting import day, supported_decimals
+from turnout.report.formatting import campaign_of, supported_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ def departure_sentences(off_track: Rows, modes: Rows) -> list[str]:
     off_track : sequence of mapping
         Rows of ``modes_off_track`` of one section.
     modes : sequence of mapping
-        All its modes, with ``band``, ``measured_at_utc``, ``frequency_hz`` and ``damping_ratio``.
+        All its modes, with ``band``, ``campaign_id``, ``measured_at_utc``, ``frequency_hz`` and ``damping_ratio``.
 
     Returns
     -------
@@ -50,9 +50,9 @@ def departure_sentences(off_track: Rows, modes: Rows) -> list[str]:
         newest = max(values)
         for group in _groups(departures, values):
             sentences.append(_sentence(band, departures[group[0]], [values[t] for t in group], group[-1] == newest))
-        uncertain = sorted(m["measured_at_utc"] for m in of_band if m["verdict"] == "uncertain")
+        uncertain = [m for m in of_band if m["verdict"] == "uncertain"]
         if uncertain:
-            days = ", ".join(day(t) for t in uncertain)
+            days = ", ".join(campaign_of(m) for m in sorted(uncertain, key=lambda m: m["measured_at_utc"]))
             sentences.append(f"Too uncertain to show whether the {band} mode continues that before: {days}.")
     return sentences
 
@@ -82,7 +82,7 @@ def _is_nearer(mode: Mapping[str, Any], first: Mapping[str, Any], group: Rows) -
 
 def _sentence(band: str, first: Mapping[str, Any], group: Rows, is_present: bool) -> str:
     """The sentence of one change."""
-    begin, end = day(group[0]["measured_at_utc"]), day(group[-1]["measured_at_utc"])
+    begin, end = campaign_of(group[0]), campaign_of(group[-1])
     when = f"On {begin}" if len(group) == 1 else f"From {begin} to {end}"
     when = f"From {begin} on" if is_present else when
     frequency = f"{_range(group, 'frequency_hz', 1)} Hz against {first['frequency_track_hz']:.1f} Hz"
@@ -115,7 +115,7 @@ def departure_rows(off_track: Rows) -> list[dict[str, str]]:
     """
     return [
         {
-            "when": day(m["measured_at_utc"]),
+            "when": campaign_of(m),
             "mode": m["band"],
             "result": RESULTS[m["verdict"]],
             "frequency": _with_error(m["frequency_hz"], m["frequency_se_hz"], 1),

@@ -212,16 +212,16 @@ def day(when: datetime | None) -> str:
     return "–" if when is None else f"{when:%Y-%m-%d}"
 
 
-def campaign_name(campaign_id: str | None, when: datetime | None) -> str:
+def campaign_of(row: Mapping[str, Any], time: str = "measured_at_utc") -> str:
     """The name of a campaign, as its folder and ``campaigns.csv`` have it: the local day. Its start in UTC may be a day
     earlier.
 
     Parameters
     ----------
-    campaign_id : str or None
-        Turnout and name, with a slash between them.
-    when : datetime or None
-        Start, whose day stands for a campaign without an id. [UTC]
+    row : mapping
+        ``campaign_id``, turnout and name with a slash between them, and its start in UTC, each if it has one.
+    time : str
+        Column of the start, whose day stands for a campaign without an id.
 
     Returns
     -------
@@ -230,10 +230,12 @@ def campaign_name(campaign_id: str | None, when: datetime | None) -> str:
 
     Examples
     --------
-    >>> campaign_name("W5/2026-05-13", datetime(2026, 5, 12, 22, 30)), campaign_name(None, datetime(2026, 5, 12))
+    >>> start = datetime(2026, 5, 12, 22, 30)
+    >>> campaign_of({"campaign_id": "W5/2026-05-13", "measured_at_utc": start}), campaign_of({"measured_at_utc": start})
     ('2026-05-13', '2026-05-12')
     """
-    return campaign_id.rpartition("/")[2] if campaign_id else day(when)
+    campaign_id = row.get("campaign_id")
+    return campaign_id.rpartition("/")[2] if campaign_id else day(row.get(time))
 
 
 def badge(state: str) -> str:

@@ -41,7 +41,7 @@ def passage_page(title: str, lines: Sequence[str], sensors: Sequence[SensorPassa
     Parameters
     ----------
     title : str
-        Name of the recording.
+        Turnout and name of the recording.
     lines : sequence of str
         The train in words.
     sensors : sequence of SensorPassage

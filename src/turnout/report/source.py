@@ -22,6 +22,8 @@ NEWEST_MODEL = "qualify row_number() over (partition by section_id order by meas
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 # Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
 HISTORY = "mode_scatter_read"
+# Campaign of each model, whose name is the local day: its start in UTC may lie on the day before.
+CAMPAIGNS = "(select model_id, campaign_id from models_current)"
 MIN_TRACK = 8  # earlier campaigns from which on a page names a mode off the track; quartiles of fewer are too uncertain
 MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
 # Effect, parameter, size [m, -] of which a page says when it is reached, and whether it falls to it (docs/mismatch.md)
@@ -52,11 +54,11 @@ ROWS = {
             left join {HISTORY} d on d.section_id = m.section_id and d.band = m.band and d.quantity = 'damping'
             where m.band in ('ballast', 'railpad') and m.source = 'hammer' and {ID_GIVEN}
         )
-        select turnout_id, section_id, model_id, band, measured_at_utc, frequency_hz, frequency_se_hz,
+        select turnout_id, section_id, model_id, campaign_id, band, measured_at_utc, frequency_hz, frequency_se_hz,
             damping_ratio, damping_se, n_impacts, rail_temperature_c, frequency_steps, damping_steps,
             frequency_hz * exp(-f_half) as frequency_low_hz, frequency_hz * exp(f_half) as frequency_high_hz,
             damping_ratio * exp(-d_half) as damping_low, damping_ratio * exp(d_half) as damping_high
-        from intervals order by section_id, band, measured_at_utc""",
+        from intervals left join {CAMPAIGNS} using (model_id) order by section_id, band, measured_at_utc""",
     "models": f"select * from models_current where {ID_GIVEN} {NEWEST_MODEL}",
     "unused": f"""
         select turnout_id, section_id, campaign_id, measured_at_utc, reason, detail
@@ -67,10 +69,11 @@ ROWS = {
         where status = 'rejected' and coalesce(method, 'joint') = 'joint' and measured_at_utc < newest_utc
         order by section_id, measured_at_utc desc, model_id""",
     "off_track": f"""
-        select turnout_id, section_id, band, measured_at_utc, frequency_hz, frequency_track_hz, damping_ratio,
-            damping_track, residue_ratio, n_history, shape_mac, verdict, frequency_se_hz, damping_se,
+        select turnout_id, section_id, campaign_id, band, measured_at_utc, frequency_hz, frequency_track_hz,
+            damping_ratio, damping_track, residue_ratio, n_history, shape_mac, verdict, frequency_se_hz, damping_se,
             frequency_distance, damping_distance
-        from modes_off_track where {ID_GIVEN} and n_history >= {MIN_TRACK}
+        from modes_off_track left join {CAMPAIGNS} using (model_id)
+        where {ID_GIVEN} and n_history >= {MIN_TRACK}
         order by section_id, measured_at_utc desc, band""",
     "receptances": f"select * from receptances_current where {ID_GIVEN} {NEWEST_MODEL}",
     "impacts": f"""

@@ -25,6 +25,10 @@ from turnout.stages.track_files import track_file
 # Units for values below 0.1 in SI units: SI unit -> (unit, its size in the SI unit)
 DISPLAY_UNITS = {"m": ("mm", 1e-3), "s": ("ms", 1e-3)}
 POSITION_FIELDS = ("place", "start", "end")
+# What tells two entries of one effect apart, unless it is a parameter of that effect.
+IDENTIFYING_FIELDS = (
+    "route", "term", *SUPPORT_KEYS, *POSITION_FIELDS, "channel_name", "train", "wheel", "order", "frequency", SINCE
+)  # fmt: skip
 FIELDS_IN_METRES = {*SUPPORT_KEYS, *POSITION_FIELDS}
 FILE_HEADER = """# What recordings of this turnout showed to be missing from the track of its layout. Written by
 # `turnout diagnose --accept`; take an entry out again when the cause is repaired.
@@ -240,14 +244,17 @@ def _is_same_effect(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
 
 
 def _identity(entry: str) -> tuple[str, ...]:
-    """Identity of an entry: route, effect, and position, sensor or train."""
-    names = ("route", "term", *SUPPORT_KEYS, *POSITION_FIELDS, "channel_name", "train", SINCE)
-    values = []
-    for name in names:
-        match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)
-        value = (match[1] or match[2]).strip().strip('"') if match else ""
-        values.append(f"{float(value):.1f}" if re.fullmatch(r"-?\d+(\.\d*)?", value) else value)
-    return tuple(values)
+    """Identity of an entry: route, effect, and position, sensor, train, wheel, order or frequency of a line."""
+    effect = effects_by_name().get(_value_of(entry, "term"))
+    fitted = {p.name for p in effect.parameters} if effect else set()
+    return tuple("" if name in fitted else _value_of(entry, name) for name in IDENTIFYING_FIELDS)
+
+
+def _value_of(entry: str, name: str) -> str:
+    """Value of a field of an entry, a number to one decimal; "" without the field."""
+    match = re.search(rf"^[ -]*{name}: *(?:{{ *value: *([^,}}]+)|([^\n#]+))", entry, re.MULTILINE)
+    value = (match[1] or match[2]).strip().strip('"') if match else ""
+    return f"{float(value):.1f}" if re.fullmatch(r"-?\d+(\.\d*)?", value) else value
 
 
 def _values_text(term: Mapping[str, Any]) -> str:

@@ -19,8 +19,12 @@ FAILED_RULE = re.compile(
 )
 FINISHED_JOB = re.compile(r"^Finished jobid: (\d+) ", re.M)
 # Of a line that ends with a colon the next one is a part: it names the files.
-STOP_MESSAGE = re.compile(r"^\w+(?:Errors?|Exception)(?: in (?:file|rule) .*)?:\n(.+(?:(?<=:)\n.+)?)$", re.M)
-EXCEPTION = re.compile(r"^[\w.]+(?:Error|Exception)(?:: .+)?$", re.M)  # the last line of a traceback
+# The class of an exception may have any name; Snakemake writes "Error in rule" of a failed job.
+STOP_MESSAGE = re.compile(
+    r"^(?:(?!Error )\w+ in (?:file|rule) .*|\w+(?:Errors?|Exception)):\n(.+(?:(?<=:)\n.+)?)$", re.M
+)
+# Behind the indented lines of a traceback stands its exception
+EXCEPTION = re.compile(r"^Traceback \(most recent call last\):\n(?:[ \t].*\n|\n)*([\w.]+(?:: .+)?)$", re.M)
 MAX_REASON_LENGTH = 300  # characters of a message in the report
 
 

@@ -1,11 +1,14 @@
 """The panels of one passage: recording and prediction, two wheelsets, and a spectrogram with a line per axle."""
 
 from importlib import resources
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from turnout.cli.passage import _write_page
 from turnout.passage.channel_fit import ChannelFit
+from turnout.records import Channel, Recording
 from turnout.report.passage_page import SensorPassage, passage_page, spectrogram, spectrogram_panel
 
 RATE = 5000.0
@@ -59,3 +62,10 @@ def test_a_page_with_series_has_the_script_that_draws_their_legends(template):
     text = template.read_text(encoding="utf-8")
     page_has_charts = template.name in ("beams.html", "comparison.html", "finding.html", "passage.html", "turnout.html")
     assert ("<script>{{ chart_script|safe }}</script>" in text) == page_has_charts
+
+
+def test_the_title_of_the_page_has_the_turnout_and_the_file(tmp_path):
+    recording = Recording(tone(1.0, 1.0)[None], RATE, (Channel("A7", "acceleration"),), source="20260513T090000Z.h5")
+    page = tmp_path / "page.html"
+    _write_page(str(page), "t1", recording, SimpleNamespace(at_sensor={"A7": AXLES}), {}, [])
+    assert "<title>t1, 20260513T090000Z.h5</title>" in page.read_text() and "<h1>t1, 2026" in page.read_text()

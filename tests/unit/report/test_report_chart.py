@@ -245,6 +245,15 @@ def test_values_of_a_history_have_as_many_digits_as_their_intervals_justify():
     assert "ballast damping: 0.123 ± 0.046 (95 %)" in svg and "102 Hz, damping 0.123 ± 0.046 (95 %), n = 9" in svg
 
 
+def test_the_label_of_a_point_has_the_name_of_its_campaign():
+    mode = {
+        "measured_at_utc": datetime(2026, 5, 12, 22, 30), "campaign_id": "t/2026-05-13", "frequency_hz": 102.1,
+        "frequency_se_hz": 5.0, "n_impacts": 9, "damping_ratio": 0.12, "damping_se": 0.02, "rail_temperature_c": None,
+    }  # fmt: skip
+    svg = history_panel("ballast", [mode], [], [])
+    assert "2026-05-13: 102 Hz" in svg and "2026-05-12:" not in svg
+
+
 def test_one_uncertain_campaign_does_not_flatten_a_history():
     """Its expected range, -200 to 400 Hz, is cut off: the axis stays within one span of the campaigns and above 0."""
     mode = {

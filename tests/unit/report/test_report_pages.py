@@ -20,6 +20,7 @@ from turnout.report.job import report_job
 from turnout.report.pages.turnout import lines_of
 from turnout.report.panels.diagram import diagram
 from turnout.report.site import write_pages
+from turnout.report.source import ROWS, FleetSource
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.configuration_rows import configuration_rows
@@ -160,6 +161,21 @@ def test_a_diagnosis_of_two_alarms_is_shown_once():
     rows = [row | {"diagnosis": "local pad; 4 tests"}, row, row | {"diagnosis": "local pad; 4 tests"}]
     assert [line["diagnosis"] for line in lines_of(rows)] == ["local pad", "", "as above for this turnout"]
     assert [line["evidence"] for line in lines_of(rows)] == ["4 tests", "", ""]
+
+
+def test_the_modes_of_a_page_have_the_campaigns_of_their_models(pages):
+    """The rows of modes off their history are those of a view of modes_current: one with all modes stands for it."""
+    _, connection = pages
+    source = FleetSource(connection)
+    campaigns = {f"tommerup_s1/{day}" for day in DAYS}
+    assert {m["campaign_id"] for m in source.rows_of(["tommerup_s1"])["modes"]["tommerup_s1"]} == campaigns
+    all_modes = ROWS["off_track"].replace(
+        "from modes_off_track",
+        """from (select *, 0.0 as frequency_track_hz, 0.0 as damping_track, 0.0 as residue_ratio, 9 as n_history,
+        0.0 as shape_mac, '' as verdict, 0.0 as frequency_distance, 0.0 as damping_distance from modes_current)""",
+    )
+    rows = connection.execute(all_modes, {"turnouts": ["tommerup_s1"]}).fetch_df()
+    assert set(rows["campaign_id"]) == campaigns
 
 
 def test_files_that_were_not_used_are_listed_as_in_quarantine(pages):

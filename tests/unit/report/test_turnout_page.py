@@ -85,6 +85,17 @@ def test_one_sentence_states_from_when_to_when_a_mode_differs(frequencies, depar
     assert departure_rows([modes[k] for k in departing][::-1])[0]["when"] == f"2026-0{1 + departing[0]}-01"
 
 
+def test_a_departure_has_the_name_of_its_campaign_which_is_the_local_day():
+    """Its start in UTC lies on the day before."""
+    begun = datetime(2026, 4, 30, 22, 30)
+    uncertain = departure(band="railpad", verdict="uncertain", measured_at_utc=begun, campaign_id="t/2026-05-01")
+    departing = departure(measured_at_utc=begun, campaign_id="t/2026-05-01")
+    text = page(models=[REJECTED], off_track=[departing, uncertain])
+    assert "From 2026-05-01 on the ballast mode differs" in text
+    assert "whether the railpad mode continues that before: 2026-05-01." in text
+    assert text.count('<td class="date">2026-05-01</td>') == 2 and "2026-04-30" not in text
+
+
 def test_a_mode_with_a_large_error_is_reported_as_uncertain():
     mode = departure(verdict="uncertain", frequency_hz=307.37, frequency_se_hz=77.8, damping_se=0.338)
     text = page(models=[REJECTED], off_track=[mode])

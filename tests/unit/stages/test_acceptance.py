@@ -21,7 +21,7 @@ from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan
 from turnout.mismatch.turnout.predicted_case import PredictedCase
 from turnout.simulate import load_track, simulate_hammer, uniform_track
 from turnout.stages import mismatch
-from turnout.stages.accept_finding import accept
+from turnout.stages.accept_finding import accept, entry_text, with_entry
 from turnout.stages.accepted_effects import AcceptedEffect, accepted_of, describe_term, terms_on
 from turnout.stages.mismatch_groups import Group
 from turnout.stages.mismatch_results import Results
@@ -93,6 +93,42 @@ def test_the_same_effect_at_the_same_position_is_replaced_and_another_is_added(c
     assert [(a.key, round(next(iter(a.values.values()))[0], 6)) for a in found] == [
         ("hanging_sleeper[18.0 m]", 1.5e-3), ("hanging_sleeper[18.6 m]", 1.12e-3), ("sensor_gain[A]", 1.2),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "fixed", "other"),
+    [
+        ("hum", {"channel_name": "A", "frequency": 50.0, "start": 0.0, "phase": 0.0}, {"frequency": 100.0}),
+        ("wheel_flat", {"wheel": 1, "train": "railcar"}, {"wheel": 5}),
+        ("out_of_round", {"wheel": 1, "order": 3, "train": "railcar"}, {"order": 5}),
+    ],
+)
+def test_effects_at_one_sensor_or_train_differ_by_frequency_wheel_and_order(config, name, fixed, other):
+    def entry(value, **changes):
+        values = dict.fromkeys((p.name for p in physics.effects_by_name()[name].parameters), GAP | {"value": value})
+        return entry_text(
+            {"term": name, "fixed": fixed | changes, "parameters": values},
+            finding(),
+            load_track("small", folder=config / "tracks"),
+        )
+
+    text = "name: a\n"
+    for described in (entry(1e-3), entry(2e-3, **other), entry(3e-3)):
+        text = with_entry(text, described)
+    assert (
+        text.count("- term:") == 2
+        and text.count("value: 1,") == 0
+        and text.index("value: 2,") < text.index("value: 3,")
+    )
+
+
+def test_a_fitted_frequency_tells_no_two_masses_apart(config):
+    mass = {"term": "attached_resonator", "fixed": {"support": 12.0}}
+    text = "name: a\n"
+    for frequency in (180.0, 185.0):
+        described = mass | {"parameters": {"frequency": GAP | {"value": frequency, "unit": "Hz"}}}
+        text = with_entry(text, entry_text(described, finding(), load_track("small", folder=config / "tracks")))
+    assert text.count("- term:") == 1 and "value: 185" in text
 
 
 def test_an_effect_behind_the_crossing_is_only_on_the_track_of_its_route(config, repository):

@@ -9,9 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from turnout.errors import RegistryError
+from turnout.errors import ConfigError, ConfigErrors, RegistryError
 from turnout.registry.job import register
 from turnout.workflow.batches import UnitResult, read_results, write_batch
+from turnout.workflow.current_results import DamagedBatch
 from turnout.workflow.job_log import job_log
 from turnout.workflow.nightly import NightReport, nightly
 from turnout.workflow.run_report import failure_reason
@@ -197,6 +198,7 @@ def test_a_quiet_run_prints_only_its_last_line(folder, quiet, capfd):
     assert ("trend: 12 rows" not in out and "rule trend" not in error) == quiet
 
 
+WRONG_VALUE = ConfigError("a.yaml", "line 1", "7", "Write 8")
 ERROR = """Error in rule {rule}:
     message: None
     jobid: {job}
@@ -284,6 +286,29 @@ def test_the_reason_of_a_run_that_ended_with_a_traceback_is_its_exception_or_its
     assert failure_reason() == "NotADirectoryError: [Errno 20] Not a directory: 'results'"
     write("last", "Traceback (most recent call last):\n\nturnout.errors.StateError: no state\n", 10)
     assert failure_reason() == "turnout.errors.StateError: no state"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [DamagedBatch("work/a.json", ValueError("no batch")), ConfigErrors([WRONG_VALUE] * 2)],
+    ids=type,
+)
+def test_the_exception_of_a_failed_job_is_stated_whatever_its_name(folder, error):
+    with pytest.raises(type(error)), job_log("logs/register.log"):
+        raise error
+    write("run", ERROR.format(rule="register", job=4))
+    name = f"{type(error).__module__}.{type(error).__name__}"
+    assert f"see logs/register.log: {name}: {str(error).splitlines()[0]}" in failure_reason()
+
+
+def test_the_message_that_stopped_a_run_is_stated_whatever_the_name_of_its_exception(folder):
+    write("run", 'DamagedBatch in file "/srv/t/rules/register.smk", line 11:\nwork/a.json: no batch\n')
+    assert failure_reason() == "work/a.json: no batch"
+
+
+def test_a_job_that_succeeded_in_its_second_attempt_is_no_reason(folder):
+    write("run", ERROR.format(rule="register", job=4) + "\nFinished jobid: 4 (Rule: register)\n")
+    assert failure_reason() == "see .snakemake/log/run.snakemake.log"
 
 
 def test_a_reason_whose_first_line_ends_with_a_colon_includes_the_second_line(folder):

@@ -10,7 +10,7 @@ from turnout.registry.as_of import chart_in_words
 from turnout.report.formatting import (
     STIFFNESS_NOTE,
     badge,
-    campaign_name,
+    campaign_of,
     diagnoses_once,
     has_stiffness,
     result_and_evidence,
@@ -85,7 +85,7 @@ def fleet_page(source: FleetSource, template: Template, shared: Mapping[str, Any
         n_turnouts=len(turnouts),
         n_sections=sum(t["n_sections"] for t in turnouts),
         today=source.day.split("'")[1][:10],
-        latest=_campaign(max((t for t in turnouts if t["latest"]), key=lambda t: t["latest"], default={})),
+        latest=campaign_of(max((t for t in turnouts if t["latest"]), key=lambda t: t["latest"], default={}), "latest"),
         cards=_cards(lines),
         n_quarantined=sum(r["rows"] for r in reasons),
         worklist=[_work(w, diagnosis) for w, diagnosis in zip(worklist, diagnoses_once(worklist))],
@@ -133,11 +133,6 @@ def _work(row: Mapping[str, Any], diagnosis: str) -> dict[str, Any]:
     }
 
 
-def _campaign(turnout: Mapping[str, Any]) -> str:
-    """Name of the newest campaign of a turnout."""
-    return campaign_name(turnout.get("campaign_id"), turnout.get("latest"))
-
-
 def _line(
     turnout: dict[str, Any],
     charts: Mapping[str, int],
@@ -156,6 +151,6 @@ def _line(
         "score_of": f"{score['section_id'].split('/')[-1]} {score['band']}" if score and score["score"] >= 0.5 else "",
         "name": turnout["name"] or "",
         "km_text": "" if turnout["km"] is None else f"{turnout['km']:.3f}",
-        "latest": _campaign(turnout),
+        "latest": campaign_of(turnout, "latest"),
         "states": ", ".join(f"{charts[s]} {s}" for s in STATES if s in charts) or "–",
     }

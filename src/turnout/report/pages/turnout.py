@@ -13,7 +13,7 @@ from turnout.report.departures import departure_rows, departure_sentences
 from turnout.report.formatting import (
     STIFFNESS_NOTE,
     badge,
-    campaign_name,
+    campaign_of,
     day,
     diagnoses_once,
     has_stiffness,
@@ -78,7 +78,7 @@ def turnout_page(
     return template.render(
         turnout=turnout,
         place=_position_words(turnout),
-        latest=_campaign(max(models.values(), key=lambda m: m["measured_at_utc"], default={})),
+        latest=campaign_of(max(models.values(), key=lambda m: m["measured_at_utc"], default={})),
         diagram=_diagram(rows) if rows["sections"] else "",
         has_train_charts=any(c["source"] == "passage" for c in rows["chart_states"]),
         findings=lines_of(rows["worklist"]),
@@ -189,7 +189,7 @@ def _summary(
     status = "not read, see quarantine" if is_unread else "not measured"
     row = {"label": section["label"], "panel": section["panel"] or "–", "n": 0, "when": "–", "status": status}
     if model:
-        row |= {"n": model["n_impacts_used"], "when": _campaign(model)}
+        row |= {"n": model["n_impacts_used"], "when": campaign_of(model)}
         row["status"] = model["status"].replace("_", " ") + (f": {model['reason']}" if model["reason"] else "")
     for band in BANDS:
         mode = _latest(modes, band, model) or {}
@@ -233,7 +233,7 @@ def _section(
         "track": TRACKS.get(section["track"], "track not configured"),
         "position": f"{section['position_m']:.1f}" if section["position_m"] is not None else "–",
         "open": states.get(key) in ("confirm now", "inspect this week", "plan"),
-        "when": _campaign(model) if model else "none",
+        "when": campaign_of(model) if model else "none",
         "history": history or "<p>No model yet.</p>",
         "panels": _panels(rows, section, model, receptance, modes) if model and receptance else "",
         "detail": "; ".join(sorted_statements(model["detail"])) if model else "",
@@ -295,13 +295,8 @@ def _hidden_counts(quarantine: Sequence[Mapping[str, Any]]) -> list[tuple[str, i
 
 def _unused_tests(tests: Sequence[Mapping[str, Any]]) -> str:
     """Earlier tests of a section that gave no model, the newest first; they are not in its history."""
-    entries = [f"{_campaign(t)} ({_reason(t)})" for t in tests]
+    entries = [f"{campaign_of(t)} ({_reason(t)})" for t in tests]
     return first_texts(entries, MAX_UNUSED_SHOWN, others="before")
-
-
-def _campaign(test: Mapping[str, Any]) -> str:
-    """Name of the campaign of a row of ``models``."""
-    return campaign_name(test.get("campaign_id"), test.get("measured_at_utc"))
 
 
 def _reason(test: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from turnout.counts import count_of
 from turnout.report.axis import Axis
-from turnout.report.formatting import seconds, student_quantile, supported_decimals, with_half_width
+from turnout.report.formatting import campaign_of, seconds, student_quantile, supported_decimals, with_half_width
 from turnout.report.svg import Chart
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def history_panel(
     band : str
         Band of the resonance.
     modes : sequence of mapping
-        Rows of ``modes_current`` of one section and band.
+        Rows of ``modes_current`` of one section and band, with ``campaign_id``.
     charts : sequence of mapping
         Rows of its control chart, may be empty.
     events : sequence of mapping
@@ -108,7 +108,7 @@ def history_panel(
         style = "event" if event[f"resets_{band}"] else "event mild"
         chart.vertical(seconds(event["event_at_utc"]), style, event["kind"].replace("_", " "), row % 3)
     labels = [
-        f"{m['measured_at_utc']:%Y-%m-%d}: {_number(m, FREQUENCY, 2)} Hz{_of(i, quantity is FREQUENCY)}, damping "
+        f"{campaign_of(m)}: {_number(m, FREQUENCY, 2)} Hz{_of(i, quantity is FREQUENCY)}, damping "
         f"{_number(m, DAMPING, 4)}{_of(i, quantity is DAMPING)}, n = {m['n_impacts']}, "
         f"{_temperature(m['rail_temperature_c'])}"
         for m, i in zip(modes, intervals)
