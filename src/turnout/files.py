@@ -399,7 +399,7 @@ def read_json(path: os.PathLike | str, default: Any) -> Any:
     path : path-like
         The file.
     default : any
-        Result for a file that is absent, or (with a warning) truncated.
+        Result for a file that is absent, or (with a warning) truncated or of another type than the default.
 
     Returns
     -------
@@ -407,9 +407,12 @@ def read_json(path: os.PathLike | str, default: Any) -> Any:
         The content, or ``default``.
     """
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        if type(content) is not type(default):
+            raise ValueError(f"{type(content).__name__} instead of {type(default).__name__}")
     except FileNotFoundError:
         return default
     except ValueError as error:
         logging.getLogger("turnout.workflow").warning("%s is cut or no JSON (%s): it is made again", path, error)
         return default
+    return content

@@ -48,15 +48,15 @@ def run(args: argparse.Namespace) -> int:
     """
     from turnout.config import load_configuration
     from turnout.errors import ConfigError
-    from turnout.workflow.alerts import message_text, send_alerts, worklist_entries
+    from turnout.workflow.alerts import message_text, send_new_entries, worklist_entries
 
     settings = load_configuration(args.configuration).settings["alerts"]
-    entries = worklist_entries(args.registry)
     if args.dry_run:
+        entries = worklist_entries(args.registry)
         add_result(args, entries)
         print(message_text(entries) if entries else "No entry asks for an action.")
         return 0
-    counts = send_alerts(entries, settings)
+    counts = send_new_entries(args.registry, settings)
     if not counts:
         problem = "neither recipients nor webhook"
         raise ConfigError(f"{args.configuration}/config.yaml", "alerts", problem, "Write one of them, or both")

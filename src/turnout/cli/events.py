@@ -1,6 +1,7 @@
 """List maintenance, enter it, or show whether it helped: tamping, exchanged pads, another sensor, another method.
 
   turnout events                                      everything that is entered
+  turnout events tommerup_s1                          what is entered for this turnout
   turnout events --effect                             whether the work helped, and for how long
   turnout events tommerup_s1/A7 tamping 2026-04-02 --note "machine 09-3X"
 
@@ -8,9 +9,15 @@ An event that resets a resonance starts a new epoch of its charts: they learn th
 again. Each kind of work resets certain resonances (docs/settings.md); --resets states others.
 """
 
+from __future__ import annotations
+
 import argparse
+from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_configuration, add_registry, add_result
+
+if TYPE_CHECKING:
+    from datetime import datetime
 
 GROUP = "Worklist and maintenance"
 HELP = "list or enter maintenance, and show whether it helped"
@@ -24,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Parser of the command.
     """
-    parser.add_argument("id", metavar="ID", nargs="?", help="turnout, or turnout/section")
+    parser.add_argument("id", metavar="ID", nargs="?", help="turnout, or turnout/section; all if not given")
     parser.add_argument("kind", metavar="KIND", nargs="?", help="tamping, pad_exchange, sensor_change ...")
     when = "YYYY-MM-DD or YYYY-MM-DDTHH:MM, UTC; a day alone begins at 00:00, before the tests of that day"
     parser.add_argument("date", metavar="DATE", nargs="?", help=when)
@@ -48,28 +55,60 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit code.
     """
+    from turnout.errors import ConfigError
+
+    if args.effect and args.kind:
+        problem, remedy = f"{args.kind!r} beside --effect", "Enter the work first, then ask for its effect"
+        raise ConfigError("events", "the command line", problem, remedy)
+    if args.effect:
+        return _effect(args)
+    if not args.kind:
+        return _list(args)
+    if not args.date:
+        raise ConfigError("events", "the command line", "a kind without a date", "Write: turnout events ID KIND DATE")
+    return _enter(args)
+
+
+def _list(args: argparse.Namespace) -> int:
+    """Print all events, or those of one turnout; those of one section with the work on its whole turnout."""
     from dataclasses import asdict
 
     from turnout.config import load_configuration
+
+    configuration = load_configuration(args.configuration)
+    turnout, section = _asked(args, {*configuration.ids, *(e.turnout for e in configuration.events)})
+    events = [
+        e
+        for e in configuration.events
+        if (not turnout or e.turnout == turnout) and (not section or e.section in (None, section))
+    ]
+    add_result(args, [asdict(e) for e in events])
+    if not events:
+        of_id = f" of {args.id}" if args.id else ""
+        print(f"{args.configuration}/events.csv: no event{of_id} yet. Enter one: turnout events ID KIND DATE")
+    for e in events:
+        where = f"{e.turnout}/{e.section}" if e.section else e.turnout
+        resets = " and ".join(e.resets) or "nothing"
+        print(f"{_time(e.at):<16}  {where:<28} {e.kind:<16} resets {resets}  {e.note}".rstrip())
+    return 0
+
+
+def _asked(args: argparse.Namespace, ids: set[str]) -> tuple[str, str]:
+    """Turnout and section of the id on the command line, "" for all; ConfigError for a turnout that is not known."""
+    from turnout.config.schema import NO_TURNOUT, suggestion
+    from turnout.config.table_edits import turnout_and_section
     from turnout.errors import ConfigError
 
-    if args.effect:
-        return _effect(args.registry)
-    if args.id is None:
-        events = load_configuration(args.configuration).events
-        add_result(args, [asdict(e) for e in events])
-        if not events:
-            print(f"{args.configuration}/events.csv: no event yet. Enter one: turnout events ID KIND DATE")
-        for e in events:
-            where = f"{e.turnout}/{e.section}" if e.section else e.turnout
-            resets = " and ".join(e.resets) or "nothing"
-            print(f"{e.at:%Y-%m-%d}  {where:<28} {e.kind:<16} resets {resets}  {e.note}")
-        return 0
-    if not (args.kind and args.date):
-        raise ConfigError(
-            "events", "the command line", "an id without kind and date", "Write: turnout events ID KIND DATE"
-        )
-    return _enter(args)
+    turnout, section = turnout_and_section(args.id) if args.id else ("", "")
+    if turnout and turnout not in ids:
+        remedy = suggestion(turnout, sorted(ids), NO_TURNOUT)
+        raise ConfigError("the command line", "ID", f"turnout {turnout!r} is not known", remedy)
+    return turnout, section
+
+
+def _time(at: datetime) -> str:
+    """The day of work, with its time if it has one: it decides about the tests of that day."""
+    return f"{at:%Y-%m-%d %H:%M}" if at.hour or at.minute else f"{at:%Y-%m-%d}"
 
 
 def _enter(args: argparse.Namespace) -> int:
@@ -106,15 +145,23 @@ def _enter(args: argparse.Namespace) -> int:
     return 0
 
 
-def _effect(registry: str) -> int:
+def _effect(args: argparse.Namespace) -> int:
+    """Print what the work of all turnouts did, or of one turnout or section."""
     from turnout.registry.database import open_registry
 
-    with open_registry(registry) as con:
-        rows = con.execute(
+    with open_registry(args.registry) as con:
+        known = con.execute("select turnout_id from turnouts union select turnout_id from events").fetchall()
+        turnout, section = _asked(args, {name for (name,) in known})
+        cursor = con.execute(
             "select event_at_utc, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
             "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "
-            "order by event_at_utc, section_id, band"
-        ).fetchall()
+            "where turnout_id = coalesce(nullif($1, ''), turnout_id) and "
+            "section_id = coalesce(nullif($2, ''), section_id) order by event_at_utc, section_id, band",
+            [turnout, section and f"{turnout}/{section}"],
+        )
+        names = [column[0] for column in cursor.description]
+        rows = cursor.fetchall()
+    add_result(args, [dict(zip(names, row)) for row in rows])
     for at, section, band, kinds, verdict, gain, low, high, before, after, retention, last in rows:
         retention = (
             f"half of it lost by {retention:%Y-%m-%d}"
@@ -124,7 +171,7 @@ def _effect(registry: str) -> int:
         interval = "no interval" if low is None or high is None else f"{low:+z.1f} to {high:+z.1f}, 95 %"
         size = "" if gain is None else f", {gain:+z.1f} %"
         print(
-            f"{at:%Y-%m-%d} {section} {band}, {kinds}: {verdict}{size} ({interval}; {before} and {after} campaigns)"
+            f"{_time(at)} {section} {band}, {kinds}: {verdict}{size} ({interval}; {before} and {after} campaigns)"
             + (f"; {retention}" if verdict == "stiffer" else "")
         )
     if not rows:

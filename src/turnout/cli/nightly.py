@@ -138,14 +138,14 @@ def _alert(options: Sequence[str]) -> int:
 
     from turnout.config import load_configuration
     from turnout.errors import TurnoutError
-    from turnout.workflow.alerts import has_channel, send_alerts, worklist_entries
+    from turnout.workflow.alerts import has_channel, send_new_entries
     from turnout.workflow.nightly import GENERATION
 
     settings = load_configuration(_configuration_folder(options), leave_out=True).settings["alerts"]
     if not has_channel(settings):
         return 0
     try:
-        send_alerts(worklist_entries(GENERATION.parent), settings)
+        send_new_entries(GENERATION.parent, settings)
     except TurnoutError as error:
         print(f"turnout nightly: {error}", file=sys.stderr)
         return 1

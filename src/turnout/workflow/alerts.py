@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from turnout.counts import first_texts
 from turnout.errors import TurnoutError
 from turnout.files import read_json, write_text
-from turnout.registry.as_of import chart_in_words, list_day
+from turnout.registry.as_of import chart_in_words, list_day, whole_list
 from turnout.registry.database import open_registry
 
 if TYPE_CHECKING:
@@ -36,13 +36,15 @@ MAX_NAMED = 3  # entries named in the subject
 PASSWORD, WEBHOOK = "TURNOUT_SMTP_PASSWORD", "TURNOUT_WEBHOOK"  # of the environment
 
 
-def worklist_entries(registry: Path | str) -> list[dict[str, Any]]:
+def worklist_entries(registry: Path | str, beyond_limit: bool = False) -> list[dict[str, Any]]:
     """Entries of today's worklist that need a person.
 
     Parameters
     ----------
     registry : path
         Folder of the registry.
+    beyond_limit : bool
+        Whether rows beyond the limit of the list are included.
 
     Returns
     -------
@@ -50,16 +52,47 @@ def worklist_entries(registry: Path | str) -> list[dict[str, Any]]:
         Rows of the view ``worklist``, the most urgent first.
     """
     with open_registry(registry) as con:
-        cursor = con.execute(f"select * from worklist({list_day(con)}) order by rank")
+        day = list_day(con)
+        rows_of = whole_list(day) if beyond_limit else f"worklist({day})"
+        cursor = con.execute(f"select * from {rows_of} order by rank")
         names = [column[0] for column in cursor.description]
         rows = [dict(zip(names, row)) for row in cursor.fetchall()]
     return [row for row in rows if row["state"] in STATES]
 
 
+def send_new_entries(registry: Path | str, settings: AlertsSettings) -> dict[str, int]:
+    """Send the entries of today's worklist that a channel has not got yet.
+
+    Parameters
+    ----------
+    registry : path
+        Folder of the registry.
+    settings : AlertsSettings
+        Section ``alerts`` of the configuration.
+
+    Returns
+    -------
+    dict of str to int
+        As ``send_alerts``.
+
+    Raises
+    ------
+    TurnoutError
+        As ``send_alerts``.
+    """
+    return send_alerts(worklist_entries(registry), settings, listed=worklist_entries(registry, beyond_limit=True))
+
+
 def send_alerts(
-    entries: Sequence[Mapping[str, Any]], settings: AlertsSettings, sent_file: Path = SENT_FILE
+    entries: Sequence[Mapping[str, Any]],
+    settings: AlertsSettings,
+    sent_file: Path = SENT_FILE,
+    listed: Sequence[Mapping[str, Any]] | None = None,
 ) -> dict[str, int]:
     """Send the entries that a channel has not got yet.
+
+    An alarm is one entry in whatever state, identified by the campaign that raised it. An entry without an alarm is one
+    as long as it is on the list: one that comes back is new, as another campaign to be confirmed.
 
     Parameters
     ----------
@@ -69,6 +102,8 @@ def send_alerts(
         Section ``alerts`` of the configuration.
     sent_file : Path
         Note of what was sent.
+    listed : sequence of mapping or None
+        Rows of the list without its limit; None: ``entries`` are all.
 
     Returns
     -------
@@ -82,23 +117,30 @@ def send_alerts(
     """
     sent: dict[str, list[str]] = read_json(sent_file, {})
     counts, errors = {}, []
+    present = {_key(entry) for entry in (*entries, *(listed or ()))}
     for channel, send in _channels(settings).items():
-        known = set(sent.get(channel, ()))
+        noted = _noted(sent.get(channel))
+        known = {key for key in noted if key in present or not key.endswith(STATES)}
         new = [entry for entry in entries if _key(entry) not in known]
         counts[channel] = len(new)
-        if not new:
-            continue
         try:
-            send(new, settings)
+            if new:
+                send(new, settings)
         except (OSError, smtplib.SMTPException, urllib.error.URLError, ValueError) as error:
             errors.append(f"{_address(channel, settings)}: {_reason(error)}")
             continue
-        sent[channel] = sorted(known | {_key(entry) for entry in new})
-        write_text(sent_file, json.dumps(sent, indent=1) + "\n")
+        if new or known != noted:
+            sent[channel] = sorted(known | {_key(entry) for entry in new})
+            write_text(sent_file, json.dumps(sent, indent=1) + "\n")
     if errors:
         remedy = "Check the section alerts of config.yaml and the server; they are tried again in the next run"
         raise TurnoutError(f"alerts were not sent by {'; '.join(errors)}. {remedy}.")
     return counts
+
+
+def _noted(keys: Any) -> set[str]:
+    """Keys of the entries that a channel has got, from the note of what was sent."""
+    return set(map(str, keys)) if isinstance(keys, list) else set()
 
 
 def has_channel(settings: AlertsSettings) -> bool:

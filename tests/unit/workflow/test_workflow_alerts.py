@@ -114,6 +114,31 @@ def test_each_entry_is_sent_once_by_each_channel(tmp_path, settings, mail, hook)
     assert second["turnout_id"] == "W2" and second["look_at"] in hook.bodies[1]["text"]
 
 
+def test_an_entry_without_an_alarm_that_comes_back_is_sent_again(tmp_path, settings, mail):
+    """Another campaign to be confirmed is one. An alarm that was off the list, as while suppressed, is not."""
+    sent = tmp_path / "alerts.json"
+    confirm = PLAN | {"state": "confirm now"}
+    assert send_alerts([ALARM, confirm], settings, sent) == {"mail": 2, "webhook": 2}
+    assert send_alerts([ALARM, confirm], settings, sent) == {"mail": 0, "webhook": 0}
+    assert send_alerts([], settings, sent) == {"mail": 0, "webhook": 0}
+    assert send_alerts([ALARM, confirm], settings, sent) == {"mail": 1, "webhook": 1}
+
+
+def test_an_entry_beyond_the_limit_of_the_list_is_still_on_it(tmp_path, settings, mail):
+    sent = tmp_path / "alerts.json"
+    send_alerts([ALARM, PLAN], settings, sent)
+    send_alerts([ALARM], settings, sent, listed=[ALARM, PLAN])
+    assert send_alerts([ALARM, PLAN], settings, sent) == {"mail": 0, "webhook": 0}
+
+
+@pytest.mark.parametrize("content", ["[1]", '"a"', "null", '{"mail": null}', '{"mail": 7, "webhook": [1]}', "{"])
+def test_a_damaged_note_of_what_was_sent_sends_the_entries_again(tmp_path, settings, mail, content):
+    sent = tmp_path / "alerts.json"
+    sent.write_text(content)
+    assert send_alerts([ALARM], settings, sent) == {"mail": 1, "webhook": 1}
+    assert send_alerts([ALARM], settings, sent) == {"mail": 0, "webhook": 0}
+
+
 def test_an_acknowledged_alarm_is_no_new_entry(tmp_path, settings, mail):
     sent = tmp_path / "alerts.json"
     send_alerts([ALARM], settings, sent)
@@ -192,7 +217,7 @@ def test_without_recipients_nothing_is_sent_and_the_settings_change_no_hash(tmp_
 
 def test_the_command_reads_the_worklist_of_a_registry(tmp_path, repository, monkeypatch, capsys, settings):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("turnout.workflow.alerts.worklist_entries", lambda registry: [ALARM])
+    monkeypatch.setattr("turnout.workflow.alerts.worklist_entries", lambda registry, beyond_limit=False: [ALARM])
     (tmp_path / "config").mkdir()
     (tmp_path / "config/turnouts.tsv").write_text("turnout\tlayout\n")
     (tmp_path / "config/config.yaml").write_text("")
