@@ -1,9 +1,10 @@
 """Write tables and views for other tools: Parquet or CSV files, or Delta Lake tables.
 
-turnout export out                            every table as one Parquet file
+turnout export out                            the usual tables and views, one Parquet file each
 turnout export out --format csv --only worklist chart_states
 turnout export lake --format delta --only modes_current charts
 
+In CSV an apostrophe precedes text that a spreadsheet would take for a formula. Times are UTC, without a zone.
 Delta Lake needs the extra: pip install '.[lakehouse]'
 """
 
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry
 from turnout.counts import count_of
+from turnout.registry.spreadsheet import FORMULA_STARTS, QUOTE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,7 +110,19 @@ def _write(con: duckdb.DuckDBPyConnection, name: str, folder: Path, form: str) -
     path = folder / f"{name}.{form}"
     written = str(path).replace("'", "''")
     options = "format parquet, compression zstd" if form == "parquet" else "format csv, header"
-    return path, con.execute(f"copy (select * from {quoted}) to '{written}' ({options})").fetchall()[0][0]
+    rows = f"select * from {quoted}" if form == "parquet" else _rows_without_formulas(con, quoted)
+    return path, con.execute(f"copy ({rows}) to '{written}' ({options})").fetchall()[0][0]
+
+
+def _rows_without_formulas(con: duckdb.DuckDBPyConnection, quoted: str) -> str:
+    """SQL of the rows of a table or view with its texts as ``without_formula`` writes them."""
+    starts = ", ".join(f"chr({ord(start)})" for start in FORMULA_STARTS)
+    changes = ", ".join(
+        f"case when left({name}, 1) in ({starts}) then chr({ord(QUOTE)}) || {name} else {name} end as {name}"
+        for name, kind in ((_identifier(row[0]), row[1]) for row in con.execute(f"describe {quoted}").fetchall())
+        if kind == "VARCHAR"
+    )
+    return f"select * replace ({changes}) from {quoted}" if changes else f"select * from {quoted}"
 
 
 def _delta(con: duckdb.DuckDBPyConnection, quoted: str, path: Path) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 T = TypeVar("T")
+QUOTE = "'"  # before a text: a spreadsheet shows the text as it is
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
@@ -31,5 +32,5 @@ def without_formula(value: T) -> T | str:
     OWASP, "CSV Injection".
     """
     if isinstance(value, str) and value.startswith(FORMULA_STARTS):
-        return f"'{value}"
+        return f"{QUOTE}{value}"
     return value
