@@ -249,6 +249,8 @@ def _send_mail(entries: Sequence[Mapping[str, Any]], settings: AlertsSettings) -
     message["To"] = ", ".join(recipients)
     message.set_content(message_text(entries))
     host, port, timeout = settings.smtp_host, settings.smtp_port, settings.timeout
+    if not host:  # smtplib would not connect, and ask for that
+        raise ValueError("smtp_host is empty. Write the name of the mail server")
     context = ssl.create_default_context()
     if settings.smtp_security == "tls":
         server: smtplib.SMTP = smtplib.SMTP_SSL(host, port, timeout=timeout, context=context)

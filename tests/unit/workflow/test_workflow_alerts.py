@@ -139,6 +139,11 @@ def test_a_damaged_note_of_what_was_sent_sends_the_entries_again(tmp_path, setti
     assert send_alerts([ALARM], settings, sent) == {"mail": 0, "webhook": 0}
 
 
+def test_recipients_without_a_mail_server_are_an_error_that_says_what_to_write(tmp_path, settings):
+    with pytest.raises(TurnoutError, match="smtp_host is empty. Write the name of the mail server"):
+        send_alerts([ALARM], replace(settings, smtp_host=""), tmp_path / "alerts.json")
+
+
 def test_an_acknowledged_alarm_is_no_new_entry(tmp_path, settings, mail):
     sent = tmp_path / "alerts.json"
     send_alerts([ALARM], settings, sent)
