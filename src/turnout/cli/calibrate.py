@@ -20,13 +20,6 @@ if TYPE_CHECKING:
 
 GROUP = "Simulate and diagnose"
 HELP = "fit a section of a track file to hammer tests"
-PRINTED_UNITS = {
-    "pad_stiffness": "MN/m",
-    "pad_damping": "kN s/m",
-    "ballast_stiffness": "MN/m",
-    "ballast_damping": "kN s/m",
-    "sleeper_mass": "kg",
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _track_entry(section: str, values: Mapping[str, float], sd: Mapping[str, float], missed: str) -> str:
     """The values as lines of the track file, or as comments if the fit ``missed`` the tests."""
+    from turnout.simulate.calibration import PRINTED_UNITS
     from turnout.units import PARAMETER_UNITS
 
     if missed:

@@ -14,6 +14,7 @@ from turnout.simulate.hammer import resolve_location
 from turnout.simulate.matrices import assemble
 from turnout.simulate.modal_calibration import with_section
 from turnout.simulate.turnout_track import TurnoutTrack, stretch_of_track
+from turnout.units import PARAMETER_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,6 +29,13 @@ PARAMETERS = {
     "ballast_stiffness": ("ballast", "stiffness", 0.7),
     "ballast_damping": ("ballast", "damping", 1.0),
     "sleeper_mass": ("sleeper", "mass", 0.15),
+}
+PRINTED_UNITS = {
+    "pad_stiffness": "MN/m",
+    "pad_damping": "kN s/m",
+    "ballast_stiffness": "MN/m",
+    "ballast_damping": "kN s/m",
+    "sleeper_mass": "kg",
 }
 BANDS = ((40.0, 100.0), (100.0, 200.0), (200.0, 400.0), (400.0, 600.0), (600.0, 800.0))
 MAX_SD_RATIO = 0.5  # posterior sd over prior sd below which the data determine a parameter
@@ -103,7 +111,10 @@ class Calibration:
             remark = (
                 "" if self.informed[name] else "   hardly determined by these tests: about what the track file says"
             )
-            lines.append(f"  {name:<18} {value:12.5g} ± {100 * self.sd[name]:.1f} %{remark}")
+            unit = PRINTED_UNITS[name]
+            size = value / PARAMETER_UNITS[unit][1]
+            lines.append(f"  {name:<18} {size:12.5g} {unit:<8} ± {100 * self.sd[name]:.1f} %{remark}")
+        lines.append("  ± is one standard deviation")
         lines += [f"  {a} and {b} are determined only together" for a, b in self.correlated]
         for (low, high), after in self.misfit.items():
             before = self.misfit_before[low, high]

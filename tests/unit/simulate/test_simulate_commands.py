@@ -179,6 +179,15 @@ def calibrated(monkeypatch, capsys, command, reduced=0.9):
     return capsys.readouterr().out, taken
 
 
+def test_each_value_of_a_calibration_has_its_unit_and_its_error_a_name(monkeypatch, capsys):
+    """The table has the numbers and units of the lines to paste."""
+    output, _ = calibrated(monkeypatch, capsys, ["--track", "tommerup"])
+    lines = [line.split() for line in output.splitlines()]
+    assert ["pad_stiffness", "300", "MN/m", "±", "1.2", "%"] in lines
+    assert next(line for line in lines if line[:1] == ["ballast_damping"])[1:7] == ["71", "kN", "s/m", "±", "80.0", "%"]
+    assert "± is one standard deviation" in output
+
+
 @pytest.mark.parametrize("own", ["aarup_n4", "tommerup"], ids=["turnout", "layout"])
 def test_a_calibration_uses_the_track_of_the_turnout_and_states_it(tmp_path, repository, monkeypatch, capsys, own):
     (tmp_path / "config/tracks").mkdir(parents=True)
