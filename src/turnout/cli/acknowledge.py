@@ -26,6 +26,11 @@ OPEN_ALARMS_QUERY = """
     where closed_at_utc is null and turnout_id = $1 and section_id = coalesce($2, section_id)
         and band = coalesce($3, band) and raised_at_utc <= $4
     limit 1"""
+NAMED_ALARMS_QUERY = """
+    select section_id, band, raised_at_utc from alarms where closed_at_utc is null and turnout_id = $1
+    order by section_id, band, raised_at_utc"""
+MAX_ALARMS_NAMED = 4
+WHOLE_TURNOUT = "*"  # section of the median of all
 SUPPRESSED_QUERY = """
     select count(*), count(*) filter (exists (
         select 1 from alarms a where a.closed_at_utc is null and a.turnout_id = s.turnout_id
@@ -99,8 +104,7 @@ def run(args: argparse.Namespace) -> int:
         remark = f"Note: not compared with the open alarms. {error}"
     if remark is None:
         observation = f"no alarm of {args.id}, {args.band or 'all bands'}, is open that was raised by {at}"
-        remedy = "Write id, band and time of an open alarm, which `turnout worklist` lists. Nothing was written"
-        raise ConfigError(args.registry, "open alarms", observation, remedy)
+        raise ConfigError(args.registry, "open alarms", observation, _remedy(args.registry, turnout))
     with added_row(path, cells, COLUMNS) as tables:
         after = load_configuration(args.configuration, tables=tables)
         if row not in after.acknowledgements:
@@ -109,6 +113,22 @@ def run(args: argparse.Namespace) -> int:
     if remark:
         print(remark)
     return 0
+
+
+def _remedy(registry: str, turnout: str) -> str:
+    """Which alarms of a turnout are open: the worklist names what has changed, which may be another resonance."""
+    from turnout.counts import first_texts
+    from turnout.registry.database import open_registry
+
+    with open_registry(registry) as con:
+        rows = con.execute(NAMED_ALARMS_QUERY, [turnout]).fetchall()
+    if not rows:
+        return f"No alarm of {turnout} is open. Nothing was written"
+    names = [
+        f"{f'{turnout}/*' if section == WHOLE_TURNOUT else section} --band {band}, raised {raised:%Y-%m-%d %H:%M}"
+        for section, band, raised in rows
+    ]
+    return f"Open are, times in UTC: {first_texts(names, MAX_ALARMS_NAMED, '; ', 'more')}. Nothing was written"
 
 
 def _effect(registry: str, row: Mapping[str, Any]) -> str | None:

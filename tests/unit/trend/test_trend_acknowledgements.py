@@ -79,6 +79,33 @@ def test_an_acknowledgement_without_a_matching_alarm_is_reported(configuration, 
         assert len(load_configuration(configuration).acknowledgements) == before + changes
 
 
+def test_an_acknowledgement_without_a_matching_alarm_names_those_that_are_open(configuration, tmp_path, capsys):
+    """The heading of a row of the worklist may name the other resonance, and no row states when an alarm was raised."""
+    turnout, label = place_of(configuration)
+    place = f"{turnout}/{label}"
+    alarms = [
+        {
+            "alarm_id": name, "turnout_id": turnout, "section_id": section, "band": band, "source": "hammer",
+            "direction": "down", "raised_at_utc": pd.Timestamp("2026-02-01 09:30"), "closed_at_utc": closed,
+        }
+        for name, section, band, closed in (
+            ("a", place, "railpad", None), ("b", "*", "ballast", None),
+            ("c", place, "ballast", pd.Timestamp("2026-03-01")),
+        )
+    ]  # fmt: skip
+    register([], tmp_path / "registry", read=iter)
+    options = ["--by", "me", "--reason", "seen", "--configuration", str(configuration)]
+    options += ["--registry", str(tmp_path / "registry")]
+    publish(tmp_path / "registry", {"alarms": arrow_rows("alarms", pd.DataFrame(alarms[2:]))})
+    assert main(["acknowledge", place, "--band", "ballast", *options]) == 2
+    assert f"No alarm of {turnout} is open. Nothing was written." in capsys.readouterr().err
+    publish(tmp_path / "registry", {"alarms": arrow_rows("alarms", pd.DataFrame(alarms))})
+    assert main(["acknowledge", place, "--band", "ballast", *options]) == 2
+    named = f"{turnout}/* --band ballast, raised 2026-02-01 09:30; {place} --band railpad, raised 2026-02-01 09:30."
+    assert f"Open are, times in UTC: {named} Nothing" in capsys.readouterr().err
+    assert main(["acknowledge", f"{turnout}/*", "--band", "ballast", *options]) == 0
+
+
 def test_a_suppression_states_how_many_charts_it_hides_and_for_how_long(configuration, tmp_path, capsys):
     """Two charts, of which one has an open alarm, and one of another section."""
     turnout, label = place_of(configuration)
