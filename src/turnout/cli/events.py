@@ -76,7 +76,7 @@ def _list(args: argparse.Namespace) -> int:
     from turnout.config import load_configuration
 
     configuration = load_configuration(args.configuration)
-    turnout, section = _asked(args, {*configuration.ids, *(e.turnout for e in configuration.events)})
+    turnout, section = _turnout_and_section(args, {*configuration.ids, *(e.turnout for e in configuration.events)})
     events = [
         e
         for e in configuration.events
@@ -93,7 +93,7 @@ def _list(args: argparse.Namespace) -> int:
     return 0
 
 
-def _asked(args: argparse.Namespace, ids: set[str]) -> tuple[str, str]:
+def _turnout_and_section(args: argparse.Namespace, ids: set[str]) -> tuple[str, str]:
     """Turnout and section of the id on the command line, "" for all; ConfigError for a turnout that is not known."""
     from turnout.config.schema import NO_TURNOUT, suggestion
     from turnout.config.table_edits import turnout_and_section
@@ -150,8 +150,8 @@ def _effect(args: argparse.Namespace) -> int:
     from turnout.registry.database import open_registry
 
     with open_registry(args.registry) as con:
-        known = con.execute("select turnout_id from turnouts union select turnout_id from events").fetchall()
-        turnout, section = _asked(args, {name for (name,) in known})
+        rows = con.execute("select turnout_id from turnouts union select turnout_id from events").fetchall()
+        turnout, section = _turnout_and_section(args, {name for (name,) in rows})
         cursor = con.execute(
             "select event_at_utc, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
             "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "

@@ -119,8 +119,8 @@ def send_alerts(
     counts, errors = {}, []
     present = {_key(entry) for entry in (*entries, *(listed or ()))}
     for channel, send in _channels(settings).items():
-        noted = _noted(sent.get(channel))
-        known = {key for key in noted if key in present or not key.endswith(STATES)}
+        sent_keys = _sent_keys(sent.get(channel))
+        known = {key for key in sent_keys if key in present or not key.endswith(STATES)}
         new = [entry for entry in entries if _key(entry) not in known]
         counts[channel] = len(new)
         try:
@@ -129,7 +129,7 @@ def send_alerts(
         except (OSError, smtplib.SMTPException, urllib.error.URLError, ValueError) as error:
             errors.append(f"{_address(channel, settings)}: {_reason(error)}")
             continue
-        if new or known != noted:
+        if new or known != sent_keys:
             sent[channel] = sorted(known | {_key(entry) for entry in new})
             write_text(sent_file, json.dumps(sent, indent=1) + "\n")
     if errors:
@@ -138,7 +138,7 @@ def send_alerts(
     return counts
 
 
-def _noted(keys: Any) -> set[str]:
+def _sent_keys(keys: Any) -> set[str]:
     """Keys of the entries that a channel has got, from the note of what was sent."""
     return set(map(str, keys)) if isinstance(keys, list) else set()
 
