@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.errors import RegistryError
     from turnout.files import make_folder
+    from turnout.registry.damage import damage_message
     from turnout.registry.database import open_registry
 
     folder, names = Path(args.folder), args.only or DEFAULT_TABLES
@@ -77,6 +78,8 @@ def run(args: argparse.Namespace) -> int:
             try:
                 path, n = _write(con, name, folder, args.format)
             except duckdb.Error as error:
+                if damage_message(error, args.registry):
+                    raise
                 reason = str(error).splitlines()[0]
                 raise RegistryError(
                     f"{name} cannot be written to {folder}: {reason}. Free disk space or give write permission."

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from turnout import __version__
 from turnout.cli import COMMANDS, GROUPS
-from turnout.cli.options import add_common, leaf_parsers
+from turnout.cli.options import DEFAULT_REGISTRY, add_common, leaf_parsers
 from turnout.errors import TurnoutError, installation_error, remedy_of_access
 from turnout.threads import use_one_thread
 
@@ -220,9 +220,20 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
             return NOT_FOLLOWED, _message(error.__context__, args)
         if absent := installation_error(error):
             return NOT_FOLLOWED, str(absent)
+        if damage := _damage_of_registry(error, args):
+            return NOT_FOLLOWED, damage
         traceback.print_exc()
         fault = f"{type(error).__name__}: {error}"
         return PROGRAM_FAULT, f"a fault of the program, {fault}. Please report it with the lines above"
+
+
+def _damage_of_registry(error: Exception, args: argparse.Namespace) -> str:
+    """Message for an error of DuckDB about a file of the registry; "" for any other error."""
+    if "duckdb" not in sys.modules:
+        return ""
+    from turnout.registry.damage import damage_message
+
+    return damage_message(error, getattr(args, "registry", None) or DEFAULT_REGISTRY)
 
 
 @contextmanager

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from typing import Any
 
+DEFAULT_REGISTRY = "results/registry"
 RAW_HELP = "raw root, the folder of all recordings"
 TRACK_HELP = "file in config/tracks, or its path (default: the turnout's own, else tommerup)"
 
@@ -45,7 +46,7 @@ def add_registry(parser: argparse.ArgumentParser, help: str = "folder of the reg
     help : str
         What the command uses it for.
     """
-    parser.add_argument("--registry", default="results/registry", help=help)
+    parser.add_argument("--registry", default=DEFAULT_REGISTRY, help=help)
 
 
 def add_raw(

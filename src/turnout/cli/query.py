@@ -19,7 +19,6 @@ import sys
 from contextlib import contextmanager
 from decimal import Decimal
 from difflib import get_close_matches
-from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
@@ -79,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
     from turnout.errors import RegistryError
     from turnout.registry.confinement import open_confined, require_reading
+    from turnout.registry.damage import damage_message
     from turnout.registry.documentation import listing
 
     check_output_files(args, "--csv")
@@ -103,15 +103,10 @@ def run(args: argparse.Namespace) -> int:
                     for remark in misspelt_names(connection, sql):
                         print(remark, file=sys.stderr)
         except duckdb.Error as error:
-            raise RegistryError(f"{error}\n{_remedy(error, args.registry)}") from None
+            if damage_message(error, args.registry):
+                raise
+            raise RegistryError(f"{error}\n'turnout query --list' names the tables, views and macros") from None
     return 0
-
-
-def _remedy(error: duckdb.Error, registry: str) -> str:
-    """What to do: the files of the registry are to blame where one of them is named, else the query."""
-    if str(Path(registry).resolve()) in str(error):
-        return "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do"
-    return "'turnout query --list' names the tables, views and macros"
 
 
 def misspelt_names(connection: duckdb.DuckDBPyConnection, sql: str) -> list[str]:

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import duckdb
+
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
 from turnout.registry.database import DATABASE, has_database
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
 GONE = "is gone"
+REMEDY_OF_DAMAGE = "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do"
 
 
 def find_damage(root: Path, files: Iterable[DataFile]) -> dict[str, str]:
@@ -41,6 +44,26 @@ def find_damage(root: Path, files: Iterable[DataFile]) -> dict[str, str]:
     """
     problems = {f.path: problem for f in files if (problem := _problem(root / f.path, f))}
     return dict(sorted(problems.items()))
+
+
+def damage_message(error: Exception, registry: Path | str) -> str:
+    """What to do about an error of DuckDB that names a file of the registry.
+
+    Parameters
+    ----------
+    error : Exception
+        Any error.
+    registry : path
+        Folder of the registry.
+
+    Returns
+    -------
+    str
+        The error and its remedy; "" for any other error.
+    """
+    if not isinstance(error, duckdb.Error) or str(Path(registry).resolve()) not in str(error):
+        return ""
+    return f"{error}\n{REMEDY_OF_DAMAGE}"
 
 
 def without_damage(generation: Generation, damage: Collection[str]) -> Generation:

@@ -42,6 +42,32 @@ def test_a_damaged_file_is_not_reported_as_a_fault_of_the_query(registry, tmp_pa
     assert "'turnout query --list' names the tables, views and macros" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["query", "from modes"], ["export", "out"], ["worklist"], ["worklist", "--csv", "list.csv"], ["report"],
+        ["alert", "--dry-run"], ["events", "--effect"], ["paper", "t1"],
+    ],
+    ids=" ".join,
+)  # fmt: skip
+def test_no_command_takes_a_damaged_file_for_its_own_fault(
+    registry, tmp_path, repository, monkeypatch, capsys, command
+):
+    copy = tmp_path / "results/registry"
+    shutil.copytree(registry, copy)
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    assert main(["registry", "relocate"]) == 0
+    for file in copy.rglob("*.parquet"):
+        file.write_bytes(b"no Parquet")
+    assert main(command) == 2
+    message = capsys.readouterr().err
+    assert (
+        "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do" in message
+    )
+    assert "Traceback" not in message
+
+
 def test_a_registry_that_another_program_has_open_is_not_reported_as_damaged(registry, tmp_path, capsys):
     shutil.copytree(registry, tmp_path / "registry")
     file = tmp_path / "registry" / "registry.duckdb"
