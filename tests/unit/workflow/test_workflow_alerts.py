@@ -140,7 +140,7 @@ def test_a_damaged_note_of_what_was_sent_sends_the_entries_again(tmp_path, setti
 
 
 def test_recipients_without_a_mail_server_are_an_error_that_says_what_to_write(tmp_path, settings):
-    with pytest.raises(TurnoutError, match="smtp_host is empty. Write the name of the mail server"):
+    with pytest.raises(TurnoutError, match=r"smtp_host is empty\. Write the name of the mail server"):
         send_alerts([ALARM], replace(settings, smtp_host=""), tmp_path / "alerts.json")
 
 
