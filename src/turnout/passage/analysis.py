@@ -82,7 +82,7 @@ def analyse(
     if envelopes is None:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "nothing stands out of the noise")))
     track, _ = train_track(envelopes, [s.track for s in usable])
-    rows = audible_sensors(envelopes)
+    rows = audible_sensors(envelopes, [s.track not in ("both", track) for s in usable])
     if rows.size == 0:
         return Passage("rejected", (*findings, Rejection("no_train", 0.0, None, "no sensor records more than noise")))
     audible = [usable[i] for i in rows]

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 
 MIN_RANGE = 8.0  # of the level, over its scatter
+MIN_POWER_RATIO = 0.01  # of the best third of the sensors; with less power a sensor is on the neighbouring track
+MAX_LOUDNESS_LOSS = 1.0  # nepers of power above the quiet level, of a sensor that differs by its gain alone
 QUIET_BLOCK = 0.05  # s over which a level is averaged
 
 
@@ -122,27 +124,32 @@ def loudness(envelopes: SensorEnvelopes) -> np.ndarray:
     return np.where(is_audible, loud, 0.0)
 
 
-def audible_sensors(envelopes: SensorEnvelopes) -> np.ndarray:
-    """Rows of the sensors that record the train: more than noise, and not much fainter than most.
+def audible_sensors(envelopes: SensorEnvelopes, is_other_track: Sequence[bool] | None = None) -> np.ndarray:
+    """Rows of the sensors that record the train: more than noise, and not from the neighbouring track.
 
-    A sensor with a tenth of the amplitude of the best third belongs to the neighbouring track; it is not a less
-    sensitive sensor.
+    A sensor with a tenth of the amplitude of the best third is left out where it is also fainter over its own quiet
+    level, or where the train is not on its track. A wrong gain alone is no reason: it changes the quiet level as much.
 
     Parameters
     ----------
     envelopes : SensorEnvelopes
         Envelopes of the sensors.
+    is_other_track : (n_sensor,) sequence of bool or None
+        True where a sensor measures only trains on the other track; None: not known, a faint sensor may do so.
 
     Returns
     -------
     (n,) array of int
         Rows, increasing.
     """
-    is_loud = loudness(envelopes) > 0.1
+    loud = loudness(envelopes)
+    is_loud = loud > 0.1
     if not is_loud.any():
         return np.flatnonzero(is_loud)
     power = envelopes.levels.loud_power
-    return np.flatnonzero(is_loud & (power >= 0.01 * np.quantile(power[is_loud], 0.7, method="higher")))
+    best_power, best_loud = (np.quantile(values[is_loud], 0.7, method="higher") for values in (power, loud))
+    is_remote = True if is_other_track is None else np.asarray(is_other_track) | (loud < best_loud - MAX_LOUDNESS_LOSS)
+    return np.flatnonzero(is_loud & ~(is_remote & (power < MIN_POWER_RATIO * best_power)))
 
 
 def train_track(envelopes: SensorEnvelopes, tracks: Sequence[str]) -> tuple[str, float]:
