@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from turnout.records import Recording
 
 TIME_STEP = 0.001  # s, bins of the slow acceleration
+SPEED_EXPONENT, SPEED_EXPONENT_SD = 2.0, 0.3  # of an amplitude: acceleration is v² w''; and its prior deviation
 MAX_AMPLITUDE_ERROR = 0.3  # relative standard error of an amplitude; above it the logarithm has no normal error
 WAVENUMBER_BAND = (0.12, 0.9)  # cycles per metre: below is drift, above is vibration
 
@@ -127,6 +128,30 @@ def train_amplitude(per_axle: np.ndarray) -> tuple[float, float]:
     return float(per_axle.mean()), float(per_axle.std(ddof=1) / np.sqrt(per_axle.size))
 
 
+def with_speed_error(mean: float, se: float, speed: float, speed_se: float) -> tuple[float, float]:
+    """``train_amplitude`` with the error that the train's speed adds: a load follows from amplitude over speed squared.
+
+    Parameters
+    ----------
+    mean, se : float
+        Mean amplitude and its standard error. [m/s²]
+    speed, speed_se : float
+        Speed of the train and its standard error. [m/s]
+
+    Returns
+    -------
+    mean, se : float
+        Mean amplitude and its standard error. [m/s²]
+
+    Examples
+    --------
+    >>> mean, se = with_speed_error(2.0, 0.03, 20.0, 0.2)
+    >>> print(f"{mean:.2f} ± {se:.2f}")
+    2.00 ± 0.05
+    """
+    return mean, float(np.hypot(se, SPEED_EXPONENT * speed_se / speed * mean))
+
+
 def calibrate(
     amplitudes: ArrayLike, loads: ArrayLike, speeds: ArrayLike, min_trains: int = 5, errors: ArrayLike | None = None
 ) -> LoadCalibration | None:
@@ -160,13 +185,13 @@ def calibrate(
     relative = np.log(speed[is_usable] / reference)
     target = np.log(amplitude[is_usable] / load[is_usable])
     # acceleration goes with v²; trains of one speed cannot show anything else
-    prior = np.array([[0.0, 0.0], [0.0, 1 / 0.3**2]])
+    prior = np.array([[0.0, 0.0], [0.0, SPEED_EXPONENT_SD**-2]])
     scatter, own_variance = 0.05, (error[is_usable] / amplitude[is_usable]) ** 2
     design = np.column_stack([np.ones(is_usable.sum()), relative])
     for _ in range(10):
         weight = 1.0 / (scatter**2 + own_variance)
         normal = (design * weight[:, None]).T @ design + prior
-        solution = np.linalg.solve(normal, design.T @ (weight * target) + prior @ [0.0, 2.0])
+        solution = np.linalg.solve(normal, design.T @ (weight * target) + prior @ [0.0, SPEED_EXPONENT])
         residual = target - design @ solution
         # variance beyond the trains' own errors, weighted as the fit is
         excess = (
@@ -234,7 +259,8 @@ def axle_load(
 ) -> LoadFinding | None:
     """Mean axle load from all calibrated channels; None ("unavailable") where its error would exceed the setting.
 
-    A calibration is used between 0.8 times its slowest and 1.25 times its fastest train.
+    A calibration is used between 0.8 times its slowest and 1.25 times its fastest train. The error of the train's speed
+    is the same at all channels.
 
     Parameters
     ----------
@@ -281,7 +307,8 @@ def axle_load(
     variance = shared * contributions.sum() ** 2 + (1.0 - shared) * np.sum(contributions**2)
     # of the mean, from the differences of the sensors: one sensor whose gain has changed moves the mean as much
     between = np.sum(weight * (np.array(logs) - log_mean) ** 2) / (weight.sum() * max(len(logs) - 1, 1))
-    relative = float(np.sqrt(max(variance, between)))
+    by_speed = 0.0 if passage.speed is None else SPEED_EXPONENT * passage.speed.se / passage.speed.speed
+    relative = float(np.hypot(np.sqrt(max(variance, between)), by_speed))
     if relative > settings.load_relative_error_maximum:
         return None
     mean = float(np.exp(log_mean))

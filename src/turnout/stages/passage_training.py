@@ -14,7 +14,14 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.files import write_if_changed
 from turnout.passage.analysis import analyse
-from turnout.passage.axle_load import LoadCalibration, calibrate, quasi_static, train_amplitude, with_error_correlation
+from turnout.passage.axle_load import (
+    LoadCalibration,
+    calibrate,
+    quasi_static,
+    train_amplitude,
+    with_error_correlation,
+    with_speed_error,
+)
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.cleaning import clean
 from turnout.passage.clusters import Clusters, fit_clusters
@@ -151,6 +158,8 @@ def _sensor_amplitudes(
         for s in sensors
         if s.name in passage.at_sensor
     }
+    if (speed := passage.speed) is not None:
+        amplitudes = {name: with_speed_error(*a, speed.speed, speed.se) for name, a in amplitudes.items()}
     return {"file": path, "load": train.axle_load, "speed": passage.train_motion.speed, "amplitudes": amplitudes}
 
 

@@ -18,7 +18,7 @@ from turnout.config.settings.passage import PassageSettings
 from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_error_correlation
 from turnout.passage.kinematics import Motion
-from turnout.passage.result import Passage
+from turnout.passage.result import Passage, SpeedFinding
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage_context import read_clusters, read_loads
@@ -136,14 +136,15 @@ def test_the_stated_error_of_a_load_includes_an_error_common_to_all_sensors(comm
     assert 0.7 < np.sqrt(np.mean(np.square(off))) < 1.25
 
 
-def weigh(monkeypatch, trains, amplitudes, speed=33.0):
+def weigh(monkeypatch, trains, amplitudes, speed=33.0, speed_se=1e-5):
     """Load from ``amplitudes`` (channel -> mean) of the train to be weighed, calibrated on ``trains``; any error."""
     monkeypatch.setattr("turnout.passage.axle_load.quasi_static", lambda own, *_: own * np.array([1.0001, 0.9999] * 6))
     columns = [[t[key] for t in trains] for key in ("load", "speed")]
     made = {n: calibrate([t["amplitudes"][n][0] for t in trains], *columns) for n in amplitudes}
     channels = [SimpleNamespace(name=n, position=0.0) for n in amplitudes]
     recording = SimpleNamespace(channels=channels, signal=amplitudes.get, rate=1.0)
-    passage = Passage("accepted", (), Motion(speed), at_sensor=dict.fromkeys(amplitudes))
+    finding = SpeedFinding(speed, speed_se, 0.0, 0.0, "sensors")
+    passage = Passage("accepted", (), Motion(speed), finding, at_sensor=dict.fromkeys(amplitudes))
     calibrations = with_error_correlation(made, trains)
     return axle_load(recording, passage, calibrations, PassageSettings(load_relative_error_maximum=1.0))
 
@@ -178,6 +179,35 @@ def test_a_gain_that_changed_after_the_calibration_is_within_the_stated_error(n_
     found = weigh(monkeypatch, trains, own)
     assert np.log(found.mean / 15.0) == pytest.approx(np.log(gain) / n_sensors, rel=1e-6)
     assert found.se / found.mean == pytest.approx(abs(np.log(gain)) / n_sensors, rel=1e-6)
+
+
+@pytest.mark.parametrize("n_sensors", [1, 4])
+@pytest.mark.parametrize("speed_error", [0.01, 0.16])
+def test_the_interval_of_a_load_includes_the_error_of_the_speed(speed_error, n_sensors, monkeypatch):
+    """A train of unknown type at one sensor has a speed to one sixth: its load has an error of a third."""
+    rng, names, covered = np.random.default_rng([36, n_sensors]), [f"c{k}" for k in range(n_sensors)], 0
+    trains = [
+        {"load": p, "speed": v, "amplitudes": {n: (p * (v / 35.0) ** 2 * (1 + 1e-3 * (-1) ** k), 0.0) for n in names}}
+        for k, (p, v) in enumerate(zip(np.linspace(8, 22, 12), [25, 45, 30, 40] * 3))
+    ]
+    amplitudes = {n: 15.0 * (33.0 / 35.0) ** 2 for n in names}
+    for _ in range(200):
+        speed = 33.0 * np.exp(speed_error * rng.standard_normal())
+        found = weigh(monkeypatch, trains, amplitudes, float(np.clip(speed, 21.0, 55.0)), speed_error * speed)
+        covered += abs(np.log(found.mean / 15.0)) < 1.96 * found.se / found.mean
+    low, high = stats.binom.ppf([0.001, 0.999], 200, 0.95)
+    assert low <= covered <= high
+
+
+def test_the_load_of_an_unknown_train_at_one_sensor_is_unavailable(turnout):
+    """Only its bogies show its speed, to one sixth. The load was given 5 to 50 % off, with an error of 2 %."""
+    config, raw, settings = turnout
+    known = learn_loads(config, weighed_trains(config, raw, PATTERNS, settings), settings)
+    recording = weighed(np.random.default_rng(33), 14.5, 36.0)
+    lone = replace(recording, samples=recording.samples[3:4], channels=recording.channels[3:4])
+    passage = analyse(lone, sensors_for(lone), (), settings)
+    assert (passage.speed.source, passage.n_axle) == ("bogie", 8)
+    assert axle_load(lone, passage, known, settings) is None
 
 
 def _speed_and_load(rng, fast):
