@@ -14,10 +14,11 @@ from turnout.passage.axles import MAX_LEFT_HEIGHT, sensor_times
 from turnout.passage.channel_checks import channel_states, lost_sensors
 from turnout.passage.cleaning import clean
 from turnout.passage.crossing_nose import MIN_MOTION_GAIN, detect_at_nose, fixed_impact_correlation, simultaneity
-from turnout.passage.kinematics import Motion, pair_correlations, refine_slowness, scan_slowness
+from turnout.passage.kinematics import Motion
 from turnout.passage.position_checks import inconsistent_channels, inconsistent_positions
 from turnout.passage.result import Passage
 from turnout.passage.sensor_stack import align_sensors, second_train
+from turnout.passage.slowness_scan import pair_correlations, refine_slowness, scan_slowness
 from turnout.passage.speed import combine_speeds, motion_of, slowness_from_sensors, with_acceleration
 from turnout.passage.train_detection import audible_sensors, restrict_to, sensor_envelopes, train_track
 from turnout.passage.train_type import UNKNOWN

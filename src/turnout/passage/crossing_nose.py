@@ -14,9 +14,9 @@ import numpy as np
 from turnout.passage.axle_count import match_template
 from turnout.passage.comb import COMB_STEP, LEAD_LENGTH, Comb, profiles_at, teeth_of
 from turnout.passage.comb_search import motions_at_all_speeds
-from turnout.passage.kinematics import correlation_at, pair_correlations, stack_correlations
 from turnout.passage.sensor_envelopes import Levels, SensorEnvelopes
 from turnout.passage.sensor_stack import without_train
+from turnout.passage.slowness_scan import correlation_at, pair_correlations, stack_correlations
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

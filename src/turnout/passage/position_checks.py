@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.passage.axles import GRID_STEP, along_train
-from turnout.passage.kinematics import Motion, coarsen, pair_correlations, slowness_grid, stack_correlations
+from turnout.passage.kinematics import Motion
+from turnout.passage.slowness_scan import coarsen, pair_correlations, slowness_grid, stack_correlations
 from turnout.records import Rejection
 
 if TYPE_CHECKING:

@@ -21,8 +21,9 @@ from turnout.passage.axles import (
     level_feature,
     scale_profile,
 )
-from turnout.passage.kinematics import Motion, correlation_at, slowness_grid
+from turnout.passage.kinematics import Motion
 from turnout.passage.profile_decoding import decode_profile
+from turnout.passage.slowness_scan import correlation_at, slowness_grid
 from turnout.records import Rejection
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ import pytest
 from benchmarks.passage_truth import IC3, PATTERNS, RATE, impact_train, rolling_noise, sensors_for
 
 from turnout.passage.analysis import analyse
-from turnout.passage.kinematics import Motion, scan_slowness
+from turnout.passage.kinematics import Motion
 from turnout.passage.position_checks import inconsistent_positions
+from turnout.passage.slowness_scan import scan_slowness
 from turnout.passage.speed import slowness_from_sensors
 from turnout.stages.passage_context import known_patterns
 
