@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from turnout.cli.options import add_configuration, add_registry, add_result
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from datetime import datetime
 
 GROUP = "Worklist and maintenance"
@@ -77,6 +78,9 @@ def _list(args: argparse.Namespace) -> int:
 
     configuration = load_configuration(args.configuration)
     turnout, section = _turnout_and_section(args, {*configuration.ids, *(e.turnout for e in configuration.events)})
+    if turnout in configuration.variants:
+        labels = configuration.variants[turnout].tree["sections"]
+        _check_section(turnout, section, {*labels, *(e.section for e in configuration.events if e.turnout == turnout)})
     events = [
         e
         for e in configuration.events
@@ -104,6 +108,16 @@ def _turnout_and_section(args: argparse.Namespace, ids: set[str]) -> tuple[str, 
         remedy = suggestion(turnout, sorted(ids), NO_TURNOUT)
         raise ConfigError("the command line", "ID", f"turnout {turnout!r} is not known", remedy)
     return turnout, section
+
+
+def _check_section(turnout: str, section: str, labels: Collection[str | None]) -> None:
+    """ConfigError for a section that is none of the ``labels``."""
+    from turnout.config.schema import suggestion
+    from turnout.errors import ConfigError
+
+    if section and section not in labels:
+        problem = f"turnout {turnout!r} has no section {section!r}"
+        raise ConfigError("the command line", "ID", problem, suggestion(section, sorted(filter(None, labels))))
 
 
 def _time(at: datetime) -> str:
@@ -161,6 +175,9 @@ def _effect(args: argparse.Namespace) -> int:
         )
         names = [column[0] for column in cursor.description]
         rows = cursor.fetchall()
+        if not rows:  # a section without effects must be known
+            labels = con.execute("select label from sections where turnout_id = $1", [turnout]).fetchall()
+            _check_section(turnout, section, {label for (label,) in labels} or {section})
     add_result(args, [dict(zip(names, row)) for row in rows])
     for at, section, band, kinds, verdict, gain, low, high, before, after, retention, last in rows:
         retention = (

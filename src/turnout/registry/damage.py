@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
 GONE = "is gone"
+SPILL_FOLDERS = (".spill", f"{DATABASE}.tmp")  # of a registration, and of DuckDB for the database
 REMEDY_OF_DAMAGE = "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do"
 
 
@@ -49,6 +51,9 @@ def find_damage(root: Path, files: Iterable[DataFile]) -> dict[str, str]:
 def damage_message(error: Exception, registry: Path | str) -> str:
     """What to do about an error of DuckDB that names a file of the registry.
 
+    A folder beside the registry whose name begins alike holds none of them, nor do the folders into which DuckDB
+    spills.
+
     Parameters
     ----------
     error : Exception
@@ -61,7 +66,9 @@ def damage_message(error: Exception, registry: Path | str) -> str:
     str
         The error and its remedy; "" for any other error.
     """
-    if not isinstance(error, duckdb.Error) or str(Path(registry).resolve()) not in str(error):
+    spilled = "|".join(re.escape(name) for name in SPILL_FOLDERS)
+    file = rf"{re.escape(f'{Path(registry).resolve()}{os.sep}')}(?!{spilled})"
+    if not isinstance(error, duckdb.Error) or not re.search(file, str(error)):
         return ""
     return f"{error}\n{REMEDY_OF_DAMAGE}"
 

@@ -23,7 +23,7 @@ ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 # Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
 HISTORY = "mode_scatter_read"
 # Campaign of each model, whose name is the local day: its start in UTC may lie on the day before.
-CAMPAIGNS = "(select model_id, campaign_id from models_current)"
+CAMPAIGNS = f"(select model_id, campaign_id from models_current where {ID_GIVEN})"
 MIN_TRACK = 8  # earlier campaigns from which on a page names a mode off the track; quartiles of fewer are too uncertain
 MAX_QUARANTINE_ROWS = 20  # quarantine rows of one reason that a page shows
 # Effect, parameter, size [m, -] of which a page says when it is reached, and whether it falls to it (docs/mismatch.md)

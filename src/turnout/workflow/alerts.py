@@ -126,11 +126,11 @@ def send_alerts(
         try:
             if new:
                 send(new, settings)
+            known |= {_key(entry) for entry in new}
         except (OSError, smtplib.SMTPException, urllib.error.URLError, ValueError) as error:
             errors.append(f"{_address(channel, settings)}: {_reason(error)}")
-            continue
-        if new or known != sent_keys:
-            sent[channel] = sorted(known | {_key(entry) for entry in new})
+        if known != sent_keys:
+            sent[channel] = sorted(known)
             write_text(sent_file, json.dumps(sent, indent=1) + "\n")
     if errors:
         remedy = "Check the section alerts of config.yaml and the server; they are tried again in the next run"

@@ -45,6 +45,7 @@ def project(tmp_path, monkeypatch):
         connection = duckdb.connect()
         connection.execute("create table turnouts as select 't1' as turnout_id union select 't2' union select 't3'")
         connection.execute("create table events as select 't9' as turnout_id")
+        connection.execute("create table sections as select 't1' as turnout_id, unnest(['A7', 'A8']) as label")
         connection.execute(EFFECTS)
         return connection
 
@@ -92,6 +93,8 @@ def test_the_effect_is_that_of_the_turnout_that_is_named(project, capsys, id, se
     [
         (["t11"], "turnout 't11' is not known. Did you mean 't1'?"),
         (["t11", "--effect"], "turnout 't11' is not known. Did you mean 't1'?"),
+        (["t1/A9"], "turnout 't1' has no section 'A9'. Allowed: A7, A8."),
+        (["t1/A9", "--effect"], "turnout 't1' has no section 'A9'. Allowed: A7, A8."),
         (["t1", "tamping"], "a kind without a date. Write: turnout events ID KIND DATE."),
         (["t1", "tamping", "2026-05-01", "--effect"], "'tamping' beside --effect. Enter the work first"),
     ],

@@ -7,11 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import duckdb
 import pytest
 from registry_rows import Bench, hammer_result
 
 from turnout.cli.main import main
 from turnout.cli.worklist import _write
+from turnout.registry.damage import damage_message
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +68,20 @@ def test_no_command_takes_a_damaged_file_for_its_own_fault(
         "A file of the registry is damaged or absent: 'turnout registry check' names each, with what to do" in message
     )
     assert "Traceback" not in message
+
+
+@pytest.mark.parametrize(
+    ("name", "is_file"),
+    [
+        ("registry/modes/a.parquet", True), ("registry/registry.duckdb", True), ("registry_export/modes.csv", False),
+        ("registry/.spill/duckdb_temp_storage-0.tmp", False), ("registry/registry.duckdb.tmp", False),
+    ],
+)  # fmt: skip
+def test_only_an_error_that_names_a_file_of_the_registry_is_damage(tmp_path, name, is_file):
+    """A folder beside it may be full or closed, and so may the folder for what exceeds the memory."""
+    error = duckdb.IOException(f'IO Error: Cannot open file "{tmp_path / name}": No space left on device')
+    assert bool(damage_message(error, tmp_path / "registry")) == is_file
+    assert not damage_message(OSError(str(error)), tmp_path / "registry")
 
 
 def test_a_registry_that_another_program_has_open_is_not_reported_as_damaged(registry, tmp_path, capsys):

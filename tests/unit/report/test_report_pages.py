@@ -7,6 +7,7 @@ from datetime import date
 from functools import cache
 from html.parser import HTMLParser
 
+import duckdb
 import numpy as np
 import pytest
 from benchmarks.published.response import paper_response
@@ -20,7 +21,7 @@ from turnout.report.job import report_job
 from turnout.report.pages.turnout import lines_of
 from turnout.report.panels.diagram import diagram
 from turnout.report.site import write_pages
-from turnout.report.source import ROWS, FleetSource
+from turnout.report.source import CAMPAIGNS, ROWS, FleetSource
 from turnout.stages.hammer import hammer_unit
 from turnout.workflow.batches import UnitResult, read_results, write_batch
 from turnout.workflow.configuration_rows import configuration_rows
@@ -176,6 +177,16 @@ def test_the_modes_of_a_page_have_the_campaigns_of_their_models(pages):
     )
     rows = connection.execute(all_modes, {"turnouts": ["tommerup_s1"]}).fetch_df()
     assert set(rows["campaign_id"]) == campaigns
+
+
+def test_the_campaigns_of_a_page_need_no_models_of_other_turnouts():
+    """A site of many turnouts is written in groups: each would join the models of all."""
+    connection = duckdb.connect()
+    connection.execute("""create view models_current as
+        select * from (values ('a', 't1', 't1/2026-05-01'), ('b', 't2', 't2/2026-05-01'))
+            as of_model (model_id, turnout_id, campaign_id)""")
+    rows = connection.execute(f"from {CAMPAIGNS}", {"turnouts": ["t1"]}).fetchall()
+    assert rows == [("a", "t1/2026-05-01")]
 
 
 def test_files_that_were_not_used_are_listed_as_in_quarantine(pages):

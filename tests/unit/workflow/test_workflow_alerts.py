@@ -124,6 +124,16 @@ def test_an_entry_without_an_alarm_that_comes_back_is_sent_again(tmp_path, setti
     assert send_alerts([ALARM, confirm], settings, sent) == {"mail": 1, "webhook": 1}
 
 
+def test_an_entry_that_left_the_list_while_a_server_failed_is_sent_when_it_comes_back(tmp_path, settings, mail):
+    """That night had another entry to send; what had left the list is noted whether or not the server answers."""
+    sent, without_server = tmp_path / "alerts.json", replace(settings, smtp_host="")
+    confirm, other = PLAN | {"state": "confirm now"}, PLAN | {"turnout_id": "W7"}
+    assert send_alerts([ALARM, confirm], settings, sent)["mail"] == 2
+    with pytest.raises(TurnoutError, match="smtp_host is empty"):
+        send_alerts([ALARM, other], without_server, sent)
+    assert send_alerts([ALARM, confirm, other], settings, sent)["mail"] == 2
+
+
 def test_an_entry_beyond_the_limit_of_the_list_is_still_on_it(tmp_path, settings, mail):
     sent = tmp_path / "alerts.json"
     send_alerts([ALARM, PLAN], settings, sent)
