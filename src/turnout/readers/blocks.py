@@ -21,7 +21,8 @@ LARGEST_NUMBER = 1e30  # beyond it a number marks a missing sample, as 9.9e37 an
 class BlockReader:
     """``reader(start, stop)`` -> (n_channel, stop - start) SI samples of the channels ``mapped`` of a raw record.
 
-    ReadError if the file is damaged there, or has changed since this object was created.
+    Samples are counted from the ``first`` one that was measured. ReadError if the file is damaged there, or has changed
+    since this object was created.
     """
 
     record: RawRecord
@@ -29,12 +30,14 @@ class BlockReader:
     where: str
     source: Source
     state: tuple[int, int] | None
+    first: int = 0
 
     def __call__(self, start: int, stop: int) -> np.ndarray:
         if self.source.state() != self.state:
             problem = f"it changed while it was read, at sample {start}"
             raise self.source.error(self.where, problem, "Start again when its copying has ended")
         samples = np.empty((len(self.mapped), stop - start))
+        start, stop = self.first + start, self.first + stop
         place = f"{self.where}, samples {start} to {stop}"
         with self.source.parsed_by("the format's library", place), np.errstate(all="ignore"):
             for row, mapping in zip(samples, self.mapped):
@@ -56,7 +59,9 @@ class BlockReader:
         BlockReader
             A reader of these channels in this order.
         """
-        return BlockReader(self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state)
+        return BlockReader(
+            self.record, tuple(self.mapped[i] for i in rows), self.where, self.source, self.state, self.first
+        )
 
 
 @dataclass

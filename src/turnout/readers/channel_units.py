@@ -51,6 +51,8 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
         conversion_to_si = to_si(raw.quantity, resolve_unit(file_unit, raw.unit), raw.sensitivity, raw.sensitivity_unit)
     except ValueError as error:
         remedy = "Correct 'unit' or 'sensitivity' of this channel in the layout"
+        if not file_unit.isascii() and "is not known" in str(error):
+            remedy = f"{remedy}; if its letters are wrong, save the file as UTF-8 with a text editor"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (scale_error := undecided_error(record, index, place, source)) and not raw.overrules_file:
         raise scale_error

@@ -48,6 +48,7 @@ from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns, line_number
 from turnout.readers.entries import Entry
+from turnout.readers.label_lines import has_labels, with_joined_labels
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
@@ -58,6 +59,7 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, R
 from turnout.readers.start_columns import start_or_clock_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
+from turnout.readers.stated_units import decoded_unit
 from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
 
@@ -86,8 +88,9 @@ def read_raw(source: Source) -> RawFile:
     end, remarks = _end_of_content(data, source)
     if data.find(b"\n") < 0:
         data, lazy = data[:end].replace(b"\r", b"\n"), False
-    if not lazy or has_other_notation(source.head) or BREAK_IN_CELL.search(source.head):
-        lazy, data = False, with_whole_cells(with_plain_numbers(data[:end]))
+    head_of_file = source.head
+    if not lazy or has_other_notation(head_of_file) or BREAK_IN_CELL.search(head_of_file) or has_labels(head_of_file):
+        lazy, data = False, with_joined_labels(with_whole_cells(with_plain_numbers(data[:end])))
         end = len(data)
     end_of_text = end_without_blank_rows(data, end)
     blank_rows = data[end_of_text:end]
@@ -129,6 +132,7 @@ def _read_damaged_table(table: bytes, n_table: int, source: Source) -> RawFile:
 
 def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source, n_table: int = 1) -> RawFile:
     """Records of a head and the rows below it; ``end`` is the byte behind the rows, ``n_table`` counts the tables."""
+    head = head._replace(units=[decoded_unit(unit) for unit in head.units])  # that of the time, too
     names, units, offset, separator = head.names, head.units, head.offset, head.separator
     if separator == BLANK:
         data = data[:end]

@@ -17,7 +17,7 @@ from turnout.readers.stated_ends import with_stated_duration
 from turnout.readers.stated_scales import with_named_factors
 from turnout.readers.stated_sensitivities import with_named_sensitivities
 from turnout.readers.stated_starts import with_declared_origins
-from turnout.readers.stated_units import with_stated_units
+from turnout.readers.stated_units import with_decoded_units, with_stated_units
 from turnout.readers.stated_zones import with_stated_zone
 from turnout.readers.unread_starts import with_unread_starts
 
@@ -58,7 +58,9 @@ class Format:
         check_declared_sizes(self.module, source)
         raw = import_module(f"turnout.readers.{self.module}").read_raw(source)
         records = tuple(
-            with_stated_units(with_named_sensitivities(with_named_factors(with_declared_origins(r))))
+            with_stated_units(
+                with_named_sensitivities(with_named_factors(with_declared_origins(with_decoded_units(r))))
+            )
             if isinstance(r, RawRecord)
             else r
             for r in raw.records

@@ -4,8 +4,8 @@ It assigns the channels of a file to those of the layout, converts units and che
 """
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +16,9 @@ from turnout.readers.array_axes import AXES_REMEDY
 from turnout.readers.blocks import BlockReader, ChannelStatistics
 from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
+from turnout.readers.channel_starts import different_starts
 from turnout.readers.channel_units import undecided_error
+from turnout.readers.constant_ends import measured_span
 from turnout.readers.entry_check import EntryCheck
 from turnout.readers.lost_entries import lost_entry_errors, usable_conditions
 from turnout.readers.packing import fill_values
@@ -34,12 +36,15 @@ from turnout.readers.simultaneous_records import simultaneous_errors
 from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
 from turnout.readers.stated_counts import missing_samples, surplus_samples, unfilled_buffer
+from turnout.readers.stated_zones import with_zone_of_layout
 from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unread_starts import is_of_other_day
 from turnout.records import LongRecording, RawDescription, Recording
 
 REMARKS = ("rate_ambiguous", "entry_unknown")  # once for all records of a file
+SHARED_START_REMEDY = "Start all channels by one trigger, or export them cut to the stretch that they share"
+PADDING_REMEDY = "If the logger fills its blocks, export the measured samples alone; else check cables and power"
 VALID_REMEDY = "Export the measured samples alone; if the entry means something else, name it in 'checked_entries'"
 
 
@@ -74,6 +79,8 @@ def convert_records(
     """
     if not raw.records and not raw.expected:
         raise source.error("the file", "it holds no record", COPY_AGAIN, reason="empty")
+    of_layout = [with_zone_of_layout(r, description.time_zone) if isinstance(r, RawRecord) else r for r in raw.records]
+    raw = replace(raw, records=tuple(of_layout))
     recordings: list[Recording | LongRecording] = []
     errors: list[ReadError] = []
     stamps = [(k, record.started_at) for k, record in enumerate(raw.records) if not isinstance(record, ReadError)]
@@ -228,6 +235,8 @@ class _Conversion:
         statements = all_statements(record, k, self.n_record, sensor_rows, where, source, description.rate, checked)
         check_unknown_step(record, statements, description.rate, where, source)
         rate = resolve(statements, description.rate, where, source)
+        if problem := different_starts(record):
+            raise source.error(where, problem, SHARED_START_REMEDY, reason="clock_drift")
         if problem := delay_problem(record, sorted(sensor_rows), rate):
             raise source.error(where, problem, DELAY_REMEDY, reason="clock_drift")
         channel_maps = self.assignments.mappings(record, where)
@@ -240,7 +249,12 @@ class _Conversion:
         of_borders = list(border_errors(record, sensor_rows, checked, measurement, where, source))
         if not channel_maps:
             raise source.error(where, "the layout wants none of its channels", "Name channels in the layout")
-        block_reader = BlockReader(record, channel_maps, where, source, source.state())
+        vibrations = [record.samples[m.index] for m in channel_maps if m.channel.quantity != "temperature"]
+        first, stop = measured_span(vibrations) if vibrations else (0, n_sample)
+        of_marks += _end_remarks(n_sample, first, stop, where, source)
+        n_sample = stop - first
+        started_at = started_at + timedelta(seconds=first / rate) if started_at else None
+        block_reader = BlockReader(record, channel_maps, where, source, source.state(), first)
         is_long = self.max_duration is not None and n_sample / rate > self.max_duration
         samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
         from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
@@ -270,6 +284,14 @@ class _Conversion:
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
+
+
+def _end_remarks(n_row: int, first: int, stop: int, where: str, source: Source) -> Iterator[ReadError]:
+    """Remarks on equal rows at the ends of a record, which were left out."""
+    for n, end in ((first, "first"), (n_row - stop, "last")):
+        if n:
+            problem = f"its {end} {n} of {n_row} samples repeat one value on all channels, beside noise: no measurement"
+            yield source.error(where, f"{problem}. They are left out", PADDING_REMEDY, reason="entry_unknown")
 
 
 def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, source: Source) -> Iterator[ReadError]:

@@ -161,6 +161,7 @@ def _records(
     started_text = _date_and_time(
         *(_per_channel(fields, name, 1)[0] or head.get(name, "") for name in ("Date", "Time"))
     )
+    of_head = _date_and_time(head.get("Date", ""), head.get("Time", ""))
     entries = (*_entries(fields, segment.x_unit), *entries_of(head, "the file's header"))
     has_x = x is not None and len(x) == n_row and bool(np.isfinite(x).all())
     n_sample = n_row // n_write
@@ -174,7 +175,7 @@ def _records(
             is_time_in_seconds=True,
             time=None if seconds is None else seconds[i * n_sample : (i + 1) * n_sample],
             units=tuple(units[:count]) if len(units) >= count else ("",) * count,
-            **start_fields(started_text if i == 0 else None),  # of later writes no time is stated
+            **(start_fields(started_text, of_head) if i == 0 else {}),  # of later writes no time is stated
             conditions={name: number_or_text(head[name]) for name in CONDITIONS if name in head},
             undecided=undecided,
         )

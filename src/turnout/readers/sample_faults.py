@@ -12,7 +12,8 @@ from turnout.readers.lazy import Column
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
 from turnout.readers.repeated_blocks import repeated_block
-from turnout.readers.simultaneous_records import add_shared, shared_channels
+from turnout.readers.scaled_copies import N_COMPARED, scaled_copies
+from turnout.readers.simultaneous_records import MAX_ROUNDING, add_shared, shared_channels
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.records import RawDescription
 
@@ -41,6 +42,28 @@ def _missing_sample_errors(
         if problems := [f"{n} of {len(column)} samples are {x:.7g}, {meaning}" for n, x, meaning in counts if n]:
             place = f"{where}, channel {mapping.channel.name!r}"
             errors[i] = source.error(place, problems[0], MISSING_REMEDY, reason="not_finite")
+    return errors
+
+
+COPY_REMEDY = "Name one of them 'ignored' in the layout, or correct 'source' if they are two sensors"
+
+
+def _copy_errors(
+    record: RawRecord, mappings: Sequence[ChannelMapping], where: str, source: Source
+) -> dict[int, ReadError]:
+    """Errors by index of the channels that are an earlier one of the record, in the same or in other units."""
+    errors: dict[int, ReadError] = {}
+    measured = [i for i, m in enumerate(mappings) if m.channel.quantity != "temperature"]
+    heads = [np.asarray(record.samples[mappings[i].index][:N_COMPARED]) for i in measured]
+    for first, second, factor in scaled_copies(heads):
+        i, j = measured[first], measured[second]
+        if mappings[i].channel.quantity != mappings[j].channel.quantity:
+            continue
+        factor *= mappings[j].scale / mappings[i].scale
+        times = "" if abs(factor - 1.0) <= MAX_ROUNDING else f" times {factor:.4g}"
+        problem = f"its samples are those of channel {mappings[i].channel.name!r}{times}: one signal is there twice"
+        place = f"{where}, channel {mappings[j].channel.name!r}"
+        errors.setdefault(j, source.error(place, problem, COPY_REMEDY, reason="duplicate"))
     return errors
 
 
@@ -203,4 +226,5 @@ def faults_by_channel(
         for i, mapping in enumerate(channel_maps)
         if mapping.channel.quantity in ("force", "acceleration") and is_count_or_time(record.samples[mapping.index])
     }
-    return _missing_sample_errors(record, channel_maps, statistics, where, source) | of_axes | of_statistics
+    of_copies = _copy_errors(record, channel_maps, where, source)
+    return of_copies | _missing_sample_errors(record, channel_maps, statistics, where, source) | of_axes | of_statistics

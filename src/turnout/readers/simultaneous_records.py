@@ -7,6 +7,7 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.repeated_blocks import is_noisy
+from turnout.readers.scaled_copies import scaled_copies
 from turnout.readers.source import Source
 from turnout.records import LongRecording, Recording
 
@@ -15,14 +16,19 @@ N_COMPARED = 16  # first samples, by which channels with the same samples are fo
 ONE_RECORD_REMEDY = (
     "If they were recorded at once, export all channels as one record, each by its own name, or one record to a file"
 )
+ONE_UNIT_REMEDY = "Export one of them to a file of its own: the values in physical units, without the raw ones"
+MIN_RATIO = (
+    3.0  # of two units, such as ft/s² and m/s²; those of daN and kgf, or daN and lbf, are not told from strengths
+)
+MAX_ROUNDING = 1e-3  # relative difference of copies whose units are both right
 
 
 def simultaneous_errors(recordings: Sequence[Recording | LongRecording], source: Source) -> dict[int, ReadError]:
     """Errors of records that cannot follow each other.
 
-    Two records with the same noise in one channel, and other samples in another, were recorded at once. A record that
-    repeats another counts once; the hammer test itself finds its impact. Records of trains follow each other by their
-    starts.
+    Two records with the same noise in one channel, and other samples in another, were recorded at once. A record whose
+    noise is another's times a factor is a copy in other units. A record that repeats another counts once; the hammer
+    test itself finds its impact. Records of trains follow each other by their starts.
 
     Parameters
     ----------
@@ -42,6 +48,7 @@ def simultaneous_errors(recordings: Sequence[Recording | LongRecording], source:
         if not (is_whole and in_memory[first].kind == "hammer"):
             name = in_memory[first].channels[row].name
             add_shared(errors, (first, second), "" if is_whole else name, source)
+    _add_copies(errors, list(in_memory.values()), source)
     for earlier, later in pairwise(recordings):
         if problem := _overlap(earlier, later):
             numbers = earlier.record, later.record
@@ -95,9 +102,48 @@ def add_shared(errors: dict[int, ReadError], records: tuple[int, int], name: str
         errors.setdefault(record, _error(record, partner, problem, "duplicate", source))
 
 
-def _error(record: int, partner: int, problem: str, reason: str, source: Source) -> ReadError:
+def _add_copies(errors: dict[int, ReadError], recordings: Sequence[Recording], source: Source) -> None:
+    """Add the errors of records that are copies of another in other units.
+
+    The later one alone has an error if both are the same in SI units, else nothing says which is right.
+    """
+    for (first, second), factors in _factors_of_copies(recordings).items():
+        name, factor = max(factors.items(), key=lambda item: abs(item[1] - 1.0))
+        n_channel = next(len(r.channels) for r in recordings if r.record == second)
+        if len(factors) == n_channel and abs(factor - 1.0) <= MAX_ROUNDING:
+            problem = "its samples are those of {other}, written in other units or with other digits"
+            errors.setdefault(second, _error(second, first, problem, "duplicate", source, ONE_UNIT_REMEDY))
+            continue
+        for record, partner, ratio in ((first, second, 1.0 / factor), (second, first, factor)):
+            problem = f"its channel {name!r} is that of {{other}} times {ratio:.4g}: one is a copy in other units"
+            errors.setdefault(record, _error(record, partner, problem, "duplicate", source, ONE_UNIT_REMEDY))
+
+
+def _factors_of_copies(recordings: Sequence[Recording]) -> dict[tuple[int, int], dict[str, float]]:
+    """Numbers of two records -> factor of each channel of the latter that is one of the former in other units.
+
+    Computed impacts of several strengths have one shape: their factors are no ratio of units.
+    """
+    found: dict[tuple[int, int], dict[str, float]] = {}
+    for name in sorted({channel.name for r in recordings for channel in r.channels}):
+        having = [r for r in recordings if any(channel.name == name for channel in r.channels)]
+        for i, j, factor in scaled_copies([r.signal(name) for r in having]):
+            if not np.array_equal(having[i].samples, having[j].samples):
+                found.setdefault((having[i].record, having[j].record), {})[name] = factor
+    return {pair: factors for pair, factors in found.items() if _are_ratios_of_units([*factors.values()])}
+
+
+def _are_ratios_of_units(factors: Sequence[float]) -> bool:
+    """Whether factors are those of copies in SI units, all 1, or one is so far from it as units and raw values are."""
+    is_far = any(not 1.0 / MIN_RATIO < abs(factor) < MIN_RATIO for factor in factors)
+    return is_far or all(abs(factor - 1.0) <= MAX_ROUNDING for factor in factors)
+
+
+def _error(
+    record: int, partner: int, problem: str, reason: str, source: Source, remedy: str = ONE_RECORD_REMEDY
+) -> ReadError:
     text = problem.format(other=f"record {partner + 1}")
-    return source.error(f"record {record + 1}", text, ONE_RECORD_REMEDY, reason)
+    return source.error(f"record {record + 1}", text, remedy, reason)
 
 
 def _overlap(first: Recording | LongRecording, second: Recording | LongRecording) -> str:

@@ -25,6 +25,7 @@ from turnout.readers.stated_starts import (
     with_stated_start,
 )
 from turnout.readers.stated_zones import ABBREVIATION, zone_in_name, zone_of
+from turnout.readers.time_numbers import is_unset
 from turnout.readers.time_texts import DATE_PARTS, is_day, parse_time, time_of_vector
 
 CLOCK_ALONE = re.compile(
@@ -40,6 +41,7 @@ BARE_WORDS = frozenset(("date", "dato", "datum", "fecha", "time", "zeit"))
 def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRecord | ReadError, ...]:
     """The records with the starts that their metadata state, if no format defines one.
 
+    A start of a clock that was never set, such as 1904-01-01, counts only where no other is stated.
     An entry that all records have is about the file: one of the record itself counts more. If the format gives one of
     the records a start, those without stay so, because a start of the file would precede it.
 
@@ -54,12 +56,20 @@ def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRec
         The same number of records.
     """
     intact = [r for r in records if isinstance(r, RawRecord)]
+    if any(r.started_at for r in intact) and not any(map(_has_set_start, intact)):
+        others = with_stated_starts([replace(r, started_at=None) if isinstance(r, RawRecord) else r for r in records])
+        return others if any(isinstance(r, RawRecord) and _has_set_start(r) for r in others) else tuple(records)
     if len(intact) > 1 and any(r.started_at for r in intact):
         return tuple(records)
     counts = Counter(key for r in intact for key in {_key(e) for e in r.entries if may_state_start(e.name)})
     return tuple(
         _with_start(r, _entries_of_start(r, counts, len(intact))) if isinstance(r, RawRecord) else r for r in records
     )
+
+
+def _has_set_start(record: RawRecord) -> bool:
+    """Whether a record has a start of a clock that was set."""
+    return record.started_at is not None and not is_unset(record.started_at)
 
 
 def _key(entry: Entry) -> tuple[str, str, str]:

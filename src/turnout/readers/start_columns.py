@@ -17,7 +17,7 @@ from turnout.readers.stamp_texts import plain_stamp
 from turnout.readers.stated_starts import OTHER, has_date_word, is_other_start, is_start_name
 from turnout.readers.texts import decode_text
 from turnout.readers.time_axes import is_dated_axis
-from turnout.readers.time_numbers import SINCE, time_of_number
+from turnout.readers.time_numbers import SINCE, is_unset, time_of_number
 
 TIME_OF_DAY = re.compile(rf" *{CLOCK} *")
 UNIT_AT_END = re.compile(r"[\[(]([^\[\]()]*)[\])]$")
@@ -179,6 +179,9 @@ def with_axis_start(record: RawRecord) -> RawRecord:
     times = [start for start, _ in starts if start]
     if record.started_at is None and not times:
         return replace(record, unread_start=starts[0][1])
-    used = record.started_at or times[0]
+    set_times = [time for time in times if not is_unset(time)]
+    stated = None if set_times and is_unset(record.started_at) else record.started_at
+    used = stated or (set_times or times)[0]
+    times = times if is_unset(used) else set_times
     second = next((start for start in times if is_other_start(start, used)), None)
     return replace(record, started_at=used, unread_start=str(second) if second else "")

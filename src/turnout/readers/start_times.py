@@ -9,7 +9,8 @@ from zoneinfo import ZoneInfo
 
 from turnout.errors import ReadError
 from turnout.readers.source import RawRecord, Source
-from turnout.readers.stated_zones import zone_problem
+from turnout.readers.stated_zones import stamp_and_zone, zone_problem
+from turnout.readers.time_numbers import is_unset
 from turnout.readers.time_texts import is_date, stated_time
 
 TIME_FORMAT = "%Y-%m-%d %H:%M:%S.%f"
@@ -134,7 +135,6 @@ def _longest_ordered(starts: Sequence[Any]) -> list[int]:
     return ordered
 
 
-FIRST_YEAR = 1990  # of a digital logger; earlier years are epochs of counters (1904, 1970, 1980)
 MAX_LEAD = timedelta(days=1)  # of a logger's clock before ours, with the differences between time zones
 CLOCK_REMEDY = "Check the logger's clock; give the campaign or the time in the file's name"
 SHORT_DATE = re.compile(r"\d{1,2}(?:[-/]\d{1,2}[-/]\d{2,4}|\.\d{1,2}\.\d{2})(?!\d)")
@@ -172,7 +172,8 @@ def start_fields(*values: Any, declared: str = "") -> dict[str, Any]:
     Returns
     -------
     dict of str to any
-        The first time stamp that can be read; without one, the text of the first that is stated.
+        The first time stamp that can be read, one of a clock that was set before any other; without one, the text of
+        the first that is stated.
 
     Examples
     --------
@@ -183,7 +184,7 @@ def start_fields(*values: Any, declared: str = "") -> dict[str, Any]:
     """
     stated = [value for value in values if _text_of(value).casefold() not in NO_START]
     times = [stated_time(value, declared) for value in stated]
-    started_at = next((time for time, _ in times if time is not None), None)
+    started_at = min((time for time, _ in times if time is not None), key=is_unset, default=None)
     if started_at is not None or not stated:
         return {"started_at": started_at, "unread_start": ""}
     return {"started_at": None, "unread_start": times[0][1] or _text_of(stated[0])[:60]}
@@ -208,7 +209,7 @@ def is_plausible(stamp: datetime) -> bool:
         False for the epoch of a counter, such as 1904-01-01, and for a time in the future.
     """
     now = datetime.now(UTC).replace(tzinfo=None)
-    return stamp.year >= FIRST_YEAR and stamp.replace(tzinfo=None) <= now + MAX_LEAD
+    return not is_unset(stamp) and stamp.replace(tzinfo=None) <= now + MAX_LEAD
 
 
 def clock_change(stamp: datetime, time_zone: str) -> str:
@@ -276,7 +277,9 @@ def start_errors(
         )
         text = no_time[0][1]
         remedy = CLOCK_REMEDY
-        if SHORT_DATE.match(text) and not is_date(text):
+        if stamp_and_zone(text)[0]:
+            problem, remedy = f"{problem}: its time zone is not known to be that of the layout", ZONE_REMEDY
+        elif SHORT_DATE.match(text) and not is_date(text):
             remedy = ORDER_REMEDY
         elif "MATLAB class" in text:
             remedy = OBJECT_REMEDY
@@ -289,7 +292,7 @@ def start_errors(
         yield _start_error([k for k, _ in no_time], problem, source, remedy)
     timed = [(k, stamp) for k, stamp in stamps if stamp is not None]
     if strange := [(k, stamp) for k, stamp in timed if not is_plausible(stamp)]:
-        is_early = strange[0][1].year < FIRST_YEAR
+        is_early = is_unset(strange[0][1])
         fault = "no time of a recording: the logger's clock was not set" if is_early else "in the future"
         problem = f"the start time {strange[0][1]:{TIME_FORMAT}} is {fault}"
         yield _start_error([k for k, _ in strange], problem, source)

@@ -13,7 +13,7 @@ from turnout.readers.entries import Entry
 from turnout.readers.rate_statements import MIN_EPOCH
 from turnout.readers.rate_units import seconds_of, words_of
 from turnout.readers.source import RawRecord
-from turnout.readers.time_numbers import SINCE, is_declared
+from turnout.readers.time_numbers import SINCE, is_declared, is_unset
 from turnout.readers.time_texts import NUMBER_TEXT, looks_dated, parse_time, stated_time, time_of_vector
 
 START = re.compile(
@@ -159,6 +159,8 @@ def with_stated_start(record: RawRecord) -> RawRecord:
     if record.unread_start:
         return record
     stated = dict(item for entry in record.entries if is_start_name(entry.name) for item in times_of_entry(entry))
+    if of_set_clocks := {text: time for text, time in stated.items() if not is_unset(time)}:
+        stated = of_set_clocks
     times = [time for time in stated.values() if time]
     if not stated:
         return record
@@ -196,6 +198,8 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
         yield str(value), parse_time(value)
     elif time := time_of_vector(value):
         yield str(value), time
+    elif isinstance(value, list) and value and all(isinstance(text, str) and looks_dated(text) for text in value):
+        yield from ((text, parse_time(text)) for text in value)
     elif isinstance(value, str) and not NUMBER_TEXT.fullmatch(value.strip()):
         if looks_dated(value.strip()):
             yield value.strip(), parse_time(value.strip())

@@ -15,6 +15,7 @@ from turnout.readers.entries import FREE_TEXT, MAX_ENTRIES, Entry
 from turnout.readers.entry_owners import CHANNEL, container_of, numbered_channels, owners_of, spaced_words
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
+from turnout.readers.texts import other_readings
 from turnout.readers.unit_names import conditions_of_unit, is_unit_name
 from turnout.units import Conversion, conversion
 
@@ -63,6 +64,32 @@ def known_unit(unit: str) -> Conversion | None:
 
 
 @lru_cache(maxsize=4096)
+def decoded_unit(unit: str) -> str:
+    """A unit whose letters were decoded wrongly, in the encoding of an older program in which it is known.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it was decoded.
+
+    Returns
+    -------
+    str
+        Unchanged if it is known, or if no encoding gives one known unit.
+
+    Examples
+    --------
+    >>> [decoded_unit(unit) for unit in ("m/sý", "øC", "æs", "ý")]  # of DOS, and one that no encoding explains
+    ['m/s²', '°C', 'µs', 'ý']
+    """
+    if unit.isascii() or known_unit(unit) or rate_unit(unit):
+        return unit
+    readings = {reading: known_unit(reading) or rate_unit(reading) for reading in other_readings(unit)}
+    known = [reading for reading, meaning in readings.items() if meaning]
+    return known[0] if len({readings[reading] for reading in known}) == 1 else unit
+
+
+@lru_cache(maxsize=4096)
 def is_meaningless(unit: str) -> bool:
     """Whether a label is no unit: a placeholder, or a number that some loggers write there.
 
@@ -101,6 +128,23 @@ def same_unit(first: str, second: str) -> bool:
     """
     a, b = (known_unit(re.sub(r"^[\d.eE+-]+ *(?=\D)", "", unit.strip())) for unit in (first, second))
     return a is not None and b is not None and a.dimension == b.dimension and abs(a.scale / b.scale - 1.0) < 1e-9
+
+
+def with_decoded_units(record: RawRecord) -> RawRecord:
+    """The record with the units of its channels in the encoding in which they are known.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+
+    Returns
+    -------
+    RawRecord
+        The same record if all units are known, or unknown in every encoding.
+    """
+    units = tuple(map(decoded_unit, record.units))
+    return replace(record, units=units) if units != record.units else record
 
 
 def with_stated_units(record: RawRecord) -> RawRecord:

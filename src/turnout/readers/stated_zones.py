@@ -24,6 +24,22 @@ OFFSET = re.compile(r"(?:UTC|GMT)? ?([+-])(\d{1,2})(?::?(\d{2}))?")
 SAME_ABBREVIATIONS = {"MEZ": "CET", "MESZ": "CEST", "HNEC": "CET", "HAEC": "CEST", "SEČ": "CET", "SELČ": "CEST"}
 # Abbreviations that a name may hold; which offset they mean depends on the day and on the country.
 ABBREVIATION = re.compile(r"\b(?:CES?T|MES?Z|WES?T|EES?T|BST|HNEC|HAEC|SEL?Č)\b")
+# Of zones outside Europe, which count in the name of a start or a clock; without brackets only those that are no words.
+FOREIGN = r"[ECMP][SD]T|AK[SD]T|A[DS]T|HST|N[SD]T|NZ[SD]T|A[EC][SD]T|AWST|JST|KST|MSK|HKT|SGT|PHT|PKT|SAST|BRT|UT"
+FOREIGN_ALONE = re.compile(rf"\b(?:{FOREIGN})\b")
+FOREIGN_IN_BRACKETS = re.compile(rf"{FOREIGN}|[GI]ST|[ECW]AT|[AT]RT|ICT|IDT|WIB")
+# Words of zones as Windows and Java print them -> their abbreviations in winter and in summer.
+ZONES_IN_WORDS = {
+    **dict.fromkeys(("w. europe", "central europe", "central european", "romance"), ("CET", "CEST")),
+    **dict.fromkeys(("e. europe", "eastern european", "fle", "gtb"), ("EET", "EEST")),
+    **dict.fromkeys(("gmt", "british", "greenwich"), ("GMT", "BST")),
+    "western european": ("WET", "WEST"),
+    "eastern": ("EST", "EDT"),
+    "central": ("CST", "CDT"),
+    "mountain": ("MST", "MDT"),
+    "pacific": ("PST", "PDT"),
+}
+ZONE_IN_WORDS = re.compile(r"(?!local )((?:[a-z]+\.? ){1,3})(standard|daylight|summer) time", re.IGNORECASE)
 # A zone without the word; a bare offset may be a duration or a ratio as well.
 ZONE_ALONE = re.compile(r"(?:UTC|GMT)(?: ?[+-]\d{1,2}(?::\d{2})?)?")
 # Names of which every word is one of these, and one of TIME, state the zone of the start: "Time base", "Zeitreferenz".
@@ -34,6 +50,7 @@ TIME = re.compile(
 BESIDE_TIME = re.compile(
     r"start|record(?:ed|ing)?|all|the|of|is|are|in|reference|ref|standard|base|basis|system|format|local|logger|der|die|des"
 )
+CLOCK_WORD = re.compile(r"clock|uhr|horloge|klok|ur|reloj|orologio")
 # Names of the source of a clock and of places: an abbreviation under them is no zone of the start.
 NO_CLOCK = re.compile(
     r"sync\w*|ntp|ptp|gps|gnss|source|quelle|display|anzeige|track|gleis|line|strecke|depot|station|train|zug"
@@ -49,8 +66,11 @@ WINTER = re.compile(
 )
 DENIALS = frozenset("off no false none not non nein nej nee ne nie aus 0 disabled inactive".split())
 STAMP_AND_ZONE = re.compile(
-    r"(.*\d(?: ?[AaPp]\.?[Mm]\.?)?)(?: ?[\[(]| )([A-Z]{2,5}(?: ?[+-]\d{1,2}(?::?\d{2})?)?|[A-Z]\w+/[\w/]+)[\])]?"
+    r"(.*\d(?: ?[AaPp]\.?[Mm]\.?)?)(?: ?[\[(]| )"
+    r"((?![AP]M\b)[A-Z]{1,5}(?: ?[+-]\d{1,2}(?::?\d{2})?|\d[A-Z]{3})?|[A-Z]\w+/[\w/]+|(?:[A-Z]\w*\.? ){1,3}\w+ Time)"
+    r"[\])]?"
 )
+ZONE_BEFORE_YEAR = re.compile(r"(.*\d:\d{2}) ([A-Z]{2,5}) (\d{4})")  # as the program "date" prints it
 UTC_OFFSET = re.compile(r"(?:UTC|GMT) ?[+-]\d{1,2}(?::?\d{2})?(?!\d)", re.IGNORECASE)
 IN_BRACKETS = re.compile(r"[\[(]([^\[\]()]+)[\])]")
 OR = " or "  # between zones that a file states
@@ -90,14 +110,60 @@ def with_stated_zone(record: RawRecord) -> RawRecord:
 
 def _with_zone_of_stamp(record: RawRecord) -> RawRecord:
     """The record with the start that was not read because a zone stands behind it, as "CEST" or "Europe/Berlin"."""
-    match = STAMP_AND_ZONE.fullmatch(record.unread_start)
-    stamp = parse_time(match[1]) if match and record.started_at is None else None
-    if not match or stamp is None or stamp.tzinfo is not None:
+    stamp, text = stamp_and_zone(record.unread_start) if record.started_at is None else (None, "")
+    zone = zone_of(text)
+    if stamp is None or (zone is None and not ABBREVIATION.fullmatch(text)):
         return record
-    zone = zone_of(match[2])
-    if zone is None and not ABBREVIATION.fullmatch(match[2]):
+    return replace(record, started_at=stamp.replace(tzinfo=zone), unread_start="", unread_zone="" if zone else text)
+
+
+@lru_cache(maxsize=4096)
+def stamp_and_zone(text: str) -> tuple[datetime | None, str]:
+    """Time stamp without a zone and the name of the zone that stands behind it.
+
+    Parameters
+    ----------
+    text : str
+        Start of a record.
+
+    Returns
+    -------
+    tuple of (datetime or None, str)
+        (None, "") for any other text.
+
+    Examples
+    --------
+    >>> stamp_and_zone("2026-05-13 18:30 EDT"), stamp_and_zone("Wed May 13 18:30:00 PST 2026")[1]
+    ((datetime.datetime(2026, 5, 13, 18, 30), 'EDT'), 'PST')
+    """
+    if match := ZONE_BEFORE_YEAR.fullmatch(text):
+        stamp, zone = parse_time(f"{match[1]} {match[3]}"), match[2]
+    elif match := STAMP_AND_ZONE.fullmatch(text):
+        stamp, zone = parse_time(match[1]), match[2]
+    else:
+        return None, ""
+    return (stamp, zone) if stamp and stamp.tzinfo is None else (None, "")
+
+
+def with_zone_of_layout(record: RawRecord, time_zone: str) -> RawRecord:
+    """The record with the start that was not read because of the abbreviation behind it, if it is the layout's zone.
+
+    Parameters
+    ----------
+    record : RawRecord
+        The record as its reader returns it.
+    time_zone : str
+        IANA name of the layout's zone.
+
+    Returns
+    -------
+    RawRecord
+        Unchanged for an abbreviation that the zone of the layout does not have on that day.
+    """
+    stamp, zone = stamp_and_zone(record.unread_start) if record.started_at is None else (None, "")
+    if stamp is None or not is_zone_of(zone, stamp, time_zone):
         return record
-    return replace(record, started_at=stamp.replace(tzinfo=zone), unread_start="", unread_zone="" if zone else match[2])
+    return replace(record, started_at=stamp, unread_start="")
 
 
 def _names_of_start(record: RawRecord) -> list[str]:
@@ -134,8 +200,9 @@ def zone_in_name(name: str) -> str:
     if {"utc", "gmt"} & set(words_of(name)):
         return "UTC"
     texts = [text.strip() for text in IN_BRACKETS.findall(name)]
-    abbreviation = ABBREVIATION.search(name.replace("_", " "))
-    of_brackets = (text for text in texts if not text.isdigit() and zone_of(text))
+    spaced = name.replace("_", " ")
+    abbreviation = ABBREVIATION.search(spaced) or FOREIGN_ALONE.search(spaced)
+    of_brackets = (t for t in texts if not t.isdigit() and (zone_of(t) or FOREIGN_IN_BRACKETS.fullmatch(t)))
     return next(of_brackets, abbreviation[0] if abbreviation else "")
 
 
@@ -161,9 +228,19 @@ def _zones_of_other_names(entries: tuple[Entry, ...]) -> Iterator[str]:
     for entry in entries:
         if isinstance(entry.value, str) and not entry.is_piece:
             text = " ".join(entry.value.split())
-            is_zone = ZONE_ALONE.fullmatch(text) or (text != "WEST" and ABBREVIATION.fullmatch(text))
+            is_zone = bool(ZONE_ALONE.fullmatch(text) or (text != "WEST" and ABBREVIATION.fullmatch(text)))
+            is_zone = is_zone or (_is_clock_name(entry.name) and _is_foreign(text))
             if is_zone and not any(map(NO_CLOCK.fullmatch, words_of(entry.name))):
                 yield text
+
+
+@lru_cache(maxsize=4096)
+def _is_clock_name(name: str) -> bool:
+    return any(TIME.fullmatch(word) or CLOCK_WORD.fullmatch(word) for word in words_of(name))
+
+
+def _is_foreign(text: str) -> bool:
+    return bool(FOREIGN_IN_BRACKETS.fullmatch(text) or ZONE_IN_WORDS.fullmatch(text))
 
 
 def _season_texts(entries: tuple[Entry, ...]) -> Iterator[str]:
@@ -231,7 +308,7 @@ def zone_of(text: str) -> tzinfo | None:
     >>> [str(zone_of(text)) for text in ("UTC+2", "Europe/Zurich", "CET", "120")]
     ['UTC+02:00', 'Europe/Zurich', 'None', 'UTC+02:00']
     """
-    if text.upper() in ("UTC", "Z", "GMT", "ETC/UTC"):
+    if text.upper() in ("UTC", "UT", "Z", "ZULU", "GMT", "ETC/UTC"):
         return UTC
     if match := OFFSET.fullmatch(text.upper().replace("−", "-")):
         minutes = 60 * int(match[2]) + int(match[3] or 0)
@@ -285,6 +362,10 @@ def is_zone_of(text: str, stamp: datetime, time_zone: str) -> bool:
     local = stamp.replace(tzinfo=ZoneInfo(time_zone))
     if ZONE_ALONE.fullmatch(text) and (zone := zone_of(text)):
         return local.utcoffset() == zone.utcoffset(stamp)
+    if in_words := ZONE_IN_WORDS.fullmatch(text):
+        names = ZONES_IN_WORDS.get(in_words[1].strip().lower(), ())
+        is_standard = in_words[2].lower() == "standard"  # which Windows prints in summer, too
+        return local.tzname() in (names if is_standard else names[1:])
     if (is_summer := is_summer_time(text)) is not None:
         return is_summer == bool(local.dst())
     return SAME_ABBREVIATIONS.get(text.upper(), text.upper()) == local.tzname()

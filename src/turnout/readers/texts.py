@@ -2,6 +2,10 @@
 
 import codecs
 
+# Windows-1252; the five bytes that it leaves out are control characters, as Windows reads them, and none is lost.
+WESTERN = "".join(
+    bytes([b]).decode("cp1252" if b not in (0x81, 0x8D, 0x8F, 0x90, 0x9D) else "latin-1") for b in range(256)
+)
 MIN_UTF16_SIZE = 16  # bytes: fewer do not tell the encoding
 
 
@@ -16,7 +20,7 @@ def decode_text(data: bytes) -> str:
     Returns
     -------
     str
-        The text without a byte order mark; a byte that neither encoding has becomes a replacement character.
+        The text without a byte order mark.
 
     Examples
     --------
@@ -26,11 +30,15 @@ def decode_text(data: bytes) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("cp1252", "replace")
+        return codecs.charmap_decode(data, "strict", WESTERN)[0]
 
 
-# Of letters that Windows-1252 does not have: Central European, Cyrillic, Greek, Turkish, Chinese, Japanese, Korean.
-OTHER_ENCODINGS = ("cp1250", "cp1251", "cp1253", "cp1254", "gb18030", "big5", "cp932", "cp949")
+# Of letters that Windows-1252 does not have: Central European, Cyrillic, Greek, Turkish, Chinese, Japanese, Korean; and
+# of DOS (western, Cyrillic) and of the Macintosh, which have ², µ, ° and other letters at other bytes.
+OTHER_ENCODINGS = (
+    *("cp1250", "cp1251", "cp1253", "cp1254", "gb18030", "big5", "cp932", "cp949"),
+    *("cp437", "cp850", "cp866", "koi8_r", "mac_roman"),
+)
 
 
 def other_readings(text: str) -> tuple[str, ...]:
@@ -56,8 +64,8 @@ def other_readings(text: str) -> tuple[str, ...]:
     if text.isascii():
         return ()
     try:
-        data = text.encode("cp1252")
-    except UnicodeEncodeError:
+        data = bytes(map(WESTERN.index, text))
+    except ValueError:
         return ()
     readings = (data.decode(encoding, "replace") for encoding in OTHER_ENCODINGS)
     return tuple(reading for reading in dict.fromkeys(readings) if "\ufffd" not in reading)

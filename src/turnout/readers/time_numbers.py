@@ -14,6 +14,7 @@ from fractions import Fraction
 from turnout.readers.rate_statements import PLAUSIBLE_RATES
 from turnout.readers.rate_units import rate_unit, words_of
 
+FIRST_YEAR = 1990  # of a digital logger; earlier years are epochs of counters (1601, 1904, 1970, 1980)
 EPOCHS = (6.3e8, 2.9e9)  # s since 1970: years 1990 to 2061
 DAY = Fraction(86400)  # s
 TICK = Fraction(1, 10**7)  # s, of Windows
@@ -129,6 +130,27 @@ def time_of_number(value: float, declared: str = "", step: float | None = None) 
     if len(times) == 1:
         return next(iter(times.values())), ""
     return None, f"{value}: {' or '.join(map(str, times))}?" if times else ""
+
+
+def is_unset(stamp: datetime | None) -> bool:
+    """Whether a time stamp is that of a clock that was never set: it counts from an epoch, and states no start.
+
+    Parameters
+    ----------
+    stamp : datetime or None
+        The time stamp.
+
+    Returns
+    -------
+    bool
+        False without one.
+
+    Examples
+    --------
+    >>> is_unset(datetime(1904, 1, 1)), is_unset(datetime(1970, 1, 1, 0, 12, 34)), is_unset(datetime(2026, 5, 13))
+    (True, True, False)
+    """
+    return stamp is not None and stamp.year < FIRST_YEAR
 
 
 def unit_of_axis(first: float, declared: str, step: float) -> Fraction | None:
