@@ -1,7 +1,7 @@
 """Rows at the end or the beginning of a record that repeat one value on all channels: a logger filled its last block.
 
-A signal may be exactly 0 in digital silence. The samples beside the rows decide: noise that changes at nearly every
-sample does not stop by itself, and a vibration that dies away below one step of the converter stops gradually.
+A signal may be exactly 0 in digital silence. The samples beside the rows decide: noise of several steps of the
+converter does not stop by itself, and a vibration that dies away below one step stops gradually.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,9 +13,10 @@ from turnout.readers.repeated_blocks import is_noisy
 from turnout.readers.source import BLOCK_SIZE
 
 MIN_ROWS = 32  # fewer are not looked for
-N_BESIDE = 64  # rows beside them that must change
-MAX_EQUAL_SHARE = 0.25  # of these rows equal the one before: 32 equal ones in a row come by chance once in 10**19
 N_NOISE = 256  # rows beside them that must hold noise
+N_BESIDE, N_NEAREST = 64, 16  # rows beside them whose ranges are compared
+MIN_STEPS = 3.0  # of the converter, range of the nearest rows: a vibration that dies away below it has 2
+MIN_REMAINDER = 0.33  # of the range of the rows beside, which the nearest ones have: else it dies away
 MAX_LEVEL = 10.0  # of the noise behind the rows at the beginning, in units of the quietest part: else an event begins
 N_PARTS = 200  # of a record whose levels are compared
 
@@ -23,10 +24,10 @@ N_PARTS = 200  # of a record whose levels are compared
 def measured_span(columns: Sequence[Column]) -> tuple[int, int]:
     """First sample, and the one behind the last, between rows at the ends that no sensor measured.
 
-    Such rows repeat one value on all channels, ``MIN_ROWS`` times or more, beside noise that changes at nearly every
-    sample. At the beginning the noise behind them must be that of the quiet parts of the record, because a signal may
-    be silent until an impact. A value that is the largest or the smallest of each channel, and not 0, is that of an
-    overload: it stays.
+    Such rows repeat one value on all channels, ``MIN_ROWS`` times or more, beside noise of ``MIN_STEPS`` steps of the
+    converter or more that does not die away towards them. At the beginning the noise behind them must be that of the
+    quiet parts of the record, because a signal may be silent until an impact. A value that is the largest or the
+    smallest of each channel, and not 0, is that of an overload: it stays.
 
     Parameters
     ----------
@@ -82,9 +83,14 @@ def _count_equal(columns: Sequence[Column], n_sample: int, are_last: bool) -> in
 
 
 def _is_cut_off(beside: np.ndarray) -> bool:
-    """Whether the rows beside equal ones, in order from these on, hold noise that changes at nearly every sample."""
-    is_equal = (np.diff(beside[:, :N_BESIDE], axis=1) == 0.0).all(axis=0)
-    return bool(np.isfinite(beside).all()) and np.mean(is_equal) <= MAX_EQUAL_SHARE and is_noisy(beside)
+    """Whether the rows beside equal ones, in order from these on, hold noise that does not die away towards them."""
+    if not np.isfinite(beside).all() or not is_noisy(beside):
+        return False
+    return any(
+        np.ptp(x[:N_NEAREST]) >= max(MIN_STEPS * np.diff(np.unique(x)).min(), MIN_REMAINDER * np.ptp(x[:N_BESIDE]))
+        for x in beside
+        if x.min() < x.max()
+    )
 
 
 def _is_quiet(columns: Sequence[Column], first: int, stop: int, beside: np.ndarray) -> bool:

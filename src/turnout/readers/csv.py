@@ -59,7 +59,7 @@ from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, R
 from turnout.readers.start_columns import start_or_clock_in_cells
 from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
-from turnout.readers.stated_units import decoded_unit
+from turnout.readers.stated_units import decoded_units
 from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
 
@@ -132,7 +132,7 @@ def _read_damaged_table(table: bytes, n_table: int, source: Source) -> RawFile:
 
 def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source, n_table: int = 1) -> RawFile:
     """Records of a head and the rows below it; ``end`` is the byte behind the rows, ``n_table`` counts the tables."""
-    head = head._replace(units=[decoded_unit(unit) for unit in head.units])  # that of the time, too
+    head = head._replace(units=[*decoded_units(head.units)])  # that of the time, too
     names, units, offset, separator = head.names, head.units, head.offset, head.separator
     if separator == BLANK:
         data = data[:end]

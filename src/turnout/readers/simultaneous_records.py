@@ -17,9 +17,7 @@ ONE_RECORD_REMEDY = (
     "If they were recorded at once, export all channels as one record, each by its own name, or one record to a file"
 )
 ONE_UNIT_REMEDY = "Export one of them to a file of its own: the values in physical units, without the raw ones"
-MIN_RATIO = (
-    3.0  # of two units, such as ft/s² and m/s²; those of daN and kgf, or daN and lbf, are not told from strengths
-)
+MIN_RATIO = 3.0  # of two units, such as ft/s² and m/s²: that of daN and kgf is not told from strengths of impacts
 MAX_ROUNDING = 1e-3  # relative difference of copies whose units are both right
 
 

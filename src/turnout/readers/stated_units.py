@@ -13,9 +13,9 @@ from typing import Any
 
 from turnout.readers.entries import FREE_TEXT, MAX_ENTRIES, Entry
 from turnout.readers.entry_owners import CHANNEL, container_of, numbered_channels, owners_of, spaced_words
-from turnout.readers.rate_units import rate_unit, words_of
+from turnout.readers.rate_units import RateUnit, rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
-from turnout.readers.texts import other_readings
+from turnout.readers.texts import readings_together
 from turnout.readers.unit_names import conditions_of_unit, is_unit_name
 from turnout.units import Conversion, conversion
 
@@ -63,30 +63,35 @@ def known_unit(unit: str) -> Conversion | None:
         return None
 
 
-@lru_cache(maxsize=4096)
-def decoded_unit(unit: str) -> str:
-    """A unit whose letters were decoded wrongly, in the encoding of an older program in which it is known.
+def decoded_units(units: Sequence[str]) -> tuple[str, ...]:
+    """Units of which some were decoded wrongly, in the encoding of an older program in which all are known.
 
     Parameters
     ----------
-    unit : str
-        Unit as it was decoded.
+    units : sequence of str
+        Units of a file as they were decoded.
 
     Returns
     -------
-    str
-        Unchanged if it is known, or if no encoding gives one known unit.
+    tuple of str
+        Unchanged if all are known or in ASCII, or if no encoding or several give other known units.
 
     Examples
     --------
-    >>> [decoded_unit(unit) for unit in ("m/sý", "øC", "æs", "ý")]  # of DOS, and one that no encoding explains
-    ['m/s²', '°C', 'µs', 'ý']
+    >>> decoded_units(["N", "m/sý", "øC"]), decoded_units(["Í"])  # of DOS; "Í" may be "Н" or "м"
+    (('N', 'm/s²', '°C'), ('Í',))
     """
-    if unit.isascii() or known_unit(unit) or rate_unit(unit):
-        return unit
-    readings = {reading: known_unit(reading) or rate_unit(reading) for reading in other_readings(unit)}
-    known = [reading for reading, meaning in readings.items() if meaning]
-    return known[0] if len({readings[reading] for reading in known}) == 1 else unit
+    unknown = [unit for unit in units if not (unit.isascii() or _meaning(unit))]
+    known = [reading for reading in readings_together(unknown) if all(map(_meaning, reading))]
+    if len({tuple(map(_meaning, reading)) for reading in known}) != 1:
+        return tuple(units)
+    right = dict(zip(unknown, known[0]))
+    return tuple(right.get(unit, unit) for unit in units)
+
+
+def _meaning(unit: str) -> Conversion | RateUnit | None:
+    """Conversion of a unit of samples, or a unit of time or rate; None for one that is not known."""
+    return known_unit(unit) or rate_unit(unit)
 
 
 @lru_cache(maxsize=4096)
@@ -143,7 +148,7 @@ def with_decoded_units(record: RawRecord) -> RawRecord:
     RawRecord
         The same record if all units are known, or unknown in every encoding.
     """
-    units = tuple(map(decoded_unit, record.units))
+    units = decoded_units(record.units)
     return replace(record, units=units) if units != record.units else record
 
 

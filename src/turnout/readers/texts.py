@@ -1,6 +1,7 @@
 """Decoding of the texts in raw files, whose encoding no format states reliably."""
 
 import codecs
+from collections.abc import Sequence
 
 # Windows-1252; the five bytes that it leaves out are control characters, as Windows reads them, and none is lost.
 WESTERN = "".join(
@@ -61,14 +62,35 @@ def other_readings(text: str) -> tuple[str, ...]:
     >>> "力" in other_readings("力".encode("gbk").decode("cp1252")), other_readings("force")
     (True, ())
     """
-    if text.isascii():
+    return tuple(reading for (reading,) in readings_together((text,)))
+
+
+def readings_together(texts: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """What several texts of a file are in each of the other encodings, as ``other_readings``.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Decoded texts.
+
+    Returns
+    -------
+    tuple of tuple of str
+        For each encoding that all of the texts have.
+
+    Examples
+    --------
+    >>> ("м/с2", "Н") in readings_together([text.encode("cp1251").decode("cp1252") for text in ("м/с2", "Н")])
+    True
+    """
+    if all(map(str.isascii, texts)):
         return ()
     try:
-        data = bytes(map(WESTERN.index, text))
+        data = [bytes(map(WESTERN.index, text)) for text in texts]
     except ValueError:
         return ()
-    readings = (data.decode(encoding, "replace") for encoding in OTHER_ENCODINGS)
-    return tuple(reading for reading in dict.fromkeys(readings) if "\ufffd" not in reading)
+    readings = (tuple(part.decode(encoding, "replace") for part in data) for encoding in OTHER_ENCODINGS)
+    return tuple(reading for reading in dict.fromkeys(readings) if "\ufffd" not in "".join(reading))
 
 
 def wide_encoding(head: bytes) -> str:

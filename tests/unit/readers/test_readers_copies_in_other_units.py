@@ -1,0 +1,71 @@
+"""A copy of a record or a channel in other units, or of raw beside scaled values, is no second measurement."""
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+CHANNELS = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
+GRAVITY = 9.80665
+RNG = np.random.default_rng(1)
+FORCE, RAIL = (RNG.normal(size=(2, 800)) * [[20.0], [3.0]]).round(4)
+
+
+def reasons(tmp_path, name, channels=CHANNELS, **options):
+    result = read(name, tmp_path, RawDescription(channels, rate=5000.0, **options))
+    return [r.record for r in result.recordings], [(error.reason, error.record) for error in result.errors]
+
+
+def write_tdms(tmp_path, *records):
+    with TdmsWriter(str(tmp_path / "a.tdms")) as writer:
+        for k, (force, force_unit, rail, rail_unit) in enumerate(records, start=1):
+            units = {"force": force_unit, "rail": rail_unit}
+            writer.write_segment(
+                ChannelObject(f"impact {k}", name, x, {"wf_increment": 2e-4, "unit_string": units[name]})
+                for name, x in (("force", force), ("rail", rail))
+            )
+
+
+@pytest.mark.parametrize("n_digit", [9, 5])
+@pytest.mark.parametrize("kind", ["hammer", "passage"])
+def test_a_record_again_in_other_units_counts_once(kind, n_digit, tmp_path):
+    copy = (FORCE / 4.4482216152605).round(n_digit), "lbf", (RAIL / GRAVITY).round(n_digit), "g"
+    write_tdms(tmp_path, (FORCE, "N", RAIL, "m/s²"), copy)
+    expected = {("duplicate", 1)} if kind == "hammer" else {("duplicate", 1), ("wrong_time", 0)}
+    recordings, errors = reasons(tmp_path, "a.tdms", kind=kind)
+    assert recordings == ([0] if kind == "hammer" else []) and set(errors) == expected
+
+
+def test_nothing_says_which_of_raw_and_scaled_values_under_one_unit_is_right(tmp_path):
+    rows = np.c_[np.repeat([1, 2], 800), np.r_[FORCE, FORCE * 2.3e-4], np.r_[RAIL, -RAIL * 0.0102]]
+    text = "".join(f"{k:.0f};{f:.7f};{r:.7f}\n" for k, f, r in rows)
+    (tmp_path / "a.csv").write_text(f"record;force [N];rail [m/s²]\n{text}", "utf-8")
+    assert reasons(tmp_path, "a.csv") == ([], [("duplicate", 0), ("duplicate", 1)])
+
+
+@pytest.mark.parametrize("kind", ["hammer", "passage"])
+@pytest.mark.parametrize(("copy", "unit"), [(RAIL, "m/s²"), (-RAIL, "m/s²"), ((RAIL / GRAVITY).round(4), "g")])
+def test_a_channel_that_is_another_one_in_other_units_is_left_out(copy, unit, kind, tmp_path):
+    np.savez(tmp_path / "a.npz", force=FORCE, rail=RAIL, sleeper=copy, fs=5000.0)
+    channels = (
+        RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"),
+        RawChannel("sleeper", "sleeper", "acceleration", unit),
+    )  # fmt: skip
+    result = read("a.npz", tmp_path, RawDescription(channels, rate=5000.0, kind=kind))
+    assert [channel.name for channel in result.recordings[0].channels] == ["force", "rail"]
+    assert [(error.reason, error.where.rpartition(" ")[2]) for error in result.errors] == [("duplicate", "'sleeper'")]
+
+
+def test_two_measurements_are_no_copies(tmp_path):
+    """Other noise, a weaker impact with noise of its own, whole numbers, and computed ones of other strengths."""
+    noise = RNG.normal(size=(2, 800))
+    write_tdms(
+        tmp_path,
+        (FORCE, "N", RAIL, "m/s²"),
+        (FORCE * 0.2 + 0.1 * noise[0], "N", RAIL * 0.2 + 0.1 * noise[1], "m/s²"),
+        (noise[0].round(), "N", noise[1].round(), "m/s²"),
+        (FORCE * 1.4, "N", RAIL * 1.41, "m/s²"),
+    )
+    assert reasons(tmp_path, "a.tdms") == ([0, 1, 2, 3], [])
