@@ -17,7 +17,7 @@ N_NOISE = 256  # rows beside them that must hold noise
 N_BESIDE, N_NEAREST = 64, 16  # rows beside them whose ranges are compared
 MIN_STEPS = 3.0  # of the converter, range of the nearest rows: a vibration that dies away below it has 2
 MIN_REMAINDER = 0.33  # of the range of the rows beside, which the nearest ones have: else it dies away
-MAX_LEVEL = 10.0  # of the noise behind the rows at the beginning, in units of the quietest part: else an event begins
+MAX_LEVEL = 3.0  # of the noise behind the first rows, in units of the quietest part; of noise below 2.5
 N_PARTS = 200  # of a record whose levels are compared
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from turnout.readers.repeated_blocks import MIN_BLOCK, is_noisy
 
 N_COMPARED = 4096  # samples at the beginning
+N_PARTS = 16  # of a signal
+MIN_CHANGING_SHARE = 0.25  # of the samples of each part differ from the one before
 MAX_OFFSET = 0.01  # between the two, in standard deviations: units of vibration have the same zero
 
 
@@ -43,8 +45,13 @@ def scaled_copies(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, int, flo
     n_both = np.abs(signs) @ np.abs(signs).T
     found = np.triu((np.abs(difference) == n_both) & (n_both >= MIN_BLOCK), k=1)
     for i, j in np.argwhere(found).tolist():
-        if is_noisy(heads[i][None]) and is_noisy(heads[j][None]):
+        if all(is_noisy(heads[k][None]) and _is_never_silent(signs[k]) for k in (i, j)):
             (x, mean_x), (y, mean_y) = ((heads[k] - heads[k].mean(), heads[k].mean()) for k in (i, j))
             factor = float(x @ y / (x @ x))
             if abs(mean_y - factor * mean_x) <= MAX_OFFSET * np.std(y):
                 yield i, j, factor
+
+
+def _is_never_silent(signs: np.ndarray) -> bool:
+    """Whether a signal has noise in its quiet parts, too: computed impacts, and coarse ones, have one shape."""
+    return all(np.mean(part != 0.0) >= MIN_CHANGING_SHARE for part in np.array_split(signs, N_PARTS))
