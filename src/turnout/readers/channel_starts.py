@@ -34,13 +34,13 @@ def different_starts(record: RawRecord) -> str:
 
 def _of_channels(record: RawRecord) -> list[datetime]:
     """Starts of entries that belong to one channel each."""
-    found: dict[int, datetime] = {}
+    starts: dict[int, datetime] = {}
     for entry in record.entries:
         if is_start_name(entry.name) and (times := [time for _, time in times_of_entry(entry) if time]):
             owners = owners_of(entry, record.entries, record.names)
             if len(owners) == 1:
-                found.setdefault(next(iter(owners)), times[0])
-    return list(found.values())
+                starts.setdefault(next(iter(owners)), times[0])
+    return list(starts.values())
 
 
 def _of_lines(record: RawRecord) -> Iterator[list[datetime]]:

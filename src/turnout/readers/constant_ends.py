@@ -95,8 +95,8 @@ def _is_cut_off(beside: np.ndarray) -> bool:
 
 def _is_quiet(columns: Sequence[Column], first: int, stop: int, beside: np.ndarray) -> bool:
     """Whether the noise behind the first rows has the level of the quietest part of the record, on all channels."""
-    parts = np.linspace(first + N_BESIDE, stop - N_BESIDE, N_PARTS).astype(int)
-    levels = [_levels(_rows(columns, a, a + N_BESIDE)) for a in dict.fromkeys(parts.tolist())]
+    places = np.linspace(first + N_BESIDE, stop - N_BESIDE, N_PARTS).astype(int)
+    levels = [_levels(_rows(columns, a, a + N_BESIDE)) for a in dict.fromkeys(places.tolist())]
     quietest = np.min(levels, axis=0)
     here = _levels(beside[:, :N_BESIDE])
     return bool((quietest > 0.0).any() and (here <= MAX_LEVEL * quietest)[quietest > 0.0].all())

@@ -43,8 +43,8 @@ def scaled_copies(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, int, flo
     signs = np.sign(np.diff(heads, axis=1)).astype(np.float32)
     difference = signs @ signs.T  # samples at which both turn alike, less those at which they differ
     n_both = np.abs(signs) @ np.abs(signs).T
-    found = np.triu((np.abs(difference) == n_both) & (n_both >= MIN_BLOCK), k=1)
-    for i, j in np.argwhere(found).tolist():
+    are_alike = np.triu((np.abs(difference) == n_both) & (n_both >= MIN_BLOCK), k=1)
+    for i, j in np.argwhere(are_alike).tolist():
         if all(is_noisy(heads[k][None]) and _is_never_silent(signs[k]) for k in (i, j)):
             (x, mean_x), (y, mean_y) = ((heads[k] - heads[k].mean(), heads[k].mean()) for k in (i, j))
             factor = float(x @ y / (x @ x))
@@ -54,4 +54,4 @@ def scaled_copies(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, int, flo
 
 def _is_never_silent(signs: np.ndarray) -> bool:
     """Whether a signal has noise in its quiet parts, too: computed impacts, and coarse ones, have one shape."""
-    return all(np.mean(part != 0.0) >= MIN_CHANGING_SHARE for part in np.array_split(signs, N_PARTS))
+    return all(np.mean(signs_of_part != 0.0) >= MIN_CHANGING_SHARE for signs_of_part in np.array_split(signs, N_PARTS))

@@ -122,13 +122,13 @@ def _factors_of_copies(recordings: Sequence[Recording]) -> dict[tuple[int, int],
 
     Computed impacts of several strengths have one shape: their factors are no ratio of units.
     """
-    found: dict[tuple[int, int], dict[str, float]] = {}
+    factors_of_pairs: dict[tuple[int, int], dict[str, float]] = {}
     for name in sorted({channel.name for r in recordings for channel in r.channels}):
         having = [r for r in recordings if any(channel.name == name for channel in r.channels)]
         for i, j, factor in scaled_copies([r.signal(name) for r in having]):
             if not np.array_equal(having[i].samples, having[j].samples):
-                found.setdefault((having[i].record, having[j].record), {})[name] = factor
-    return {pair: factors for pair, factors in found.items() if _are_ratios_of_units([*factors.values()])}
+                factors_of_pairs.setdefault((having[i].record, having[j].record), {})[name] = factor
+    return {pair: factors for pair, factors in factors_of_pairs.items() if _are_ratios_of_units([*factors.values()])}
 
 
 def _are_ratios_of_units(factors: Sequence[float]) -> bool:

@@ -57,8 +57,14 @@ def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRec
     """
     intact = [r for r in records if isinstance(r, RawRecord)]
     if any(r.started_at for r in intact) and not any(map(_has_set_start, intact)):
-        others = with_stated_starts([replace(r, started_at=None) if isinstance(r, RawRecord) else r for r in records])
-        return others if any(isinstance(r, RawRecord) and _has_set_start(r) for r in others) else tuple(records)
+        without_epochs = with_stated_starts(
+            [replace(r, started_at=None) if isinstance(r, RawRecord) else r for r in records]
+        )
+        return (
+            without_epochs
+            if any(isinstance(r, RawRecord) and _has_set_start(r) for r in without_epochs)
+            else tuple(records)
+        )
     if len(intact) > 1 and any(r.started_at for r in intact):
         return tuple(records)
     counts = Counter(key for r in intact for key in {_key(e) for e in r.entries if may_state_start(e.name)})

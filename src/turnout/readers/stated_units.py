@@ -82,10 +82,10 @@ def decoded_units(units: Sequence[str]) -> tuple[str, ...]:
     (('N', 'm/s²', '°C'), ('Í',))
     """
     unknown = [unit for unit in units if not (unit.isascii() or _meaning(unit))]
-    known = [reading for reading in readings_together(unknown) if all(map(_meaning, reading))]
-    if len({tuple(map(_meaning, reading)) for reading in known}) != 1:
+    known_readings = [reading for reading in readings_together(unknown) if all(map(_meaning, reading))]
+    if len({tuple(map(_meaning, reading)) for reading in known_readings}) != 1:
         return tuple(units)
-    right = dict(zip(unknown, known[0]))
+    right = dict(zip(unknown, known_readings[0]))
     return tuple(right.get(unit, unit) for unit in units)
 
 

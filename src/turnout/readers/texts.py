@@ -89,7 +89,7 @@ def readings_together(texts: Sequence[str]) -> tuple[tuple[str, ...], ...]:
         data = [bytes(map(WESTERN.index, text)) for text in texts]
     except ValueError:
         return ()
-    readings = (tuple(part.decode(encoding, "replace") for part in data) for encoding in OTHER_ENCODINGS)
+    readings = (tuple(text_bytes.decode(encoding, "replace") for text_bytes in data) for encoding in OTHER_ENCODINGS)
     return tuple(reading for reading in dict.fromkeys(readings) if "\ufffd" not in "".join(reading))
 
 

@@ -37,14 +37,14 @@ def read_npz(tmp_path, samples, **options):
 @pytest.mark.parametrize("values", [(0.0, 0.0), (7.25, 0.5), (FORCE[-2] + 1e-9, 1e-12)])
 @pytest.mark.parametrize("n", [32, 300])
 def test_rows_that_repeat_one_value_beside_noise_are_left_out(n, values, tmp_path):
-    for ends, said in (
+    for ends, problems in (
         ({"last": n}, [f"its last {n}"]),
         ({"first": n}, [f"its first {n}"]),
         ({"first": n, "last": n}, [f"its first {n}", f"its last {n}"]),
     ):
         samples, remarks = read_npz(tmp_path, padded(**ends, values=values))
         np.testing.assert_array_equal(samples, [FORCE, RAIL])
-        assert remarks == said
+        assert remarks == problems
 
 
 def write(name, tmp_path, force, rail):
