@@ -42,7 +42,7 @@ def measured_span(columns: Sequence[Column]) -> tuple[int, int]:
     Examples
     --------
     >>> noise = np.random.default_rng(1).normal(size=(2, 1000))
-    >>> measured_span([np.r_[x, np.zeros(300)] for x in noise]), measured_span(noise)
+    >>> measured_span([np.r_[x, np.zeros(300)] for x in noise]), measured_span([*noise])
     ((0, 1000), (0, 1000))
     """
     n_sample = len(columns[0]) if columns else 0
