@@ -88,8 +88,8 @@ def read_raw(source: Source) -> RawFile:
     end, remarks = _end_of_content(data, source)
     if data.find(b"\n") < 0:
         data, lazy = data[:end].replace(b"\r", b"\n"), False
-    head_of_file = source.head
-    if not lazy or has_other_notation(head_of_file) or BREAK_IN_CELL.search(head_of_file) or has_labels(head_of_file):
+    first = source.head
+    if not lazy or has_other_notation(first) or BREAK_IN_CELL.search(first) or has_labels(first):
         lazy, data = False, with_joined_labels(with_whole_cells(with_plain_numbers(data[:end])))
         end = len(data)
     end_of_text = end_without_blank_rows(data, end)
@@ -132,8 +132,7 @@ def _read_damaged_table(table: bytes, n_table: int, source: Source) -> RawFile:
 
 def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: Source, n_table: int = 1) -> RawFile:
     """Records of a head and the rows below it; ``end`` is the byte behind the rows, ``n_table`` counts the tables."""
-    head = head._replace(units=[*decoded_units(head.units)])  # that of the time, too
-    names, units, offset, separator = head.names, head.units, head.offset, head.separator
+    names, units, offset, separator = head.names, [*decoded_units(head.units)], head.offset, head.separator
     if separator == BLANK:
         data = data[:end]
         data = data[:offset] + _with_single_blanks(data[offset:])
@@ -147,7 +146,7 @@ def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: So
     remarks: tuple[ReadError, ...] = ()
     if time is None:  # else such a row has no time that fits
         remarks = tuple(_outer_row_remarks(data, head, min(end, len(data)), source))
-    head = head._replace(entries=(*head.entries, *footer))
+    head = head._replace(entries=(*head.entries, *footer), units=units)
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head.notes, source)
     first = start_or_clock_in_cells(first_cells(data, offset, separator), names)
