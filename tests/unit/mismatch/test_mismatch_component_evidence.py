@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from turnout.mismatch.engine.candidate import Candidate
+from turnout.mismatch.engine.candidate_search import changed_parts, shortlist
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.component_evidence import (
     evidence_by_position,
@@ -132,6 +133,33 @@ def test_beside_a_name_at_a_position_or_in_a_channel_its_errors_of_shape_count(w
     graded = grade_names(Findings(Search(case), fit_jointly(case), fit, verdicts)).verdicts
     assert graded[0].answer == answer and len(graded) == (2 if answer == "named" else 1)
     assert ("local_change_remains" in graded[0].trail) is (answer == "unknown")
+
+
+class SupportWithGap(Supports):
+    """A large case with an effect at the third support that a small size does not show, as columns see it."""
+
+    is_large = True
+
+    def __init__(self, changes):
+        super().__init__(changes)
+        parts = (("hardening", "ballast", 2), ("wear", "", 2), ("hardening", "ballast", 5))
+        self.candidates = tuple(
+            Candidate.of(name, SIZE, lambda v: {"size": 0.0}, ((0.5,),), {"place": 0.6 * j}, component=component)
+            for name, component, j in parts
+        )
+
+
+@pytest.mark.parametrize("change, sought", [(0.0, []), (0.4, [1.2])])
+def test_effects_of_a_component_that_changes_under_trains_are_fitted_without_a_promise(change, sought):
+    """A large effect that the base fit imitates need not promise anything. Only effects of components are sought, and
+    beside another effect the change may be an error of its shape."""
+    case = SupportWithGap(in_one(change))
+    search, fit = Search.of(case), fit_jointly(case)
+    assert changed_parts(case, fit, search.settings) == {("ballast", place) for place in sought}
+    tasks = shortlist(search, fit)
+    assert [t.candidate.position for t in tasks] == sought and not any(t.rival for t in tasks)
+    beside_another = fit_jointly(case, case.candidates[2:])
+    assert not shortlist(search, beside_another)
 
 
 @pytest.mark.parametrize("changes, answer", [([0.0] * N_SUPPORT, "none"), (in_one(0.25), "unknown")])

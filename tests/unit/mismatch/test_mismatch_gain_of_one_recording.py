@@ -83,6 +83,21 @@ def test_evidence_of_one_recording_that_similar_ones_do_not_confirm(factors, gai
 
 
 @pytest.mark.parametrize(
+    "others, gain, alone",
+    [
+        ((5.0, 2.0), 55.0, ""),  # 27 are less than half of 55: the rest is the penalty of nuisances
+        ((5.0, 2.0), 53.0, "a"),
+        ((5.0, -6.0), 55.0, "a"),  # the others contradict it by 1
+    ],
+)
+def test_no_recording_is_the_source_where_most_of_the_evidence_is_the_penalty_of_nuisances(others, gain, alone):
+    """A corrugation with 119 nats, of which conditions left out showed 22, was rejected as that of one passage."""
+    case, fit = case_and_fit((1.0, 2.0, 1.0))
+    by_condition = dict(zip("abc", (20.0, *others)))
+    assert single_source(Search(case), fit, case.candidates[0], gain, by_condition) == alone
+
+
+@pytest.mark.parametrize(
     "factors, nats",
     [
         ((1.0, 0.13, 0.0), 32.0),  # half of 0.13 squared is 0.8 % of the energy: b and c do not show it

@@ -145,6 +145,17 @@ def test_the_answer_none_is_withdrawn_where_held_out_recordings_are_not_predicte
     assert confirm((none,), Verification(1, 27.6, reserved_excess=1.9), settings)[0].answer == "none"
 
 
+@pytest.mark.parametrize("excess, answer", [(3.9, "named"), (4.1, "unknown")])
+def test_a_name_that_leaves_too_much_of_held_out_recordings_is_withdrawn(excess, answer):
+    """A quintic spring was named cubic: it fits the levels that were fitted, and another level by 142 times the
+    residual of the intact state."""
+    pair = tuple(Verdict("named", (n,), "A", 0.97, dict(POSTERIOR)) for n in ("pad_preload", "dip"))
+    check = Verification(1, 54.6, 69.9, reserved_excess=excess)
+    first, *further = confirm(pair, check, MismatchSettings(leftover=4.0))
+    assert first.answer == answer and len(further) == (answer == "named")
+    assert answer == "named" or "pad preload and dip" in first.reason
+
+
 def test_the_residual_of_reserved_recordings_is_compared_with_the_control_level():
     """Two recordings of one kind, errors of 3 and 1 sigma: a mean square of 5 over a level of 0.5; of the other 1."""
     rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]

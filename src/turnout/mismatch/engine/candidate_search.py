@@ -15,6 +15,7 @@ import numpy as np
 
 from turnout.errors import SimulationError
 from turnout.mismatch.engine.case_check import checked_predictions
+from turnout.mismatch.engine.component_evidence import evidence_by_position, local_changes
 from turnout.mismatch.engine.hammer_prescreen import prescreen
 from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.thresholds import THRESHOLDS
@@ -172,6 +173,8 @@ def shortlist(search: Search, fit: Fit, prescreened: Sequence[Entry] = ()) -> li
     ]
     min_gain = THRESHOLDS.min_promise_share * max((entry.gain for entry in selected), default=0.0)
     chosen = [e for rank, e in enumerate(selected) if rank < THRESHOLDS.n_always_refitted or e.gain > min_gain]
+    if not fit.candidates:  # beside another effect the residual is also an error in its shape
+        chosen += entries_of_parts(changed_parts(case, fit, search.settings), chosen, by_family)
     tasks = [(e, False) for e in chosen] + [(e, True) for e in component_rivals(chosen, by_family)]
     fitted = [(with_fitted_start(e, by_family), e.gain, rival) for e, rival in tasks]
     return [RefitTask(*e[1:], gain, prescreen_gains.get(e.candidate.key, 0.0), rival) for e, gain, rival in fitted]
@@ -274,6 +277,32 @@ def with_fitted_start(entry: Entry, by_family: Mapping[str, Sequence[Entry]]) ->
     return max(fitted, key=lambda e: e.gain, default=entry)
 
 
+def changed_parts(case: Case, fit: Fit, settings: MismatchSettings) -> set[tuple[str, Any]]:
+    """Parts at the position where the components differ most between passages and hammer tests.
+
+    What depends on load acts on trains alone. The base fit imitates a large effect of this kind by other stiffnesses
+    and lighter wheels, and no small effect then promises anything.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        Without effects, with its Jacobian.
+    settings : MismatchSettings
+        The difference must gain as much as an effect must promise.
+
+    Returns
+    -------
+    set of (component, position)
+        ``Candidate.part`` of the effects there; empty where nothing differs.
+    """
+    ranked = evidence_by_position(local_changes(case, fit))
+    if not ranked or ranked[0].nats <= settings.promise:
+        return set()
+    frame, level = ranked[0].frame, ranked[0].level
+    return {c.part for c in case.candidates if c.effect.component and _distance(c.where.get(frame), level) == 0.0}
+
+
 def component_rivals(chosen: Sequence[Entry], by_family: Mapping[str, Sequence[Entry]]) -> list[Entry]:
     """Best starts of other effects on the components of the first two chosen: columns hardly separate them.
 
@@ -288,12 +317,30 @@ def component_rivals(chosen: Sequence[Entry], by_family: Mapping[str, Sequence[E
     -------
     list of Entry
     """
-    sites = [e.candidate.part for e in chosen if e.candidate.effect.component][:2]
+    return entries_of_parts([e.candidate.part for e in chosen if e.candidate.effect.component][:2], chosen, by_family)
+
+
+def entries_of_parts(
+    parts: Collection[tuple[str, Any]], chosen: Sequence[Entry], by_family: Mapping[str, Sequence[Entry]]
+) -> list[Entry]:
+    """Best start of every effect of some parts that is not among the chosen.
+
+    Parameters
+    ----------
+    parts : collection of (component, position or sensor)
+    chosen : sequence of Entry
+    by_family : mapping
+        Family -> its entries.
+
+    Returns
+    -------
+    list of Entry
+    """
     chosen_effects = {(e.candidate.family, e.candidate.part) for e in chosen}
     best_entries: dict[tuple, Entry] = {}
     for entry in sorted((e for entries in by_family.values() for e in entries), key=lambda e: e.gain):
         effect = entry.candidate.family, entry.candidate.part
-        if entry.candidate.part in sites and effect not in chosen_effects:
+        if entry.candidate.part in parts and effect not in chosen_effects:
             best_entries[effect] = entry
     return list(best_entries.values())
 

@@ -181,6 +181,9 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
     Rule("reserved_fit_falls_for_little_evidence", lambda e: e.is_single_name and e.has_fallen, "B",
          "with {e.words}, held-out recordings are predicted slightly worse than without it: too little to reject the "
          "name, enough for grade B", HOW),
+    Rule("reserved_leaves_too_much", lambda e: e.has_name and e.verification.reserved_excess > e.settings.leftover,
+         "unknown", "with {e.words}, the residual of held-out recordings is still {e.verification.reserved_excess:.0f} "
+         "times that of the intact state", HOW),
     Rule("reserved_not_explained",
          lambda e: e.verdict.answer == "none" and e.verification.reserved_excess > THRESHOLDS.max_reserved_excess,
          "unknown", "held-out recordings are predicted worse than in the intact state", HOW),

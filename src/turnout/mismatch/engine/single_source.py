@@ -33,10 +33,11 @@ def single_source(
     at least two others show the effect with half its energy. Two are needed, since nuisances may absorb the gain of
     one. Trains are exempt: speed and roughness differ at each passage.
 
+    No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If that penalty is most of
+    the ``gain``, and all other conditions support the name, no single recording or position is the source.
+
     Impacts at one position are one source, however often they are repeated. They share the fittings, the twist of the
-    rail and the mark on it. No held-out condition shows the prior penalty that nuisances pay to imitate an effect. If
-    that penalty is most of the ``gain``, and all other conditions support the name, no single position is the source.
-    Passages share none of these faults: if they are enough for a name without any impact, they are a second source.
+    rail and the mark on it. Passages share none of these faults: if they are enough for a name without any impact, they are a second source.
     What other impacts lose by the name is a question of its own (``is_contradicted``).
 
     The error of a receptance is that of the model, so it is the same at each visit. Tests that repeat impacts at one
@@ -65,7 +66,7 @@ def single_source(
     if not strongest or by_condition[strongest] <= threshold or "train" in candidate.where:
         return ""
     other_gain = sum(by_condition.values()) - by_condition[strongest]
-    if other_gain >= threshold:
+    if other_gain >= threshold or _is_mostly_penalty(gain, by_condition[strongest], other_gain):
         return ""
     energies = effect_energy(case, fit, candidate)
     min_energy = THRESHOLDS.min_energy_ratio * energies.pop(strongest, np.inf)
@@ -167,10 +168,15 @@ def _single_hammer_position(
     gain_without_impacts = sum(g for condition, g in by_condition.items() if condition not in hammer_positions)
     if gain_without_impacts >= threshold:
         return ""
-    if other_gain > 0.0 and gains[strongest] + other_gain < THRESHOLDS.min_held_out_share * gain:
+    if _is_mostly_penalty(gain, gains[strongest], other_gain):
         return ""
     is_alone = gains[strongest] > THRESHOLDS.min_confirmation * threshold > other_gain
     return f"all impacts at {strongest:g} m" if is_alone else ""
+
+
+def _is_mostly_penalty(gain: float, strongest_gain: float, other_gain: float) -> bool:
+    """Whether most of a gain is the prior penalty of nuisances, and the conditions beside the strongest support it."""
+    return other_gain > 0.0 and strongest_gain + other_gain < THRESHOLDS.min_held_out_share * gain
 
 
 def single_sensor(search: Search, without: Fit, score: Score) -> str:

@@ -70,7 +70,7 @@ class Verification:
 
     ``error`` is the standard error of ``after`` less ``before`` with the two models as they are. ``error_of_fitted`` is
     its other part, which comes from the fitted recordings (``reserved_error``). ``reserved_excess`` is the weighted
-    mean square without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood
+    mean square over the control level, with the named term if there is one. ``lost_evidence`` is the fall of the logarithm of the likelihood
     of these recordings [nats], below 0 where the named model predicts them better.
     """
 
@@ -136,12 +136,12 @@ def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verifica
     n, (before, before_percent) = len(case.reserved), reserved_fit(case, base)
     if before is None or before_percent is None:
         return Verification(n, float("nan"))
-    excess = reserved_excess_ratio(search, before)
     if fit is base:
-        return Verification(n, before_percent, reserved_excess=excess)
+        return Verification(n, before_percent, reserved_excess=reserved_excess_ratio(search, before))
     decoy = predict_with_decoy(case.observations, base.predictions, case.reserved, before, fit.psi.size)
     rival_percent = reserved_fit(case, rival.fit)[1] if rival else None
     after, after_percent = reserved_fit(case, fit)
+    excess = reserved_excess_ratio(search, before if after is None else after)
     error = None if after is None else gain_error(case.reserved, before, after)
     lost = 0.0 if after is None else lost_evidence(case.reserved, before, after)
     decoy_percent = fit_percent(case.reserved, decoy)
