@@ -37,7 +37,8 @@ def single_source(
     the ``gain``, and all other conditions support the name, no single recording or position is the source.
 
     Impacts at one position are one source, however often they are repeated. They share the fittings, the twist of the
-    rail and the mark on it. Passages share none of these faults: if they are enough for a name without any impact, they are a second source.
+    rail and the mark on it. Passages share none of these faults: if they are enough for a name without any impact, they
+    are a second source.
     What other impacts lose by the name is a question of its own (``is_contradicted``).
 
     The error of a receptance is that of the model, so it is the same at each visit. Tests that repeat impacts at one
