@@ -120,21 +120,28 @@ def _add_copies(errors: dict[int, ReadError], recordings: Sequence[Recording], s
 def _factors_of_copies(recordings: Sequence[Recording]) -> dict[tuple[int, int], dict[str, float]]:
     """Numbers of two records -> factor of each channel of the latter that is one of the former in other units.
 
-    Computed impacts of several strengths have one shape: their factors are no ratio of units.
+    Computed impacts of several strengths have one shape, and one factor for all channels. Records with different starts
+    are no copies.
     """
     factors_of_pairs: dict[tuple[int, int], dict[str, float]] = {}
     for name in sorted({channel.name for r in recordings for channel in r.channels}):
         having = [r for r in recordings if any(channel.name == name for channel in r.channels)]
         for i, j, factor in scaled_copies([r.signal(name) for r in having]):
-            if not np.array_equal(having[i].samples, having[j].samples):
+            starts = {having[k].started_at for k in (i, j)} - {None}
+            if len(starts) < 2 and not np.array_equal(having[i].samples, having[j].samples):
                 factors_of_pairs.setdefault((having[i].record, having[j].record), {})[name] = factor
     return {pair: factors for pair, factors in factors_of_pairs.items() if _are_ratios_of_units([*factors.values()])}
 
 
 def _are_ratios_of_units(factors: Sequence[float]) -> bool:
-    """Whether factors are those of copies in SI units, all 1, or one is so far from it as units and raw values are."""
-    is_far = any(not 1.0 / MIN_RATIO < abs(factor) < MIN_RATIO for factor in factors)
-    return is_far or all(abs(factor - 1.0) <= MAX_ROUNDING for factor in factors)
+    """Whether factors are those of copies in SI units, all 1, or one is so far from it as units and raw values are.
+
+    Two channels with one factor are of an impact with another strength.
+    """
+    if all(abs(factor - 1.0) <= MAX_ROUNDING for factor in factors):
+        return True
+    is_strength = len(factors) > 1 and np.ptp(factors) <= MAX_ROUNDING * abs(factors[0])
+    return not is_strength and any(not 1.0 / MIN_RATIO < abs(factor) < MIN_RATIO for factor in factors)
 
 
 def _error(

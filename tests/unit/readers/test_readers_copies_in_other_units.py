@@ -69,3 +69,10 @@ def test_two_measurements_are_no_copies(tmp_path):
         (FORCE * 1.4, "N", RAIL * 1.41, "m/s²"),
     )
     assert reasons(tmp_path, "a.tdms") == ([0, 1, 2, 3], [])
+
+
+@pytest.mark.parametrize(("rail_factor", "are_used"), [(5.0, True), (5.1, False)])
+def test_one_factor_of_all_channels_is_the_strength_of_a_computed_impact(rail_factor, are_used, tmp_path):
+    write_tdms(tmp_path, (FORCE, "N", RAIL, "m/s²"), (FORCE * 5.0, "N", RAIL * rail_factor, "m/s²"))
+    recordings, errors = reasons(tmp_path, "a.tdms")
+    assert recordings == ([0, 1] if are_used else []) and bool(errors) is not are_used
