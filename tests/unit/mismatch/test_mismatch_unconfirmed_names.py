@@ -15,7 +15,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.verdict import Verdict
-from turnout.mismatch.engine.verification import Verification, least_excess_ratio, reserved_excess_ratio
+from turnout.mismatch.engine.verification import Verification, reserved_excess_ratio
 from turnout.stages.finding_row import recommendation, sentence
 
 POSTERIOR = {"pad_preload": 0.8, "none": 0.15, "unknown": 0.05}
@@ -143,30 +143,6 @@ def test_the_answer_none_is_withdrawn_where_held_out_recordings_are_not_predicte
     named = Verdict("named", ("dip",), "A", 0.97)
     assert confirm((named,), Verification(1, 27.6, reserved_excess=2.1), settings)[0].answer == "named"
     assert confirm((none,), Verification(1, 27.6, reserved_excess=1.9), settings)[0].answer == "none"
-
-
-@pytest.mark.parametrize("excess, answer", [(3.9, "named"), (4.1, "unknown")])
-@pytest.mark.parametrize("after", [69.9, 50.6])
-def test_a_name_that_leaves_too_much_of_held_out_recordings_is_withdrawn(excess, answer, after):
-    """A quintic spring was named cubic: it fits the levels that were fitted, and another level by 142 times the
-    residual of the intact state. So is a name whose fit falls for little evidence, which would have grade B."""
-    pair = named("pad_preload", "A", 60.0), named("dip", "A", 60.0)
-    check = Verification(1, 54.6, after, error=0.7, remaining_excess=excess, lost_evidence=1.0)
-    first, *further = confirm(pair, check, MismatchSettings(leftover=4.0))
-    assert first.answer == answer and len(further) == (answer == "named")
-    assert answer == "named" or "pad preload and dip" in first.reason
-    (single,) = confirm(pair[:1], check, MismatchSettings(leftover=4.0))
-    assert single.answer == answer
-
-
-def test_of_the_held_out_recordings_the_best_predicted_counts():
-    """One of two recordings may be disturbed: mean squares of 9 and 1 over a level of 0.5, and of 4 over 1."""
-    rows = [Observation(f"o{k}", "c", np.zeros(40), 0.1, 0.5, kind) for k, kind in enumerate("aab")]
-    search = Search(with_reserved(rows, {"a": 0.5, "b": 1.0}))
-    predictions = [np.full(40, 0.3), np.full(40, -0.1), np.full(40, 0.2)]
-    assert least_excess_ratio(search, predictions) == pytest.approx(1.0 / 0.5)
-    assert least_excess_ratio(search, predictions[:1]) == pytest.approx(9.0 / 0.5)
-    assert least_excess_ratio(Search(with_reserved((), {})), []) == 0.0
 
 
 def test_the_residual_of_reserved_recordings_is_compared_with_the_control_level():

@@ -172,9 +172,6 @@ RESERVED_RULES: tuple[Rule[ReservedEvidence], ...] = (
          "the simulation predicts held-out recordings worse than a signal of 0 would (fit {e.fit:.0f} %), also with "
          "the effects that explain the most: a position in the layout, the track file or a vehicle file is wrong, or a "
          "large fault is not known to this program", HOW, cause="all trains"),
-    Rule("reserved_leaves_too_much", lambda e: e.has_name and e.verification.remaining_excess > e.settings.leftover,
-         "unknown", "with {e.words}, the residual of held-out recordings is still "
-         "{e.verification.remaining_excess:.0f} times that of the intact state", HOW),
     Rule("reserved_predicted_worse", lambda e: e.is_single_name_of_grade_b and e.verification.is_worse, "unknown",
          "with {e.words}, the residual is larger than in the intact state, and held-out recordings are predicted worse",
          ENDS),

@@ -335,12 +335,7 @@ class ReservedEvidence:
     @property
     def predicts_nothing(self) -> bool:
         """Whether a name stands, and the last fit predicts the reserved recordings worse than a signal of 0 would."""
-        return self.has_name and self.fit < 0.0
-
-    @property
-    def has_name(self) -> bool:
-        """Whether any verdict has a name, or a choice of names."""
-        return any(v.answer in ("named", "a_or_b") for v in self.verdicts)
+        return any(v.answer in ("named", "a_or_b") for v in self.verdicts) and self.fit < 0.0
 
     @property
     def fit(self) -> float:
@@ -373,8 +368,8 @@ class ReservedEvidence:
 
     @property
     def words(self) -> str:
-        """All names as text, with their sites."""
-        return " and ".join(" or ".join(v.names_in_words) for v in self.verdicts if v.names)
+        """First name as text, with its site."""
+        return self.verdict.names_in_words[0]
 
     @property
     def is_single_name(self) -> bool:

@@ -70,8 +70,7 @@ class Verification:
 
     ``error`` is the standard error of ``after`` less ``before`` with the two models as they are. ``error_of_fitted`` is
     its other part, which comes from the fitted recordings (``reserved_error``). ``reserved_excess`` is the weighted
-    mean square without a term over the control level, and ``remaining_excess`` that with the named term, of the
-    recording where it is least. ``lost_evidence`` is the fall of the logarithm of the likelihood
+    mean square without a term over the control level. ``lost_evidence`` is the fall of the logarithm of the likelihood
     of these recordings [nats], below 0 where the named model predicts them better.
     """
 
@@ -82,7 +81,6 @@ class Verification:
     decoy: float | None = None
     error: float | None = None
     reserved_excess: float = 0.0
-    remaining_excess: float = 0.0
     lost_evidence: float = 0.0
     error_of_fitted: float = 0.0
 
@@ -147,8 +145,7 @@ def verify(search: Search, base: Fit, fit: Fit, rival: Score | None) -> Verifica
     error = None if after is None else gain_error(case.reserved, before, after)
     lost = 0.0 if after is None else lost_evidence(case.reserved, before, after)
     decoy_percent = fit_percent(case.reserved, decoy)
-    remaining = 0.0 if after is None else least_excess_ratio(search, after)
-    return Verification(n, before_percent, after_percent, rival_percent, decoy_percent, error, excess, remaining, lost)
+    return Verification(n, before_percent, after_percent, rival_percent, decoy_percent, error, excess, lost)
 
 
 def reserved_excess_ratio(search: Search, predictions: list[np.ndarray]) -> float:
@@ -170,24 +167,3 @@ def reserved_excess_ratio(search: Search, predictions: list[np.ndarray]) -> floa
         pairs = [(o, p) for o, p in zip(reserved, predictions) if o.data_type == data_type]
         ratios.append(weighted_mean_square(*zip(*pairs)) / search.control_level(data_type))
     return max(ratios)
-
-
-def least_excess_ratio(search: Search, predictions: list[np.ndarray]) -> float:
-    """Weighted mean square of the reserved recording that is predicted best, over the control level of its data type.
-
-    One recording may be disturbed; what a name leaves in all of them is missing in the simulation.
-
-    Parameters
-    ----------
-    search : Search
-    predictions : list of (n,) array of float
-        Of each reserved recording.
-
-    Returns
-    -------
-    float
-        0 if there are no reserved recordings.
-    """
-    pairs = zip(search.case.reserved, predictions)
-    ratios = [weighted_mean_square([o], [p]) / search.control_level(o.data_type) for o, p in pairs]
-    return min(ratios, default=0.0)
