@@ -25,7 +25,10 @@ REASONS = {
     "channel_unknown": "the file has a channel that the configuration does not name",
     "unit_unknown": "a unit that cannot be converted to the configured one",
     "scale_unknown": "the file states a scale, but not whether its numbers contain it",
-    "entry_unknown": "an entry of the file may state a rate, scale or unit, unexplained; its recordings are used",
+    "entry_unknown": (
+        "the file holds something unexplained, such as an entry that may state a rate, scale or unit, or rows that no "
+        "sensor measured; its recordings are used"
+    ),
     "library_warning": "the library that reads the format warns about the file; its recordings are used",
     "condition_lost": "names, or a condition such as a temperature, are damaged in the file; its recordings are used",
     "not_finite": "missing samples: NaN, infinity, or a number that stands for them",

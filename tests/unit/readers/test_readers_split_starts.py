@@ -142,3 +142,13 @@ def test_records_without_a_start_entry_are_not_copied():
     entry = Entry("the file", "Operator", "M. Jensen")
     records = [RawRecord(("force",), (row,), entries=(entry,)) for row in FORCE]
     assert all(out is record for out, record in zip(with_stated_starts(records), records, strict=True))
+
+
+def test_the_start_of_an_unset_clock_stays_where_no_entry_states_another():
+    """The format alone states it: it is reported later, and a record without it would lose that report."""
+    record = RawRecord(("force",), (FORCE[0],), started_at=datetime(1904, 1, 1))
+    assert with_stated_starts([record])[0].started_at == datetime(1904, 1, 1)
+    later = RawRecord(
+        ("force",), (FORCE[0],), (), (Entry("the file", "start", "2026-05-13 10:00:05"),), record.started_at
+    )
+    assert with_stated_starts([later])[0].started_at == START
