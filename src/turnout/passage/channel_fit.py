@@ -39,8 +39,8 @@ class ChannelFit:
     along b with ``amplitudes_se`` [m/s² per unit of b c]; ``test`` the chi-squared test per wheel; ``scores`` of the
     model, ``null`` band of random models, ``other_skills`` the forecast skill of other sections' models by name;
     ``measured`` and ``predicted`` (n,) [m/s²] band-passed, from ``start`` [s] of the recording on;
-    ``max_fit`` the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration;
-    ``parameters_per_second``.
+    ``max_fit`` the fit that noise alone would leave [%]; ``peak`` [m/s²] of the band-passed acceleration while
+    the train passes; ``parameters_per_second``.
     """
 
     status: str
@@ -86,10 +86,8 @@ class _Excerpt:
     min_noise: float
 
 
-def find_peak(
-    samples: np.ndarray, rate: float, axle_times: np.ndarray, model: ModalModel | None, settings: PassageSettings
-) -> ChannelFit:
-    """Peak of one sensor and times of the wheels, without a fit.
+def find_peak(samples: np.ndarray, rate: float, axle_times: np.ndarray, settings: PassageSettings) -> ChannelFit:
+    """Peak of one sensor while the train passes, without a model.
 
     Parameters
     ----------
@@ -99,8 +97,6 @@ def find_peak(
         [Hz]
     axle_times : (n_wheel,) array of float
         As for ``fit_channel``. [s]
-    model : ModalModel or None
-        Of the sensor's section: it shows the delay of the impacts. None: all delays are allowed for.
     settings : PassageSettings
         Settings of the passage analysis.
 
@@ -112,14 +108,8 @@ def find_peak(
     excerpt = _excerpt_of(samples, rate, axle_times, settings)
     if isinstance(excerpt, ChannelFit):
         return excerpt
-    if model is None:
-        earlier = settings.delay_search
-        begins = excerpt.expected - earlier * rate
-        window = _windows(excerpt.data, rate, begins, settings.score_window + 2.0 * earlier)
-        return ChannelFit(PEAK_ONLY, times=excerpt.expected / rate + excerpt.start, peak=float(np.max(np.abs(window))))
-    delay, window = _delay_and_window(excerpt, rate, _filtered_basis(model, rate, settings), settings)
-    times = (excerpt.expected + delay) / rate + excerpt.start
-    return ChannelFit(PEAK_ONLY, times=times, peak=float(np.max(np.abs(window))))
+    times = excerpt.expected / rate + excerpt.start
+    return ChannelFit(PEAK_ONLY, times=times, peak=_peak_of_train(excerpt, rate, settings))
 
 
 def fit_channel(
@@ -163,7 +153,8 @@ def fit_channel(
         return excerpt
     data, expected = excerpt.data, excerpt.expected
     basis = _filtered_basis(model, rate, settings)
-    delay, window = _delay_and_window(excerpt, rate, basis, settings)
+    delay = common_delay(delay_power(data, expected, basis, settings))
+    near_wheels = _windows(data, rate, expected + delay, settings.score_window)
     quiet = _quiet_samples(excerpt.record, rate, axle_times, speed)
     times, test = _impacts_and_test(excerpt, expected + delay, quiet, speed, model, rate, settings)
     scores = score(data, expected, basis, settings)
@@ -192,8 +183,8 @@ def fit_channel(
         scores,
         null,
         other_skills,
-        100.0 * (1.0 - noise / max(float(np.std(window)), 1e-300)),
-        float(np.max(np.abs(window))),
+        100.0 * (1.0 - noise / max(float(np.std(near_wheels)), 1e-300)),
+        _peak_of_train(excerpt, rate, settings),
         scores.n_parameter / (scores.n_value / rate),
         data,
         joint.prediction,
@@ -218,12 +209,15 @@ def _excerpt_of(
     return _Excerpt(record, excerpt, data, band_filter, expected, start, min_noise)
 
 
-def _delay_and_window(
-    excerpt: _Excerpt, rate: float, basis: WheelBasis, settings: PassageSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Delay of the impacts behind the axle times [samples], and the data of all wheels, one behind the other."""
-    delay = common_delay(delay_power(excerpt.data, excerpt.expected, basis, settings))
-    return delay, _windows(excerpt.data, rate, excerpt.expected + delay, settings.score_window)
+def _peak_of_train(excerpt: _Excerpt, rate: float, settings: PassageSettings) -> float:
+    """Largest acceleration while the train passes. [m/s²]
+
+    It is sought in one piece from the first to the last wheel. In a window for each wheel it would depend on the axle
+    times, which err by milliseconds.
+    """
+    begin = int(excerpt.expected[0] - settings.delay_search * rate)
+    end = int(excerpt.expected[-1] + (settings.delay_search + settings.score_window) * rate)
+    return float(np.max(np.abs(excerpt.data[begin:end])))
 
 
 def _band_noise(quiet: np.ndarray, rate: float, band_filter: np.ndarray, least: float) -> float:

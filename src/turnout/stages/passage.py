@@ -291,7 +291,7 @@ def _fit_rows(
         if not is_unfit and len(times) >= 2:
             samples, model = recording.signal(sensor.name), section_model.model if section_model else None
             if model is None or not is_scored(identity["passed_at_utc"], settings.scored_share):
-                fit = find_peak(samples, recording.rate, times, model, settings)
+                fit = find_peak(samples, recording.rate, times, settings)
             else:
                 others = {label: m.model for label, m in latest.items() if m is not None and label != sensor.section}
                 fit = fit_channel(samples, recording.rate, times, passage.train_motion.speed, model, settings, others)

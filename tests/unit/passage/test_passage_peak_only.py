@@ -41,7 +41,7 @@ RECORD = record()
 def fits():
     """(scored, not scored) of the same record."""
     model, settings = paper_model("CP A7"), replace(PassageSettings(), null_models=5)
-    return fit_channel(*RECORD, 40.0, model, settings), find_peak(*RECORD, model, settings)
+    return fit_channel(*RECORD, 40.0, model, settings), find_peak(*RECORD, settings)
 
 
 def test_the_peak_is_that_of_the_scored_passage(fits):
@@ -52,13 +52,19 @@ def test_the_peak_is_that_of_the_scored_passage(fits):
     assert np.allclose(scored.times, AXLES, atol=0.005)
 
 
-def test_without_a_model_the_peak_is_searched_over_all_possible_delays(fits):
-    """The highest sample of the filtered record; a model finds the same one, since its windows hold all impacts."""
-    without = find_peak(*RECORD, None, PassageSettings())
-    assert without.status == "peak_only" and without.scores is None
-    assert without.peak == fits[0].peak and np.allclose(without.times, AXLES, atol=1e-9)
-    early = find_peak(RECORD[0], RATE, AXLES + 0.008, None, PassageSettings())  # all impacts 8 ms early
-    assert early.peak == without.peak
+@pytest.mark.parametrize("error", [-0.006, -0.003, 0.003, 0.006])
+def test_an_error_of_the_acceleration_of_a_train_does_not_change_the_peak(error):
+    """A wrong acceleration moves the axle times against each other. A window behind each wheel would cut the burst."""
+    axle_times = AXLES + np.linspace(-error, error, len(AXLES))
+    samples, settings = RECORD[0].copy(), PassageSettings()
+    burst = int((AXLES[0] - 0.004) * RATE) + np.arange(10)  # before the first wheel arrives
+    samples[burst] += 60.0 * np.sin(2 * np.pi * 500.0 * burst / RATE)
+    exact, shifted = find_peak(samples, RATE, AXLES, settings), find_peak(samples, RATE, axle_times, settings)
+    assert shifted.status == "peak_only" and shifted.scores is None
+    assert np.allclose(shifted.times, axle_times, rtol=0, atol=1e-9)
+    fitted = fit_channel(samples, RATE, axle_times, 40.0, paper_model("CP A7"), settings, with_null=False)
+    assert exact.peak > 15.0 and shifted.peak == pytest.approx(exact.peak, rel=1e-9)  # rounding of the filter
+    assert fitted.peak == shifted.peak
 
 
 def test_views_count_a_peak_without_scores_and_give_the_state_of_each_wheel(tmp_path):
