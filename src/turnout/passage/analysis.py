@@ -135,9 +135,8 @@ def _analyse_train(
 ) -> Passage:
     """Passage of the train that ``sensors`` record.
 
-    The motion is sought relative to position 0 where it is among the sensors, else to the sensor nearest to it.
-    Relative to a distant origin, an error of the acceleration would change the times of the axles against each other,
-    and a train that starts within the recording was never there.
+    Its motion is given relative to position 0 where it is among the sensors, else to the sensor nearest to it:
+    a train that starts within the recording was never at a distant origin.
     """
     origin = float(np.clip(0.0, np.min(envelopes.positions), np.max(envelopes.positions)))
     envelopes = envelopes.relative_to(origin)
@@ -156,7 +155,8 @@ def _analyse_train(
     findings += _axle_count_doubts(passage, axles, all_envelopes, is_multi_sensor, settings)
     findings += _out_of_search(passage, settings)
     findings += _truncation_findings(envelopes, passage, duration) + second_train(envelopes, passage, settings)
-    motion = replace(passage.train_motion, origin=origin)
+    motion = passage.train_motion
+    motion = replace(motion, origin=motion.origin + origin)
     return replace(passage, motion=motion, status=_status(findings, "accepted"), findings=tuple(findings))
 
 
@@ -297,8 +297,12 @@ def _estimate_motion(
     settings: PassageSettings,
     is_multi_sensor: bool,
 ) -> Passage:
-    """Passage with motion from sensors and template together: axle offsets on its scale, times at the sensors."""
-    motion, offsets = initial, axles.offsets
+    """Passage with motion from sensors and template together: axle offsets on its scale, times at the sensors.
+
+    The axles are those of a mean over the sensors. In the middle of the sensors their times are right also where the
+    first motion has a wrong acceleration; elsewhere the last motion gives them.
+    """
+    motion, offsets = initial.from_position(float(np.mean(envelopes.positions))), axles.offsets
     # a short row of sensors and no template: the position error of each sensor decides
     unaided = is_multi_sensor and train_type.type == UNKNOWN and np.ptp(envelopes.positions) < MAX_SHORT_SPAN
     position_error = SHORT_SPAN_ERROR if unaided else settings.place_error
@@ -311,17 +315,19 @@ def _estimate_motion(
         centre = motion.time(offsets)
         middle = 0.5 * float(centre[0] + centre[-1])
         if train_type.type != UNKNOWN:
-            from_type = (*train_type.middle_motion, middle)
+            from_type = train_type.middle_motion
         if from_sensors is None and from_type is None:
             # an unknown train whose sensors give no speed: its bogies give it to one sixth
             middle_speed, is_guess = float(motion.speed_at(middle)), True
             from_type = (middle_speed, 0.16 * middle_speed, motion.acceleration, 0.3, middle)
         speed = combine_speeds(from_sensors, from_type, middle)
         converged = abs(speed.at(centre[0]) / motion.speed - 1) < 2e-3
-        motion = motion_of(speed, float(centre[0]), motion.direction)
+        motion = replace(motion_of(speed, float(centre[0]), motion.direction), origin=motion.origin)
         offsets = motion.distance(centre)
         if converged:
             break
+    motion = motion.from_position(0.0)
+    speed = speed.moved_to(float(np.mean(motion.time(offsets[[0, -1]]))))
     if is_guess:
         speed = replace(speed, source="bogie")
     at_sensor = {s.name: motion.passing(offsets, x) for s, x in zip(sensors, envelopes.positions)}

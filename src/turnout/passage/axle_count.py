@@ -116,6 +116,7 @@ def match_template(
         acceleration_se,
         speed,
         speed_se,
+        motion_at_middle(envelopes, fitted).start,
     )
     profiles = profiles_at(envelopes, [fitted.motion])
     start = float(profiles.origin[0]) + centred_start(profiles, fitted.comb, fitted.start)
@@ -158,11 +159,11 @@ def estimate_speed(
     likeliest : FittedRow
         The row at the most probable speed and acceleration.
     """
-    duration = fitted.comb.offsets[-1] / fitted.motion.speed
-    step = 16.0 * BEND_STEP / duration**2
-    max_acceleration = max(min(settings.acceleration_limit, 6.0 * step), step)
-    accelerations = np.linspace(-max_acceleration, max_acceleration, 13)
     middle = motion_at_middle(envelopes, fitted)
+    step = 16.0 * BEND_STEP / (fitted.comb.offsets[-1] / middle.speed) ** 2
+    reach = max(min(settings.acceleration_limit, 6.0 * step), step)
+    # around the acceleration of the row: that of a long train is many steps from 0
+    accelerations = np.linspace(-reach, reach, 13) + reach / 6.0 * np.round(middle.acceleration * 6.0 / reach)
     speeds = middle.speed * (1.0 + RELATIVE_SPEEDS)
     motions = [replace(middle, speed=v, acceleration=a) for a in accelerations for v in speeds]
     profiles = profiles_at(envelopes, motions)
@@ -292,7 +293,8 @@ def _first_with_type(
             continue
         checked.add(key)
         for axles in _position_variants(envelopes, motion, candidate):
-            times = motion.time(axles.offsets)
+            # the profile is a mean over the sensors: a wrong acceleration moves no axle in the middle of them
+            times = motion.passing(axles.offsets, float(np.mean(envelopes.positions)))
             train_type = find_type(times, patterns, settings, float(motion.speed_at(times[0])), error, POSITION_SE)
             if train_type.type != UNKNOWN and _is_whole_train(envelopes, motion, axles.offsets):
                 return (axles, train_type), untyped

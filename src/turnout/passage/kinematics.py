@@ -111,6 +111,31 @@ class Motion:
         start = float(self.time(distance))
         return replace(self, speed=float(self.speed_at(start)), start=start)
 
+    def from_position(self, position: float) -> Motion:
+        """The same motion with its origin at another position. [m]
+
+        Parameters
+        ----------
+        position : float
+            New origin, which the first axle passes at the new start. [m]
+
+        Returns
+        -------
+        Motion
+            ``passing`` gives the same times. The origin stays where the first axle never was at ``position``.
+
+        Examples
+        --------
+        >>> Motion(10.0, 1.0, 2.0).from_position(24.0)
+        Motion(speed=14.0, start=3.0, acceleration=2.0, direction=1, origin=24.0)
+        >>> Motion(10.0, 1.0, 2.0).from_position(-30.0).origin
+        0.0
+        """
+        distance = self.direction * (position - self.origin)
+        if self.speed**2 + 2.0 * self.acceleration * distance <= 0.0:
+            return self
+        return replace(self.relative_to_axle(distance), origin=position)
+
 
 def _time_at(
     speed: float | np.ndarray, start: float | np.ndarray, acceleration: float | np.ndarray, distance: np.ndarray

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,6 +63,27 @@ class SpeedFinding:
             Speed at that time. [m/s]
         """
         return self.speed + self.acceleration * (time - self.time)
+
+    def moved_to(self, time: float) -> SpeedFinding:
+        """The speed at another time, with the error that the acceleration adds until then.
+
+        Parameters
+        ----------
+        time : float
+            Time after the start of the recording. [s]
+
+        Returns
+        -------
+        SpeedFinding
+            With that ``time``.
+
+        Examples
+        --------
+        >>> SpeedFinding(20.0, 0.03, -0.5, 0.02, "sensors", time=4.0).moved_to(6.0)
+        SpeedFinding(19.00 ± 0.10 m/s (95 %), from sensors)
+        """
+        se = float(np.hypot(self.se, self.acceleration_se * (time - self.time)))
+        return replace(self, speed=self.at(time), se=se, time=time)
 
 
 @dataclass(frozen=True)

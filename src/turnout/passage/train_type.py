@@ -31,7 +31,7 @@ class TypeFinding:
     ``residual`` [m], the rms deviation of the axle spacings, is the reason. ``speed`` [m/s] at the first axle,
     ``speed_se``, ``acceleration`` [m/s²] and ``acceleration_se`` follow from the template's distances. ``middle_speed``
     and ``middle_speed_se`` are for the middle between the first and the last axle, where an uncertain acceleration
-    matters least.
+    matters least, at the time ``middle_time`` [s].
     """
 
     type: str
@@ -46,13 +46,17 @@ class TypeFinding:
     acceleration_se: float | None = None
     middle_speed: float | None = None
     middle_speed_se: float | None = None
+    middle_time: float | None = None
 
     @property
-    def middle_motion(self) -> tuple[float, float, float, float]:
-        """Speed and its standard error in the middle, acceleration and its standard error; nan where not known."""
-        values = self.middle_speed, self.middle_speed_se, self.acceleration, self.acceleration_se
-        speed, speed_se, acceleration, acceleration_se = (float("nan") if v is None else v for v in values)
-        return speed, speed_se, acceleration, acceleration_se
+    def middle_motion(self) -> tuple[float, float, float, float, float]:
+        """Speed and its standard error, acceleration and its standard error, and time of the speed: of the middle.
+
+        nan where they are not known.
+        """
+        values = self.middle_speed, self.middle_speed_se, self.acceleration, self.acceleration_se, self.middle_time
+        speed, speed_se, acceleration, acceleration_se, time = (float("nan") if v is None else v for v in values)
+        return speed, speed_se, acceleration, acceleration_se, time
 
 
 @dataclass(frozen=True)
@@ -195,6 +199,7 @@ def _decide_type(
         float(np.sqrt(covariance[1, 1])),
         float(v + a * half_duration),
         float(np.sqrt(to_middle @ covariance @ to_middle)),
+        float(times[0]) + half_duration,
     )
 
 
