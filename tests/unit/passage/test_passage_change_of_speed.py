@@ -100,3 +100,33 @@ def test_times_that_no_train_can_have_give_no_speed(settings):
     times = passing_times(IC3, PLACES, 30.0, -3.0, 1, 3.0)
     sensors = SimpleNamespace(positions=np.array(PLACES))
     assert _sensor_speed(times, sensors, 1, settings.place_error, settings) is None
+
+
+# A Vectron and seven coaches, as in config/vehicles/axle_patterns.yaml.
+LONG = np.concatenate([[0.0, 3.0, 9.5, 12.5]] + [18.19 + 26.4 * k + np.array([0.0, 2.5, 19.0, 21.5]) for k in range(7)])
+FAR_ROW = tuple(x + 150.0 for x in PLACES)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(
+    ("acceleration", "positions"),
+    [(-0.25, FAR_ROW), (0.25, FAR_ROW), (0.25, (-60.0, -51.0, -41.0)), (0.2, (0.0, 10.0, 20.0)), (-0.35, (0.0, 12.0))],
+)
+def test_the_speed_of_a_known_train_is_that_of_its_moment_at_any_sensors(acceleration, positions, direction, settings):
+    """The axle times of a mean over the sensors were taken for those at the sensor nearest to position 0.
+
+    That made the speed of a train that changes it up to 0.7 % wrong, at a stated error of 0.04 %.
+    """
+    errors = []
+    for seed in range(3):
+        recording = rolling_noise(
+            np.random.default_rng(seed), LONG, 27.0, positions, direction, acceleration=acceleration
+        )
+        passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+        assert (passage.n_axle, passage.type.type) == (LONG.size, "intercity")
+        expected = 27.0 + acceleration * (passage.speed.time - 1.0)
+        errors.append((passage.speed.speed - expected) / passage.speed.se)
+        assert passage.speed.speed == pytest.approx(expected, rel=1.5e-3)
+        for name, times in zip(passage.at_sensor, passing_times(LONG, positions, 27.0, acceleration, direction, 1.0)):
+            assert np.max(np.abs(passage.at_sensor[name] - times)) * 27.0 < 0.3
+    assert np.sqrt(np.mean(np.square(errors))) < 2.0
