@@ -27,7 +27,7 @@ from passage_fits_touched t
 -- along_b_share | double | | share of the free jumps' power along b: near 1 where a wheel acts as an impulse
 -- forecast_others_pct | double | % | best forecast skill of the other sections' models at this sensor
 -- n_wheels | integer | | wheels fitted
--- peak_ms2 | double | m/s² | peak of the band-passed acceleration
+-- peak_ms2 | double | m/s² | largest band-passed acceleration while the train passes
 -- run_id | varchar | | content id of the batch
 -- wheel_times_s | double[] | s | time of each wheel's impact from the start of the recording; empty where not scored
 -- wheel_amplitudes | double[] | | amplitude g of each wheel

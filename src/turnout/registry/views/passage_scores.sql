@@ -27,7 +27,7 @@ where f.status not in ('rejected', 'peak_only') and p.status <> 'rejected';
 -- along_b_share | double | | share of the free jumps' power along b: near 1 where a wheel acts as an impulse
 -- forecast_others_pct | double | % | best forecast skill of the other sections' models at this sensor
 -- n_wheels | integer | | wheels fitted
--- peak_ms2 | double | m/s² | peak of the band-passed acceleration
+-- peak_ms2 | double | m/s² | largest band-passed acceleration while the train passes
 -- train_type | varchar | | type of train, 'unknown' where no template fits
 -- speed_kmh | double | km/h | speed halfway through the passage
 -- axle_load_t | double | t | mean axle load; empty where not available
