@@ -111,7 +111,7 @@ SECOND_RULES: tuple[Rule[SecondEvidence], ...] = (
     Rule("excess_of_one_recording", lambda e: e.first.answer == "named" and e.is_excess_of_one_recording, "first",
          "", PAIRS),
     Rule("unnamed_beside_name", lambda e: e.first.answer == "named" and e.second.answer == "unknown", "first",
-         "a second effect without a name remains{e.location}: {e.second.reason}", PAIRS),
+         "a second effect without a name remains{e.location}{e.alternative}: {e.second.reason}", PAIRS),
     Rule("second_is_no_single_effect", lambda e: not e.second.is_single_effect, "first", "", PAIRS),
     Rule("second_may_be_shape_of_first", lambda e: e.gain < e.shape_error_evidence, "first", "", PAIRS),
     Rule("rivals_stay_a_choice", lambda e: e.is_choice and not e.split_first.is_single_effect, "first", "", PAIRS),

@@ -87,6 +87,11 @@ class SecondEvidence(_EvidenceBesideFirst):
         return "" if location is None else f" {location}"
 
     @property
+    def alternative(self) -> str:
+        """Other explanation of what the first effect leaves, "" if the residual has a location of its own."""
+        return "" if self.location else f", or {self.first.scores[0].in_words} is only similar to the true effect"
+
+    @property
     def is_choice(self) -> bool:
         """Whether the first effect is a choice of two that may both be present."""
         return self.findings.choice is not None
