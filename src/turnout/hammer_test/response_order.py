@@ -1,6 +1,7 @@
 """Which derivative of the displacement a response is, from the phase of the driving-point function.
 
-A velocity in mm/s read as an acceleration in m/s² is of the size of an acceleration. Its phase is not.
+A velocity in mm/s read as an acceleration in m/s² is of the size of an acceleration. Its phase is not. Nor is that of a
+loose sensor, which lags behind the rail by half a period above the resonance of its mounting.
 """
 
 from __future__ import annotations
@@ -23,6 +24,11 @@ ERRORS, MAX_PHASE_ERROR = 3.0, 0.3  # standard errors of a phase that noise expl
 MIN_IMPACTS, MIN_LINES = 3, 20  # below them the phases tell nothing
 # Share of the lines with a negative real part: passive structures have none, one line in fifty may be an interference.
 REFUTED, SUPPORTED = 0.1, 0.02
+# s, delay that is allowed before a sensor counts as loose: a delay changes no mode. And the share of the lines that no
+# such delay explains: a resonance of the mounting turns the phase by half a period, a track has none.
+MAX_ALLOWED_DELAY, MAX_ACTIVE_SHARE = 1e-3, 0.05
+MIN_MOUNTING_FREQUENCY = 100.0  # Hz: below, a shift of the zero turns the phase, and no mounting resonates
+DELAY_STEP = 2.5e-5  # s, between trial delays; 7 degrees at 800 Hz
 
 
 class PhaseLines(NamedTuple):
@@ -34,7 +40,7 @@ class PhaseLines(NamedTuple):
 
 
 def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
-    """Reject a test whose response is no acceleration, if its phase is that of a velocity.
+    """Reject a test whose response is no acceleration of the rail: its phase is a velocity's, or a loose sensor's.
 
     The sign of the channel is left open, so a reversed acceleration is accepted; a displacement, which has its phase,
     is not found.
@@ -49,12 +55,14 @@ def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impa
     Returns
     -------
     tuple of Impact
-        The impacts, with a rejection "out_of_scale" in the accepted ones of such a test.
+        The impacts, with a rejection "out_of_scale" or "loose_sensor" in the accepted ones of such a test.
     """
     accepted = [i for i in impacts if i.accepted]
     lines = phase_lines(accepted) if len(accepted) >= MIN_IMPACTS else None
-    if lines is None or len(lines.frequency) < MIN_LINES or not is_velocity(lines):
+    if lines is None or len(lines.frequency) < MIN_LINES:
         return tuple(impacts)
+    if not is_velocity(lines):
+        return _judge_mounting(impacts, lines, response)
     share = even_order_share(lines)
     detail = (
         f"{response} has the phase of a velocity: as an acceleration beside the hammer it would feed energy into the "
@@ -63,6 +71,21 @@ def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impa
         "has such a phase, too"
     )
     rejection = Rejection("out_of_scale", share, REFUTED, detail, response)
+    return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)
+
+
+def _judge_mounting(impacts: Sequence[Impact], lines: PhaseLines, response: str) -> tuple[Impact, ...]:
+    """Reject the accepted impacts if no delay makes the phases those of a rail beside the hammer."""
+    lines = PhaseLines(*(values[lines.frequency >= MIN_MOUNTING_FREQUENCY] for values in lines))
+    if len(lines.frequency) < MIN_LINES or (share := even_order_share(lines, MAX_ALLOWED_DELAY)) < MAX_ACTIVE_SHARE:
+        return tuple(impacts)
+    detail = (
+        f"the phase of {response} is none of a rail beside the hammer at {100.0 * share:.0f} % of "
+        f"{len(lines.frequency)} frequencies, whatever the delay between the channels: the sensor is loose and "
+        "vibrates on its mounting, or it is far from the hammer; for another structure than a track set "
+        "receptance.minimum_peak_force: 0"
+    )
+    rejection = Rejection("loose_sensor", share, MAX_ACTIVE_SHARE, detail, response)
     return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)
 
 
@@ -118,23 +141,25 @@ def is_velocity(lines: PhaseLines) -> bool:
     return even_order_share(lines) >= REFUTED and odd_share <= SUPPORTED
 
 
-def even_order_share(lines: PhaseLines) -> float:
+def even_order_share(lines: PhaseLines, max_delay: float = MAX_DELAY) -> float:
     """The smaller ``active_share`` of a displacement and an acceleration, whose phases differ by the sign.
 
     Parameters
     ----------
     lines : PhaseLines
         Response per force.
+    max_delay : float
+        Of the response behind the force, or before it. [s]
 
     Returns
     -------
     float
         0 to 1.
     """
-    return min(active_share(lines, 0), active_share(lines, 2))
+    return min(active_share(lines, 0, max_delay), active_share(lines, 2, max_delay))
 
 
-def active_share(lines: PhaseLines, order: int) -> float:
+def active_share(lines: PhaseLines, order: int, max_delay: float = MAX_DELAY) -> float:
     r"""Share of the lines at which a response of a derivative order would be that of an active structure.
 
     The force feeds energy into a passive structure at every frequency, so its driving-point mobility has a real part
@@ -143,7 +168,7 @@ def active_share(lines: PhaseLines, order: int) -> float:
     .. math:: \mathrm{Re}\, Y(\omega) \ge 0, \qquad Y = (i\omega)^{1 - n} H_n
 
     with the response per force :math:`H_n` for the n-th derivative of the displacement. The least share for any delay
-    between the channels of at most ``MAX_DELAY`` counts.
+    between the channels of at most ``max_delay`` counts.
 
     Parameters
     ----------
@@ -151,6 +176,8 @@ def active_share(lines: PhaseLines, order: int) -> float:
         Response per force at the driving point.
     order : int
         0 for a displacement, 1 for a velocity, 2 for an acceleration. Two more have the reversed sign.
+    max_delay : float
+        [s]
 
     Returns
     -------
@@ -173,6 +200,6 @@ def active_share(lines: PhaseLines, order: int) -> float:
     """
     omega = 2.0 * np.pi * lines.frequency
     phase = np.angle((1j) ** (1 - order) * lines.h)
-    delays = np.linspace(-MAX_DELAY, MAX_DELAY, 9)[:, None]
+    delays = np.linspace(-max_delay, max_delay, 2 * round(max_delay / DELAY_STEP) + 1)[:, None]
     outside = np.cos(phase + omega * delays) < -np.sin(ERRORS * lines.error) - 1e-9
     return float(outside.mean(axis=1).min())

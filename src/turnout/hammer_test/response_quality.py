@@ -15,10 +15,11 @@ from turnout.hammer_test.impacts import find_impacts
 from turnout.hammer_test.limited_response import contact_spectra, judge_limited_impacts, transfer_function
 from turnout.hammer_test.response_order import judge_response_order
 from turnout.hammer_test.response_scale import judge_response_scale
+from turnout.hammer_test.zero_shift import judge_zero_shift
 from turnout.records import Rejection
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from turnout.config.settings.receptance import ReceptanceSettings
     from turnout.records import Impact, Recording
@@ -54,6 +55,7 @@ def find_track_impacts(
     impacts = judge_saturation(impacts, response)
     impacts = judge_limited_impacts(impacts, response)
     if is_track:
+        impacts = judge_zero_shift(impacts, response)
         impacts = judge_response_order(impacts, response)
         impacts = judge_response_scale(impacts, response)
     return select_best(impacts, settings)  # among those that no other test has rejected
@@ -74,8 +76,8 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     is 1 on a linear track. The prediction is the force through the mean transfer function of the test. It contains the
     shape of each pulse: the response to a short one follows its impulse, and samples may miss its peak. A saturated
     test has a smaller transfer function, but a prediction that grows with the force. A test is rejected if b lies below
-    ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for the steepest slope of the response, which an
-    amplifier may limit.
+    ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for its highest and for its lowest value, as a
+    channel may be limited on one side, and for its steepest slope, which an amplifier may limit.
 
     Parameters
     ----------
@@ -95,32 +97,44 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     spectra = contact_spectra(used)
     predicted = np.fft.irfft(transfer_function(spectra, np.arange(len(used))) * spectra[0])
     predictions = [x[: i.acceleration.size] for x, i in zip(predicted, used)]
-    for name in ("peak", "steepest slope"):
+    for name, largest in LARGEST_VALUES.items():
         with np.errstate(divide="ignore"):
             x, y = (
-                np.log(_largest_values(used, responses, name == "steepest slope"))
+                np.log([largest(a[i.onset :]) for i, a in zip(used, responses)])
                 for responses in (predictions, [i.acceleration for i in used])
             )
         if not np.isfinite([x, y]).all() or np.std(x) < MIN_FORCE_SPREAD:
             continue
-        deviations = x - x.mean()
-        slope = float(deviations @ y / (deviations @ deviations))
-        residual = y - y.mean() - slope * deviations
-        error = float(np.sqrt(residual @ residual / (len(used) - 2) / (deviations @ deviations)))
+        slope, error = _slope(x, y)
         if slope + 3.0 * error < MAX_SATURATED_SLOPE:
-            largest = float(np.exp(np.median(y)))
             detail = (
-                f"the {name} of {response} is about {largest:.4g} whatever the force: it grows with the force to the "
-                f"power {slope:.2f}, not 1; the channel is limited before its filter, so choose a larger range"
+                f"the {name} of {response} is about {np.exp(np.median(y)):.4g} whatever the force: it grows with the "
+                f"force to the power {slope:.2f}, not 1; the channel is limited before its filter, so choose a larger "
+                "range"
             )
             return _with_rejection(impacts, Rejection("overload", slope, MAX_SATURATED_SLOPE, detail, response))
     return tuple(impacts)
 
 
-def _largest_values(impacts: Sequence[Impact], responses: Sequence[np.ndarray], is_slope: bool) -> np.ndarray:
-    """Largest value of the response to each impact, or of its differences."""
-    behind = (x[i.onset :] for i, x in zip(impacts, responses))
-    return np.array([np.max(np.abs(np.diff(x) if is_slope else x), initial=0.0) for x in behind])
+def _highest(x: np.ndarray) -> float:
+    return float(np.max(x, initial=0.0))
+
+
+# What a limited amplifier holds of a response: both sides or one, or the change from sample to sample.
+LARGEST_VALUES: dict[str, Callable[[np.ndarray], float]] = {
+    "peak": lambda x: _highest(np.abs(x)),
+    "steepest slope": lambda x: _highest(np.abs(np.diff(x))),
+    "highest value": _highest,
+    "lowest value": lambda x: _highest(-x),
+}
+
+
+def _slope(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope of y over x and its standard error. [-]"""
+    deviations = x - x.mean()
+    slope = float(deviations @ y / (deviations @ deviations))
+    residual = y - y.mean() - slope * deviations
+    return slope, float(np.sqrt(residual @ residual / (len(x) - 2) / (deviations @ deviations)))
 
 
 # Share of its largest value at which a response has begun: a filter of linear phase rings before it with less.
