@@ -96,10 +96,12 @@ def run(args: argparse.Namespace) -> int:
             print(path)
         return 0
     from turnout.stages.parameter_ranges import improbable_in_files
-    from turnout.stages.simulate import model_files, write_hammer, write_passage
+    from turnout.stages.simulate import hammer_warnings, model_files, write_hammer, write_passage
 
     check_output_files(args, "--out")
     add_warnings(args, improbable_in_files(model_files(vars(args))))
+    if args.kind == "hammer":
+        add_warnings(args, hammer_warnings(vars(args)))
     write = write_hammer if args.kind == "hammer" else write_passage
     for path, note in write(vars(args)):
         print(f"{path}: {note}")

@@ -274,6 +274,48 @@ def prepare_hammer(
     return prepare(stretch, dt, scheme, terms)
 
 
+MIN_END_DISTANCE = 6.0  # m, from which the end of a track without an absorbing end changes a receptance by at most 2 %
+
+
+def end_warning(track: Track, position: float, half_length: float = 30.0) -> str | None:
+    """What is doubtful about a hammer test near an end of the simulated track: its waves are reflected or absorbed.
+
+    Parameters
+    ----------
+    track : Track
+        The whole track of the route.
+    position : float
+        Position of the impacts. [m]
+    half_length : float
+        Length of track on both sides of the impact that is simulated. [m]
+
+    Returns
+    -------
+    str or None
+        A sentence; None from ``MIN_END_DISTANCE`` on, and outside a longer absorbing end.
+
+    Examples
+    --------
+    >>> from turnout.simulate.track import uniform_track
+    >>> end_warning(uniform_track(30.0), 15.0)
+    >>> print(end_warning(uniform_track(30.0), 1.2)[:68])
+    the impacts at 1.2 m are 1.2 m from the end of the simulated track a
+    """
+    stretch = stretch_of_track(track, position, half_length)
+    end = stretch.start if position - stretch.start < stretch.end - position else stretch.end
+    distance, reach = abs(position - end), max(MIN_END_DISTANCE, stretch.end_length)
+    if distance >= reach:
+        return None
+    advice = (
+        "use a track file that goes on" if end in (track.start, track.end) else "increase simulate.hammer_half_length"
+    )
+    return (
+        f"the impacts at {position:.4g} m are {distance:.2g} m from the end of the simulated track at {end:.4g} m, "
+        "which changes the response by up to some 10 % within 3 m, and more in an absorbing end; "
+        f"{advice} for {reach:g} m behind them"
+    )
+
+
 def resolve_location(track: Track | TurnoutTrack, location: float | str) -> tuple[float, Track]:
     """Position [m] and track of a named location, or of a position on the first route.
 

@@ -23,7 +23,7 @@ from turnout.files import write_text
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
-from turnout.simulate.hammer import ImpactTruth, hammer_sensors, resolve_location
+from turnout.simulate.hammer import ImpactTruth, end_warning, hammer_sensors, resolve_location
 from turnout.simulate.parameters import track_path
 from turnout.simulate.track import Track
 from turnout.simulate.turnout_track import TurnoutTrack, half_bay, position_by_mounting
@@ -127,6 +127,32 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
         )
         peak = max(float(r.samples[0].max()) for r in recordings)
         yield path, f"{len(recordings)} impacts at {position:.2f} m, highest force {peak / 1e3:.1f} kN"
+
+
+def hammer_warnings(request: Mapping[str, Any]) -> list[str]:
+    """What is doubtful about the hammer tests of a request, as sentences.
+
+    Parameters
+    ----------
+    request : mapping of str to any
+        Options of `turnout simulate hammer`.
+
+    Returns
+    -------
+    list of str
+        Empty where the impacts are far enough from the ends of the track.
+
+    Raises
+    ------
+    ConfigError
+        An option is invalid.
+    SimulationError
+        There is no such section or position.
+    """
+    request, _, settings, track = _prepare(request)
+    position, base = resolve_location(track, _label_or_position(request["section"]))
+    warning = end_warning(base, position, settings.hammer_half_length)
+    return [warning] if warning else []
 
 
 def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
