@@ -311,7 +311,7 @@ def end_warning(track: Track, position: float, half_length: float = 30.0) -> str
     )
     return (
         f"the impacts at {position:.4g} m are {distance:.2g} m from the end of the simulated track at {end:.4g} m, "
-        "which changes the response by up to some 10 % within 3 m, and more in an absorbing end; "
+        "which changes the response by 10 to 20 % within 2 m, and by more in a strongly absorbing end; "
         f"{advice} for {reach:g} m behind them"
     )
 
