@@ -13,7 +13,7 @@ from turnout.errors import ReadError
 from turnout.readers.attached_units import name_and_unit, names_and_units_in
 from turnout.readers.channel_descriptions import describing_entries, exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
-from turnout.readers.column_forms import counts_samples
+from turnout.readers.column_forms import HEAD_SIZE, counts_samples, rises_evenly
 from turnout.readers.entries import UnreadObject
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_vocabulary import is_rate_name
@@ -21,7 +21,7 @@ from turnout.readers.source import RawRecord, Source
 from turnout.readers.stated_quantities import quantity_entries
 from turnout.readers.stated_sensitivities import states_sensitivity
 from turnout.readers.stated_units import key_of_units
-from turnout.readers.time_axes import is_axis_name, is_dated_axis, is_unit_of_no_time
+from turnout.readers.time_axes import is_axis_name, is_unit_of_no_time
 from turnout.records import Channel, RawChannel
 from turnout.units import IGNORED
 
@@ -202,11 +202,12 @@ def index_of(
 
 
 def _needs_no_name(record: RawRecord, i: int) -> bool:
-    """Whether the form of a column shows that it is no channel: no number at all, a count of the samples, or a time."""
+    """Whether the form of a column shows that it is no channel: without a number, a count of the samples, or an even rise."""
     column, unit = record.samples[i], record.units[i]
     is_empty = isinstance(column, np.ndarray) and column.dtype.kind == "f" and bool(np.isnan(column).all())
-    is_axis = not is_unit_of_no_time(unit) and (counts_samples(column) or is_dated_axis(column, record.names[i]))
-    return is_empty or is_axis
+    if is_empty or column.dtype.kind not in "fiu" or is_unit_of_no_time(unit):
+        return is_empty
+    return counts_samples(column) or rises_evenly(column[:HEAD_SIZE])
 
 
 def _key_of_name(name: str) -> str:

@@ -6,7 +6,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from turnout.readers.column_forms import HEAD_SIZE, MIN_AXIS_SIZE, counts_in_disorder, is_on_line, rises_evenly
+from turnout.readers.column_forms import (
+    HEAD_SIZE,
+    MIN_AXIS_SIZE,
+    counts_in_disorder,
+    is_count_or_time,
+    is_on_line,
+    rises_evenly,
+)
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
 from turnout.readers.precision import EXACT_PRECISION, around
@@ -125,15 +132,20 @@ def time_statements(
     axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
     axes += _columns(record, measured, checked)
     for place, time, is_in_seconds, certainty in sorted(axes, key=lambda axis: axis[3] != CERTAIN):
-        if len(time) > 2 and not (is_proven and certainty == POSSIBLY):
+        if len(time) <= 2:
+            continue
+        is_needed = certainty == CERTAIN or not is_proven
+        if not is_needed and not is_count_or_time(time):
+            continue
+        if is_needed:
             check_time(
                 np.asarray(time, dtype=float), where if place == "its time column" else f"{where}, {place}", source
             )
-            rate, tolerance, _ = rate_of_time(time)
+        rate, tolerance, _ = rate_of_time(time)
+        starts.append((place, float(time[0]), rate, len(time)))
+        if is_needed:
             statements.append(time_statement(place, rate, tolerance, is_in_seconds, certainty))
-            if certainty == CERTAIN:
-                starts.append((place, float(time[0]), rate, len(time)))
-                is_proven = is_proven or _is_rate(statements[-1], promised)
+            is_proven = is_proven or _is_rate(statements[-1], promised)
     _check_same_start(starts, where, source)
     _check_counters(record, measured, checked, is_proven, where, source)
     return statements + statements_of(_constant_columns(record, measured))
