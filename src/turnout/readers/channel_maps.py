@@ -202,7 +202,7 @@ def index_of(
 
 
 def _needs_no_name(record: RawRecord, i: int) -> bool:
-    """Whether the form of a column shows that it is no channel: without a number, a count of the samples, or an even rise."""
+    """Whether the form of a column shows that it is no channel: no number in it, a count, or an even rise."""
     column, unit = record.samples[i], record.units[i]
     is_empty = isinstance(column, np.ndarray) and column.dtype.kind == "f" and bool(np.isnan(column).all())
     if is_empty or column.dtype.kind not in "fiu" or is_unit_of_no_time(unit):

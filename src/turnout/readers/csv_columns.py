@@ -19,6 +19,7 @@ from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.time_numbers import SINCE
+from turnout.readers.unit_names import is_unit_name
 from turnout.units import conversion, in_latin
 
 
@@ -112,9 +113,10 @@ def _plain_unit(unit: str) -> str:
 def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """Find the line of names and the line of units among the lines above the numbers.
 
-    The names are in the line above the units. In the last line, and directly below names of which one is a time, half
-    of the cells have to be units; in others all. Without a line of units they are in the last line that names a time or
-    has units in brackets, because comments may follow. Else they are in the last line.
+    The names are in the line above the units, or in the one below them if only that can hold names. In the last line,
+    and directly below names of which one is a time, half of the cells have to be units; in others all, or all behind a
+    label such as "Unit". The names of a labelled line may stand further up. Without a line of units they are in the
+    last line that names a time or has units in brackets, because comments may follow. Else they are in the last line.
 
     Parameters
     ----------
@@ -132,12 +134,32 @@ def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     (1, 2)
     >>> names_among([["Messung", "Gleis 3"], ["Rail", "Kraft"]])
     (1, None)
+    >>> names_among([["s", "kN"], ["Zeit", "Kraft"]]), names_among([["Unit", "g", "N"], ["Name", "Rail", "Kraft"]])
+    ((1, 0), (1, 0))
     """
     last = len(lines) - 1
-    for i in range(last, 0, -1):
-        if _are_units(lines[i], 0.5 if i == last or are_names(lines[i - 1]) else 1.0):
-            return i - 1, i
+    for i in range(last, -1, -1):
+        is_labelled = is_unit_name(lines[i][0]) and any(lines[i][1:]) and _are_units(lines[i][1:], 1.0)
+        names = _names_of_units(lines, i, is_labelled)
+        share = 0.5 if i and (i == last or are_names(lines[i - 1])) else 1.0
+        if names is not None and (is_labelled or _are_units(lines[i], share)):
+            return names, i
     return next((i for i in range(last, -1, -1) if are_names(lines[i])), last), None
+
+
+def _names_of_units(lines: Sequence[Sequence[str]], i: int, is_labelled: bool) -> int | None:
+    """Number of the line of names if line ``i`` holds units; None if no other line can hold names."""
+    below = range(i + 1, len(lines) if is_labelled else min(i + 2, len(lines)))
+    named = [k for k in below if are_names(lines[k])]
+    if named and (is_labelled or not i or not are_names(lines[i - 1])):
+        return named[-1]
+    if not is_labelled:
+        return i - 1 if i else next((k for k in below if not _begins_with_digit(lines[k])), None)
+    return next((k for k in (*reversed(range(i)), *below) if not _begins_with_digit(lines[k])), None)
+
+
+def _begins_with_digit(cells: Sequence[str]) -> bool:
+    return any(cell[:1].isdigit() for cell in cells)
 
 
 def _are_units(cells: Sequence[str], share: float) -> bool:
@@ -177,7 +199,7 @@ def are_names(cells: Sequence[str]) -> bool:
     >>> are_names(["time", "force"]), are_names(["Force [N]", "x"]), are_names(["Messung", "Gleis 3"])
     (True, True, False)
     """
-    if any(cell[:1].isdigit() for cell in cells):
+    if _begins_with_digit(cells):
         return False
     in_brackets = [unit for name, unit in map(name_and_unit, cells) if name]
     if any(cell.lower() in TIME_WORDS for cell in cells) or any(unit and _is_unit(unit) for unit in in_brackets):
@@ -218,6 +240,8 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         Names, "0", "1" ... if no line has them, and units, "" if not stated; further names that are none of a comment.
     """
     count, open_end = len(cells), not cells[-1]
+    if any(len(line) == count + 1 and is_unit_name(line[0]) for line in lines):  # labels, and none before the rows
+        lines = [line[1:] if len(line) == count + 1 else line for line in lines]
     whole_lines = [line for line in lines if any(line) and len(line) >= count - open_end]
     lines = [(line + [""] * open_end)[:count] for line in whole_lines]
     if not lines:
@@ -231,6 +255,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         written = [lower if _is_name_below(upper, lower) else upper for upper, lower in pairs_of_cells]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
     below = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
+    below[0] = "" if is_unit_name(below[0]) else below[0]  # a label
     pairs = names_and_units_in(written)
     names = [name for name, _ in pairs]
     units = [unit if unit or name != cell else other for (name, unit), cell, other in zip(pairs, written, below)]

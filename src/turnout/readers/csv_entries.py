@@ -141,7 +141,8 @@ def entries_of_lines(
         elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
             entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
-        is_settled = any(is_rate_name(entry.name) or subject_of(entry.name) == STRONG for entry in entries)
+        is_list = any(isinstance(entry.value, list) for entry in entries)
+        is_settled = is_list or any(is_rate_name(e.name) or subject_of(e.name) == STRONG for e in entries)
         if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
 

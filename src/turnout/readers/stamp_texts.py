@@ -24,6 +24,9 @@ DAYS_ALONE = {
     MONTH_AND_DAY: re.compile(r" *([^\W\d_]{3,9})\.?[- ](\d{1,2}),? (\d{4}) *"),
 }
 DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[.,Z+-]|$)")
+# A time since the start with its unit, as MATLAB writes those of a timetable: "5e-05 sec".
+WITH_UNIT = re.compile(r" *(\d{1,12}(?:[.,]\d{1,20})?(?:[eE][+-]?\d{1,2})?) ?(h|hr|min|s|sec|ms|[µ\u03bcu]s|ns) *")
+SECONDS = {"h": 3600, "hr": 3600, "min": 60, "s": 1, "sec": 1, "ms": 1e-3, "ns": 1e-9}  # of µs in any letters: 1e-6
 DURATION = re.compile(r" *P(?:(\d{1,5})D)?T(?:(\d{1,6})H)?(?:(\d{1,8})M)?(?:(\d{1,10})([.,]\d{1,12})?S)? *")
 # A fraction behind a colon has as many digits as ms, µs or ns; two would be frames of a film.
 FRACTION = re.compile(r"(\d{1,2}:\d{2}:\d{2}):(\d{9}|\d{6}|\d{3})(?:[.,](\d{3}|\d{6}))?(?!\d)")
@@ -122,12 +125,19 @@ def plain_stamp(text: str) -> str:
     ('2026-11-28T07:28:14.5', '2026-11-28T07:28:14.000050')
     >>> plain_stamp("PT90.5S"), plain_stamp("13.05.2026 10:00:00,5")
     ('0 days 00:01:30.5', '13.05.2026 10:00:00,5')
+    >>> plain_stamp("5e-05 sec"), plain_stamp("1.5 hr")
+    ('0 days 00:00:00.000050000000', '0 days 01:30:00.000000000000')
     """
     if text.lstrip()[:1] == "P" and (match := DURATION.fullmatch(text)) and any(match.groups()):
         days, hours, minutes, seconds = (int(number or 0) for number in match.groups()[:4])
         minutes, seconds = minutes + seconds // 60, seconds % 60
         hours, minutes = hours + minutes // 60, minutes % 60
         return f"{days + hours // 24} days {hours % 24:02}:{minutes:02}:{seconds:02}{match[5] or ''}"
+    if text.rstrip()[-1:] in "cshnr" and (match := WITH_UNIT.fullmatch(text)):
+        seconds = float(match[1].replace(",", ".")) * SECONDS.get(match[2], 1e-6)
+        minutes, second = divmod(round(seconds, 12), 60.0)
+        hours, minute = divmod(int(minutes), 60)
+        return f"{hours // 24} days {hours % 24:02}:{minute:02}:{second:015.12f}"
     text = YEAR_MONTH_DAY.sub(_with_dashes, with_western_marks(ZONE_NAME.sub("", text)))
     text = FRACTION.sub(lambda match: f"{match[1]}.{match[2]}{match[3] or ''}", text)
     if match := DIGITS_ALONE.match(text):

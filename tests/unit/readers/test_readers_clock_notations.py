@@ -154,3 +154,18 @@ TEXTS = {  # first text, last text, seconds between them
 def test_times_of_equal_and_of_mixed_forms_are_read_in_the_same_way(first, last, seconds):
     for texts in ([first, last], [first, last, f"{last} "]):  # the blank gives it another form
         assert seconds_of_clock(texts)[1] == pytest.approx(seconds, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale"), [("sec", 1.0), ("s", 1.0), ("ms", 1e3), ("µs", 1e6), ("min", 1 / 60), ("hr", 1 / 3600)]
+)
+def test_a_time_with_its_unit_in_each_cell_is_a_duration(unit, scale, tmp_path):
+    """As MATLAB writes those of a timetable."""
+    samples = np.random.default_rng(1).normal(size=200).round(4)
+    rows = "".join(f"{k / 2e4 * scale:.13g} {unit},{x}\n" for k, x in enumerate(samples))
+    (tmp_path / "a.csv").write_text("Time,rail\n" + rows, "utf-8")
+    channels = (RawChannel("rail", "rail", "acceleration", "m/s²"),)
+    (recording,) = read("a.csv", tmp_path, RawDescription(channels, rate=2e4, kind="passage")).recordings
+    np.testing.assert_array_equal(recording.samples, [samples])
+    (error,) = read("a.csv", tmp_path, RawDescription(channels, rate=1e4, kind="passage")).errors
+    assert error.reason == "wrong_rate"
