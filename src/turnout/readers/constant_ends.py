@@ -1,4 +1,4 @@
-"""Rows at the end or the beginning of a record that repeat one value on all channels: a logger filled its last block.
+"""Ends of a record that repeat one value: on all channels, where a logger filled its last block, or on one of them.
 
 A signal may be exactly 0 in digital silence. The samples beside the rows decide: noise of several steps of the
 converter does not stop by itself, and a vibration that dies away below one step stops gradually.
@@ -59,6 +59,32 @@ def measured_span(columns: Sequence[Column]) -> tuple[int, int]:
     if not is_padded or _is_overload(columns, 0):
         first = 0
     return first, stop
+
+
+def silent_ends(column: Column, first: int, stop: int) -> tuple[int, int]:
+    """Numbers of samples at both ends of a channel that repeat one value beside noise, while other channels go on.
+
+    Parameters
+    ----------
+    column : (n_sample,) array or LazyColumn
+        Samples of a channel that measures vibration, as they are in the file.
+    first, stop : int
+        As ``measured_span`` returns them for all channels of the record.
+
+    Returns
+    -------
+    tuple of (int, int)
+        0 for an end with fewer than ``MIN_ROWS`` of them.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).normal(size=1000)
+    >>> silent_ends(np.r_[noise, np.zeros(300)], 0, 1300), silent_ends(noise, 0, 1000)
+    ((0, 300), (0, 0))
+    """
+    own_first, own_stop = measured_span([column])
+    n_first, n_last = own_first - first, stop - own_stop
+    return n_first if n_first >= MIN_ROWS else 0, n_last if n_last >= MIN_ROWS else 0
 
 
 def _rows(columns: Sequence[Column], start: int, stop: int) -> np.ndarray:

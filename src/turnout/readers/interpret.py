@@ -18,7 +18,7 @@ from turnout.readers.channel_delays import DELAY_REMEDY, delay_problem
 from turnout.readers.channel_maps import Assignments, ChannelMapping
 from turnout.readers.channel_starts import different_starts
 from turnout.readers.channel_units import undecided_error
-from turnout.readers.constant_ends import measured_span
+from turnout.readers.constant_ends import measured_span, silent_ends
 from turnout.readers.entry_check import EntryCheck
 from turnout.readers.lost_entries import lost_entry_errors, usable_conditions
 from turnout.readers.packing import fill_values
@@ -45,6 +45,7 @@ from turnout.records import LongRecording, RawDescription, Recording
 REMARKS = ("rate_ambiguous", "entry_unknown")  # once for all records of a file
 SHARED_START_REMEDY = "Start all channels by one trigger, or export them cut to the stretch that they share"
 PADDING_REMEDY = "If the logger fills its blocks, export the measured samples alone; else check cables and power"
+SILENCE_REMEDY = "Check the cable and the power of the sensor, and for how long the logger records this channel"
 VALID_REMEDY = "Export the measured samples alone; if the entry means something else, name it in 'checked_entries'"
 
 
@@ -252,6 +253,7 @@ class _Conversion:
         vibrations = [record.samples[m.index] for m in channel_maps if m.channel.quantity != "temperature"]
         first, stop = measured_span(vibrations) if vibrations else (0, n_sample)
         of_marks += _end_remarks(n_sample, first, stop, where, source)
+        of_marks += _silence_remarks(record, channel_maps, first, stop, where, source)
         n_sample = stop - first
         started_at = started_at + timedelta(seconds=first / rate) if started_at else None
         block_reader = BlockReader(record, channel_maps, where, source, source.state(), first)
@@ -292,6 +294,18 @@ def _end_remarks(n_row: int, first: int, stop: int, where: str, source: Source) 
         if n:
             problem = f"its {end} {n} of {n_row} samples repeat one value on all channels, beside noise: no measurement"
             yield source.error(where, f"{problem}. They are left out", PADDING_REMEDY, reason="entry_unknown")
+
+
+def _silence_remarks(
+    record: RawRecord, channel_maps: Sequence[ChannelMapping], first: int, stop: int, where: str, source: Source
+) -> Iterator[ReadError]:
+    """Remarks on accelerations that repeat one value at an end; a force may be 0 there by the window of an analyser."""
+    for mapping in channel_maps:
+        if mapping.channel.quantity == "acceleration":
+            for n, end in zip(silent_ends(record.samples[mapping.index], first, stop), ("first", "last")):
+                problem = f"its {end} {n} of {stop - first} samples repeat one value, beside noise: it measured nothing"
+                place = f"{where}, channel {mapping.channel.name!r}"
+                yield from [source.error(place, problem, SILENCE_REMEDY, reason="entry_unknown")] if n else []
 
 
 def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, source: Source) -> Iterator[ReadError]:

@@ -1,4 +1,4 @@
-"""Channels with the same noise but for a factor: copies of one signal in other units, or raw beside scaled values."""
+"""Channels with the same noise but for a factor and an offset: one signal in other units or with another zero."""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,11 +9,10 @@ from turnout.readers.repeated_blocks import MIN_BLOCK, is_noisy
 N_COMPARED = 4096  # samples at the beginning
 N_PARTS = 16  # of a signal
 MIN_CHANGING_SHARE = 0.25  # of the samples of each part differ from the one before
-MAX_OFFSET = 0.01  # between the two, in standard deviations: units of vibration have the same zero
 
 
 def scaled_copies(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, int, float]]:
-    r"""Pairs of signals of which one is the other times a factor, but for the rounding.
+    r"""Pairs of signals of which one is the other times a factor, but for the rounding and an offset.
 
     They rise and fall at the same samples, or at all of them the other way round. The noise of two sensors agrees in
     this by chance at one of two samples.
@@ -46,10 +45,8 @@ def scaled_copies(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, int, flo
     are_alike = np.triu((np.abs(difference) == n_both) & (n_both >= MIN_BLOCK), k=1)
     for i, j in np.argwhere(are_alike).tolist():
         if all(is_noisy(heads[k][None]) and _is_never_silent(signs[k]) for k in (i, j)):
-            (x, mean_x), (y, mean_y) = ((heads[k] - heads[k].mean(), heads[k].mean()) for k in (i, j))
-            factor = float(x @ y / (x @ x))
-            if abs(mean_y - factor * mean_x) <= MAX_OFFSET * np.std(y):
-                yield i, j, factor
+            x, y = heads[i] - heads[i].mean(), heads[j] - heads[j].mean()
+            yield i, j, float(x @ y / (x @ x))
 
 
 def _is_never_silent(signs: np.ndarray) -> bool:

@@ -121,3 +121,24 @@ def test_a_passage_that_ends_in_an_overload_is_kept(tmp_path):
     np.savez(tmp_path / "a.npz", rail=rail, fs=float(RATE))
     result = read("a.npz", tmp_path, RawDescription(CHANNELS[1:], rate=float(RATE), kind="passage"))
     np.testing.assert_array_equal(result.recordings[0].signal("rail"), rail)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.mat", "a.h5", "a.tdms", "a.parquet"])
+@pytest.mark.parametrize("value", [0.0, RAIL[-2], -0.125])
+def test_an_acceleration_that_falls_silent_beside_others_is_reported(name, value, tmp_path):
+    for n_first, n_last in ((0, 300), (100, 0), (100, 300)):
+        rail = RAIL.copy()
+        rail[:n_first], rail[N - n_last :] = value, value
+        write(name, tmp_path, FORCE, rail)
+        result = read(name, tmp_path, RawDescription(CHANNELS, rate=float(RATE)))
+        np.testing.assert_allclose(result.recordings[0].samples, [FORCE, rail], rtol=1e-12)
+        ends = [f"its {end} {n} of {N} samples" for end, n in (("first", n_first), ("last", n_last)) if n]
+        assert [error.problem.partition(" repeat")[0] for error in result.errors] == ends
+        assert all("channel 'rail'" in str(error) for error in result.errors)
+
+
+def test_a_force_in_the_window_of_an_analyser_is_not_reported(tmp_path):
+    force = np.where(np.arange(N) < 340, FORCE, 0.0)
+    samples, remarks = read_npz(tmp_path, [force, RAIL])
+    np.testing.assert_array_equal(samples, [force, RAIL])
+    assert not remarks

@@ -46,7 +46,9 @@ def test_nothing_says_which_of_raw_and_scaled_values_under_one_unit_is_right(tmp
 
 
 @pytest.mark.parametrize("kind", ["hammer", "passage"])
-@pytest.mark.parametrize(("copy", "unit"), [(RAIL, "m/s²"), (-RAIL, "m/s²"), ((RAIL / GRAVITY).round(4), "g")])
+@pytest.mark.parametrize(
+    ("copy", "unit"), [(RAIL, "m/s²"), (-RAIL, "m/s²"), ((RAIL / GRAVITY).round(4), "g"), (RAIL + 9.8, "m/s²")]
+)
 def test_a_channel_that_is_another_one_in_other_units_is_left_out(copy, unit, kind, tmp_path):
     np.savez(tmp_path / "a.npz", force=FORCE, rail=RAIL, sleeper=copy, fs=5000.0)
     channels = (
