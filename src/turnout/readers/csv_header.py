@@ -183,10 +183,12 @@ def _note_of(line: str, separator: str, n_cells: int) -> tuple[str, float | str]
         value = re.sub(r"\D", "", grouped[0])
     if not (is_comment or is_note or is_rate):
         return None
+    mark = match[0][match.end(2 if match[2] else 1) : match.start(3)]
+    is_list = n_cells > 2 and set(mark.strip(" ")) == {separator}
     if _states_scale(name_with_unit, value):
-        mark = match[0][match.end(2 if match[2] else 1) : match.start(3)]
-        is_list = n_cells > 2 and set(mark.strip(" ")) == {separator}
         return name_with_unit, value.replace(separator, ";") if is_list else value  # its commas are no decimal marks
+    if plain_name in TIMES_OF_START and is_list and len(values := set(value.split(separator))) == 1:
+        return plain_name, values.pop()
     if plain_name in TIMES_OF_START and len(re.findall(r"\d+", value)) > 1 and not is_number(value):
         return plain_name, value  # "13 May 2026 10:00" is no number with a unit
     if plain_name in CONDITION_QUANTITIES:

@@ -24,6 +24,15 @@ DAYS_ALONE = {
     MONTH_AND_DAY: re.compile(r" *([^\W\d_]{3,9})\.?[- ](\d{1,2}),? (\d{4}) *"),
 }
 DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[.,Z+-]|$)")
+# A time of day without colons behind a date, "2026-05-13 0820Z", and all in one word as armed forces write it.
+COMPACT_CLOCK = re.compile(
+    r"(?<=\d)([T ,_]+)([01]\d|2[0-3])([0-5]\d)([0-5]\d)?(?=(?:[.,]\d+)?(?: ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2}))? ?h?r?s?$)"
+)
+DATE_AHEAD = re.compile(
+    r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}(?:[-/.]\d{1,2}[-/.]|\.?[- ]?[^\W\d_]{3,9}\.?[-, ]*)\d{4})(?=[T ,_])"
+)
+DATE_TIME_GROUP = re.compile(r"(\d{2}) ?(\d{2})(\d{2}) ?([A-IK-Z]) ?([A-Za-z]{3}) ?(20\d{2}|\d{2})")
+ZONE_LETTERS = {letter: k for k, letter in enumerate("YXWVUTSRQPONZABCDEFGHIKLM", start=-12)}  # h before UTC
 # A time since the start with its unit, as MATLAB writes those of a timetable: "5e-05 sec".
 WITH_UNIT = re.compile(r" *(\d{1,12}(?:[.,]\d{1,20})?(?:[eE][+-]?\d{1,2})?) ?(h|hr|min|s|sec|ms|[µ\u03bcu]s|ns) *")
 SECONDS = {"h": 3600, "hr": 3600, "min": 60, "s": 1, "sec": 1, "ms": 1e-3, "ns": 1e-9}  # of µs in any letters: 1e-6
@@ -146,6 +155,33 @@ def plain_stamp(text: str) -> str:
         if (match := alone.fullmatch(text)) and (day := _day_of(pattern, *match.groups())):
             return day.isoformat()
     return with_calendar_date(text)
+
+
+def with_colons(text: str) -> str:
+    """A time stamp with colons in its time of day: behind a date, or in a date-time group of armed forces.
+
+    Parameters
+    ----------
+    text : str
+        A value.
+
+    Returns
+    -------
+    str
+        Unchanged without such a time of day.
+
+    Examples
+    --------
+    >>> with_colons("2026-05-13 0820Z"), with_colons("13 May 2026 102030"), with_colons("131020BMAY26")
+    ('2026-05-13 08:20Z', '13 May 2026 10:20:30', '2026-05-13T10:20:00+02:00')
+    """
+    if (match := DATE_TIME_GROUP.fullmatch(text.strip())) and (month := month_of(match[5])):
+        day, hour, minute, letter = match.groups()[:4]
+        return f"20{match[6][-2:]}-{month:02}-{day}T{hour}:{minute}:00{ZONE_LETTERS[letter]:+03}:00"
+    if not (date_ahead := DATE_AHEAD.match(text)):
+        return text
+    clock = COMPACT_CLOCK.sub(lambda match: match[1] + ":".join(filter(None, match.groups()[1:])), text)
+    return clock if COMPACT_CLOCK.search(text, date_ahead.end() - 1) else text
 
 
 def with_western_marks(text: str) -> str:

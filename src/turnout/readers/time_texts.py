@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from turnout.readers.calendar_dates import dated_time
-from turnout.readers.stamp_texts import DAY_OF_YEAR, is_weekday, month_of, plain_stamp
+from turnout.readers.stamp_texts import DAY_OF_YEAR, is_weekday, month_of, plain_stamp, with_colons
 from turnout.readers.time_numbers import time_of_digits, time_of_number
 
 NUMBER_TEXT = re.compile(r"\d+(?:\.\d*)?(?:[eE]\+?\d+)?")
@@ -58,7 +58,7 @@ def looks_dated(text: str) -> bool:
     >>> [looks_dated(text) for text in ("05/13/2024 10:00 AM", "13 May 2024 10:00:00", "20240513T100000", "3.5 mm")]
     [True, True, True, False]
     """
-    text = _without_weekday(text)
+    text = with_colons(_without_weekday(text))
     is_worded = WORDED_DATE.search(text) and month_of(text) and re.search(r"\d{4}", text)
     return bool(DATED.match(text) or DAY_OF_YEAR.match(text) or is_worded or time_of_vector(text))
 
@@ -250,7 +250,7 @@ def _time_of_stamp(value: Any) -> datetime | None:
     if match := WITH_UTC.fullmatch(value.strip()):
         time = _time_of_stamp(match[1])
         return time.replace(tzinfo=UTC) if time and time.tzinfo is None else None
-    value = BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", _without_weekday(value.strip())))
+    value = BEFORE_CLOCK.sub(" ", BEHIND_CLOCK.sub("", with_colons(_without_weekday(value.strip()))))
     value = HOURS_AND_MINUTES.sub(lambda match: f"{match[1]}:{match[2]}:{match[3] or '00'}", value)
     value = plain_stamp(DOTTED_CLOCK.sub(r"\1:\2:\3", value))
     if time := dated_time(value.strip()):
