@@ -12,7 +12,7 @@ from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME, known_unit
-from turnout.units import SI
+from turnout.units import SI, in_latin
 
 TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
 # Units that say alone that a column is the time. "min" and "d" may be a minimum and a distance.
@@ -183,7 +183,7 @@ def unit_behind_mark(cell: str) -> tuple[str, str] | None:
 
 def _can_be_unit(unit: str, name: str, is_division: bool) -> bool:
     """Whether a text behind the mark is the unit of a name; the name of a quantity, as "strain", is none."""
-    plain = unit.replace("\u03bc", "µ")
+    plain = in_latin(unit).replace("\u03bc", "µ")
     if re.match(r"[^\W\d]|[°%]", plain) is None or plain.casefold() in (*MEANINGLESS_UNITS, *SI):
         return False
     if not _is_of_time(plain):

@@ -18,6 +18,7 @@ from turnout.readers.csv_cells import is_number
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
+from turnout.readers.texts import readings_together
 from turnout.readers.time_numbers import SINCE
 from turnout.readers.unit_names import is_unit_name
 from turnout.units import conversion, in_latin
@@ -249,7 +250,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         names = [*names[:-1], ""] if open_end and count > 1 else names
         return Columns(names, [""] * count, [], [(name,) for name in names], {})
     name_line, unit_line = names_among(lines)
-    written = lines[name_line]
+    written = _in_known_encoding(lines[name_line])
     if unit_line is not None:  # it may hold a name with its unit below an empty cell or the label of the line of names
         pairs_of_cells = zip(written, lines[unit_line])
         written = [lower if _is_name_below(upper, lower) else upper for upper, lower in pairs_of_cells]
@@ -266,6 +267,15 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     }
     others = [line for i, line in enumerate(lines) if i not in (name_line, unit_line) and not any(map(is_number, line))]
     return Columns(names, units, further, [*zip(written, *others)], conflicts)
+
+
+def _in_known_encoding(cells: list[str]) -> list[str]:
+    """Cells of the line of names in the only encoding in which the most names have a unit behind a mark: "Сила, Н"."""
+    if have_most_a_unit(cells):
+        return cells
+    readings = [reading for reading in readings_together(cells) if have_most_a_unit(reading)]
+    counts = [sum(unit_behind_mark(cell) is not None for cell in reading) for reading in readings]
+    return list(readings[counts.index(max(counts))]) if readings and counts.count(max(counts)) == 1 else cells
 
 
 def _is_name_below(upper: str, lower: str) -> bool:

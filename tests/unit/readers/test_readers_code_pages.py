@@ -32,6 +32,24 @@ def test_units_and_names_are_read_in_the_encoding_in_which_they_are_known(encodi
     assert result.errors == ()
 
 
+@pytest.mark.parametrize("encoding", ["cp1251", "cp866", "koi8_r", "utf-8", "utf-16"])
+@pytest.mark.parametrize(
+    "head", ["Время, мс;Сила, кН;Рельс, м/с2", "Время, мкс;Сила, Н;Рельс, g", "Сила, Н;Рельс, мм/с2"]
+)
+def test_units_behind_a_comma_are_read_in_the_encoding_in_which_they_are_known(encoding, head, tmp_path):
+    channels = (RawChannel("force", "Сила", "force"), RawChannel("rail", "Рельс", "acceleration"))
+    rows = (
+        ROWS
+        if "мкс" in head
+        else "".join(f"{k / 5:.1f};{row.partition(';')[2]}\n" for k, row in enumerate(ROWS.split()))
+    )
+    rows = rows if "Время" in head else "".join(row.partition(";")[2] + "\n" for row in ROWS.split())
+    (tmp_path / "a.csv").write_bytes(f"{head}\n{rows}".encode(encoding))
+    result = read("a.csv", tmp_path, RawDescription(channels, rate=5000.0))
+    scales = [1e3 if "кН" in head else 1.0, 9.80665 if "g" in head else 1e-3 if "мм" in head else 1.0]
+    np.testing.assert_allclose(result.recordings[0].samples, [FORCE * scales[0], RAIL * scales[1]], rtol=1e-12)
+
+
 def test_a_unit_that_no_encoding_explains_names_the_way_out(tmp_path):
     channels = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration"))
     result = read_table(tmp_path, "t [us];force;rail [m/sþ]", "cp1252", channels)
