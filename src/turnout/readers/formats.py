@@ -11,7 +11,7 @@ from turnout.readers.condition_units import with_converted_conditions
 from turnout.readers.declared_sizes import check_declared_sizes
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.source import RawFile, RawRecord, Source
-from turnout.readers.split_starts import with_stated_starts
+from turnout.readers.split_starts import with_starts_of_records, with_stated_starts
 from turnout.readers.start_columns import with_axis_start
 from turnout.readers.stated_ends import with_stated_duration
 from turnout.readers.stated_scales import with_named_factors
@@ -66,7 +66,7 @@ class Format:
             for r in raw.records
         )
         records = tuple(with_converted_conditions(r) if isinstance(r, RawRecord) else r for r in records)
-        records = with_stated_starts(records)
+        records = with_stated_starts(with_starts_of_records(records))
         records = tuple(with_stated_zone(with_axis_start(r)) if isinstance(r, RawRecord) else r for r in records)
         records = with_unread_starts(records)
         if len(records) == 1:

@@ -49,10 +49,9 @@ def with_joined_labels(data: bytes) -> bytes:
     lines: list[bytes] = []
     names = b""
     position = len(data) - len(data.removeprefix(b"\xef\xbb\xbf"))
-    while label := LABEL.match(data, position):
+    while (label := LABEL.match(data, position)) and (end := data.find(b"\n", label.end()) + 1):
         if DATA.fullmatch(label[1]):
-            return b"".join((*lines, names, data[label.end() :])) if names else data
-        end = data.find(b"\n", label.end()) + 1
+            return b"".join((*lines, names, data[label.end() :]))
         values = data[label.end() : end]
         is_of_names = bool(NAMES.fullmatch(label[1]))
         lines += [b"\n", b"\n" if is_of_names else label[1] + b"\t" + values]

@@ -73,6 +73,39 @@ def with_stated_starts(records: Sequence[RawRecord | ReadError]) -> tuple[RawRec
     )
 
 
+def with_starts_of_records(records: Sequence[RawRecord | ReadError]) -> tuple[RawRecord | ReadError, ...]:
+    """The records, each with its own one of the starts that an entry lists for all records of the file.
+
+    Parameters
+    ----------
+    records : sequence of RawRecord or ReadError
+        The records as their reader returns them.
+
+    Returns
+    -------
+    tuple of (RawRecord or ReadError)
+        Unchanged for a single record, and where no entry under the name of a start lists as many times as records.
+    """
+    n = len(records)
+    of_intact = [{_key(e) for e in r.entries if is_start_name(e.name)} for r in records if isinstance(r, RawRecord)]
+    shared = set.intersection(*of_intact) if n > 1 and of_intact else set()
+    if not shared:
+        return tuple(records)
+    return tuple(
+        replace(r, entries=tuple(_of_record(e, k, n) if _key(e) in shared else e for e in r.entries))
+        if isinstance(r, RawRecord)
+        else r
+        for k, r in enumerate(records)
+    )
+
+
+def _of_record(entry: Entry, k: int, n: int) -> Entry:
+    """An entry with the value of record ``k`` of ``n`` if it lists one for each; a date vector is a single one."""
+    value = entry.value.ravel().tolist() if isinstance(entry.value, np.ndarray) else entry.value
+    is_list = isinstance(value, (list, tuple)) and len(value) == n and time_of_vector(value) is None
+    return replace(entry, value=value[k]) if is_list else entry
+
+
 def _has_set_start(record: RawRecord) -> bool:
     """Whether a record has a start of a clock that was set."""
     return record.started_at is not None and not is_unset(record.started_at)

@@ -194,6 +194,7 @@ def times_of_entry(entry: Entry) -> Iterator[tuple[str, datetime | None]]:
         None for a time that cannot be read.
     """
     value, declared = entry.value, entry.name
+    value = value.ravel().tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "OU" else value
     if isinstance(value, (datetime, np.datetime64)):
         yield str(value), parse_time(value)
     elif time := time_of_vector(value):

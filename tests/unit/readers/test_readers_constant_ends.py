@@ -109,15 +109,19 @@ SLOW = 100.0 * np.sin(0.05 * np.arange(N) + 0.3)
         [np.r_[FORCE[300:310], np.zeros(N - 10)], FAST],
         [np.r_[np.zeros(300), FORCE[300:310], np.zeros(N - 10)], np.r_[np.zeros(300), RINGING]],
         [np.r_[FORCE[300:310], np.zeros(N + 290)], np.r_[SLOW, np.zeros(300)]],
+        [np.r_[np.zeros(300), x[:280], np.zeros(300), x[280:]] for x in (FORCE, RAIL)],
+        [np.r_[x[:100], np.zeros(N)] for x in (FORCE, RAIL)],
     ],
-    ids=["few", "one_channel", "coarse", "silence", "decay", "fast", "computed", "slow"],
+    ids=["few", "one_channel", "coarse", "silence", "decay", "fast", "computed", "slow", "gaps", "short"],
 )
 def test_samples_that_may_be_measured_are_kept(samples, tmp_path):
     np.testing.assert_array_equal(read_npz(tmp_path, samples)[0], samples)
 
 
-def test_a_passage_that_ends_in_an_overload_is_kept(tmp_path):
-    rail = np.r_[RAIL, np.full(300, RAIL.max() + 1.0)]
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_passage_that_ends_or_begins_in_an_overload_is_kept(order, tmp_path):
+    noise = RAIL if order > 0 else RAIL[:301]
+    rail = np.r_[noise, np.full(300, RAIL.max() + 1.0)][::order]
     np.savez(tmp_path / "a.npz", rail=rail, fs=float(RATE))
     result = read("a.npz", tmp_path, RawDescription(CHANNELS[1:], rate=float(RATE), kind="passage"))
     np.testing.assert_array_equal(result.recordings[0].signal("rail"), rail)

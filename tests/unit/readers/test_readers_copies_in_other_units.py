@@ -5,6 +5,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from turnout.readers import read
+from turnout.readers.scaled_copies import scaled_copies
 from turnout.records import RawChannel, RawDescription
 
 CHANNELS = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
@@ -78,3 +79,20 @@ def test_one_factor_of_all_channels_is_the_strength_of_a_computed_impact(rail_fa
     write_tdms(tmp_path, (FORCE, "N", RAIL, "m/s²"), (FORCE * 5.0, "N", RAIL * rail_factor, "m/s²"))
     recordings, errors = reasons(tmp_path, "a.tdms")
     assert recordings == ([0, 1] if are_used else []) and bool(errors) is not are_used
+
+
+def test_computed_channels_of_one_shape_with_silence_before_the_impact_are_no_copies(tmp_path):
+    t = np.arange(700)
+    decay = np.r_[np.zeros(100), 50.0 * np.exp(-t / 90.0) * np.sin(2.4 * t)]
+    np.savez(tmp_path / "a.npz", force=np.abs(FORCE), rail=decay, sleeper=0.5 * decay, fs=5000.0)
+    channels = (
+        RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"),
+        RawChannel("sleeper", "sleeper", "acceleration", "m/s²"),
+    )  # fmt: skip
+    result = read("a.npz", tmp_path, RawDescription(channels, rate=5000.0))
+    assert len(result.recordings[0].channels) == 3 and result.errors == ()
+
+
+def test_coarse_channels_that_change_at_different_samples_are_no_copies():
+    steps = np.repeat(RNG.normal(size=(2, 400)), 2, axis=1)
+    assert list(scaled_copies([steps[0], np.roll(steps[1], 1)])) == []

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.io
 
+from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 
@@ -55,6 +56,12 @@ def test_a_head_that_contradicts_the_layout_or_itself_is_an_error(text, reason, 
     assert not result.recordings and result.errors[0].reason == reason and word in result.errors[0].problem
 
 
+@pytest.mark.parametrize("n", [16, 20, 27, 28, 40, 90])
+def test_a_head_that_was_cut_off_is_an_error(n, tmp_path):
+    with pytest.raises(ReadError):
+        read_text(tmp_path, text_of()[:n])
+
+
 def write_line(tmp_path, first, second):
     (tmp_path / "a.csv").write_text(f"Start\t{first}\t{second}\nforce\trail\n{ROWS}")
     return "a.csv"
@@ -90,7 +97,14 @@ def write_hdf5(tmp_path, first, second):
     return "a.h5"
 
 
-@pytest.mark.parametrize("writer", [write_line, write_pairs, write_comma, write_mat, write_hdf5])
+def write_list(tmp_path, first, second):
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file["force"], file["rail"] = FORCE, RAIL
+        file.attrs.update(start_times=[first, second], fs=5000.0)
+    return "b.h5"
+
+
+@pytest.mark.parametrize("writer", [write_line, write_pairs, write_comma, write_mat, write_hdf5, write_list])
 @pytest.mark.parametrize("second", ["2026-05-13 08:30:00", "2026-05-13 08:30:02"])
 def test_channels_that_began_at_different_times_are_no_record(writer, second, tmp_path):
     name = writer(tmp_path, "2026-05-13 08:30:00", second)
@@ -99,3 +113,10 @@ def test_channels_that_began_at_different_times_are_no_record(writer, second, tm
         assert str(result.recordings[0].started_at)[:19] == "2026-05-13 08:30:00" and result.errors == ()
     else:
         assert not result.recordings and "clock_drift" in [error.reason for error in result.errors]
+
+
+@pytest.mark.parametrize("writer", [write_line, write_mat, write_hdf5])
+def test_a_channel_whose_clock_was_never_set_does_not_contradict_the_others(writer, tmp_path):
+    name = writer(tmp_path, "2026-05-13 08:30:00", "1904-01-01 00:00:00")
+    result = read(name, tmp_path, RawDescription(CHANNELS, rate=5000.0))
+    assert str(result.recordings[0].started_at)[:19] == "2026-05-13 08:30:00"
