@@ -18,6 +18,7 @@ ONE_RECORD_REMEDY = (
 )
 ONE_UNIT_REMEDY = "Export one of them to a file of its own: the values in physical units, without the raw ones"
 MIN_RATIO = 3.0  # of two units, such as ft/s² and m/s²: that of daN and kgf is not told from strengths of impacts
+MAX_OFFSET = 0.01  # between two records, in standard deviations: units of vibration have the same zero
 MAX_ROUNDING = 1e-3  # relative difference of copies whose units are both right
 
 
@@ -121,14 +122,17 @@ def _factors_of_copies(recordings: Sequence[Recording]) -> dict[tuple[int, int],
     """Numbers of two records -> factor of each channel of the latter that is one of the former in other units.
 
     Computed impacts of several strengths have one shape, and one factor for all channels. Records with different starts
-    are no copies.
+    or with another zero are no copies.
     """
     factors_of_pairs: dict[tuple[int, int], dict[str, float]] = {}
     for name in sorted({channel.name for r in recordings for channel in r.channels}):
         having = [r for r in recordings if any(channel.name == name for channel in r.channels)]
-        for i, j, factor in scaled_copies([r.signal(name) for r in having]):
+        signals = [r.signal(name) for r in having]
+        for i, j, factor in scaled_copies(signals):
             starts = {having[k].started_at for k in (i, j)} - {None}
-            if len(starts) < 2 and not np.array_equal(having[i].samples, having[j].samples):
+            offset = abs(np.mean(signals[j]) - factor * np.mean(signals[i]))
+            is_copy = len(starts) < 2 and offset <= MAX_OFFSET * np.std(signals[j])
+            if is_copy and not np.array_equal(having[i].samples, having[j].samples):
                 factors_of_pairs.setdefault((having[i].record, having[j].record), {})[name] = factor
     return {pair: factors for pair, factors in factors_of_pairs.items() if _are_ratios_of_units([*factors.values()])}
 

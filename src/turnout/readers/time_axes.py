@@ -132,10 +132,8 @@ def time_statements(
     axes += [(place, time, True, CERTAIN) for place, time in record.clocks]
     axes += _columns(record, measured, checked)
     for place, time, is_in_seconds, certainty in sorted(axes, key=lambda axis: axis[3] != CERTAIN):
-        if len(time) <= 2:
-            continue
         is_needed = certainty == CERTAIN or not is_proven
-        if not is_needed and not is_count_or_time(time):
+        if len(time) <= 2 or not (is_needed or is_count_or_time(time)):
             continue
         if is_needed:
             check_time(
