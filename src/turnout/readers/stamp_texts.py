@@ -143,10 +143,9 @@ def plain_stamp(text: str) -> str:
         hours, minutes = hours + minutes // 60, minutes % 60
         return f"{days + hours // 24} days {hours % 24:02}:{minutes:02}:{seconds:02}{match[5] or ''}"
     if text.rstrip()[-1:] in "cshnr" and (match := WITH_UNIT.fullmatch(text)):
-        seconds = float(match[1].replace(",", ".")) * SECONDS.get(match[2], 1e-6)
-        minutes, second = divmod(round(seconds, 12), 60.0)
-        hours, minute = divmod(int(minutes), 60)
-        return f"{hours // 24} days {hours % 24:02}:{minute:02}:{second:015.12f}"
+        duration = round(float(match[1].replace(",", ".")) * SECONDS.get(match[2], 1e-6), 12)
+        hour, minute = divmod(int(duration // 60.0), 60)
+        return f"{hour // 24} days {hour % 24:02}:{minute:02}:{duration % 60.0:015.12f}"
     text = YEAR_MONTH_DAY.sub(_with_dashes, with_western_marks(ZONE_NAME.sub("", text)))
     text = FRACTION.sub(lambda match: f"{match[1]}.{match[2]}{match[3] or ''}", text)
     if match := DIGITS_ALONE.match(text):
