@@ -19,6 +19,7 @@ from turnout.cli.options import (
     add_figure,
     add_former,
     add_raw,
+    add_result,
     add_track,
     add_turnout,
     add_warnings,
@@ -91,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
         args.seed,
     )
     add_warnings(args, comparison.warnings)
+    add_result(args, [b.row for b in comparison.bands])
     print("\n".join(comparison_lines(comparison)))
     for path, content in ((args.figure, comparison_page), (args.csv, spectra_csv)):
         if path:
@@ -113,14 +115,15 @@ def comparison_lines(comparison: PassageComparison) -> list[str]:
     """
     lines = [comparison.train, *(f"  {note}" for note in comparison.notes)]
     lines.append(
-        "sensor       band [Hz]  rms recorded, simulated  peak recorded, simulated [m/s²]  level [dB]  fit [%]"
+        "sensor       band [Hz]  rms recorded, simulated  peak recorded, simulated [m/s²] level [dB] fit / chance [%]"
     )
     for b in comparison.bands:
-        rms = [float((x**2).mean() ** 0.5) for x in (b.recorded, b.simulated)]
-        peak = [float(abs(x).max()) for x in (b.recorded, b.simulated)]
+        r, chance = b.row, "-" if b.fit_by_chance is None else f"{b.fit_by_chance:.1f}"
         lines.append(
-            f"{b.sensor:<10}{b.low:6.0f}-{b.high:<5.0f}{rms[0]:13.2f}{rms[1]:12.2f}{peak[0]:15.1f}{peak[1]:18.1f}"
-            f"{b.level_difference:+z12.1f}{b.fit:9.1f}"
+            f"{b.sensor:<10}{b.low:6.0f}-{b.high:<5.0f}{r['rms_recorded_ms2']:13.2f}{r['rms_simulated_ms2']:12.2f}"
+            f"{r['peak_recorded_ms2']:15.1f}{r['peak_simulated_ms2']:18.1f}"
+            f"{r['level_db']:+z10.1f}{r['fit_pct']:9.1f} / {chance:>5}"
         )
     lines.append("level: power of the simulation over that of the recording")
+    lines.append("chance: 95 % of shifts of the simulation in time fit worse; a fit below it says nothing")
     return lines

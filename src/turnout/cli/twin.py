@@ -20,7 +20,7 @@ from turnout.number_text import evidence_in_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from turnout.mismatch.calibrated import Deviation, ModelAnswer, StateParameter
+    from turnout.mismatch.calibrated import Deviation, ModelAnswer, OnsetEvidence, StateParameter
     from turnout.stages.calibrated_model import CalibratedModel
 
 GROUP = "Simulate and diagnose"
@@ -89,9 +89,9 @@ def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) 
         One line.
     """
     steps = model.history.used_steps
-    n = sum(s.n_recordings for s in steps)
-    visits = count_of(len(steps), "visit")
-    yield f"{turnout_id}: {count_of(n, 'recording')} of {visits} ({len(model.computed)} fitted now)"
+    used = f"{count_of(model.n_hammer_tests, 'hammer test')} and {count_of(model.n_passages, 'passage')}"
+    fitted = f"{count_of(len(model.computed), 'visit')} fitted now"
+    yield f"{turnout_id}: {used} of {count_of(len(steps), 'visit')} used; {fitted}"
     for step in model.history.steps:
         if not step.is_used:
             i = step.innovation
@@ -136,6 +136,8 @@ def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
         yield f"{p.name:32} {position:>9} {value:11.4g} {sd:10.3g} {p.sd:10.3g} {_unit(p)}"
     if any(_unit(p) == "ln" for p, _, _ in listed):
         yield "ln: logarithm of the value divided by that of the track file; 0 is the file's value, -0.69 half of it"
+    if any(p.group == "seat" for p, _, _ in listed):
+        yield "seat: true position of a sensor less that of the layout"
     if waves:
         narrowed = sum(sd < MAX_SD_RATIO * p.sd for p, _, sd in waves)
         yield f"running surface: {narrowed} of {len(waves)} waves are determined by the recordings (--all lists them)"
@@ -145,7 +147,9 @@ def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
 
 def _unit(parameter: StateParameter | Deviation) -> str:
     """Unit of a parameter: "ln" for the logarithm of a factor on the value of the file."""
-    return "ln" if parameter.unit == "-" and parameter.group != "gain" else parameter.unit
+    from turnout.mismatch.calibrated.model_answer import stated_unit
+
+    return stated_unit(parameter.unit, parameter.group)
 
 
 def _differences(model: CalibratedModel) -> Iterator[str]:
@@ -175,8 +179,10 @@ def _effect(answer: ModelAnswer) -> str:
     """Names, parameter and size of an answer."""
     if answer.verdict == "unknown":
         return f"unknown effect at {answer.parameter}, no single effect of the catalogue explains it"
+    from turnout.mismatch.calibrated.model_answer import stated_unit
+
     assert answer.size is not None and answer.sd is not None
-    unit = "ln" if answer.unit == "-" and answer.group != "gain" else answer.unit
+    unit = stated_unit(answer.unit, answer.group)
     names = " or ".join(answer.names).replace("_", " ")
     words = f"{names}, {answer.parameter} {answer.size:+.3g} ± {answer.sd:.2g} {unit}"
     reached = answer.size
@@ -190,5 +196,16 @@ def _effect(answer: ModelAnswer) -> str:
 def _strongest(model: CalibratedModel) -> Iterator[str]:
     """The change with the largest evidence, where none is stated."""
     if model.changes and all(a.verdict == "none" for a in model.answers if a.question == "change"):
-        best = model.changes[0]
-        yield f"the most likely change is {best.effect.name}, with evidence of {evidence_in_words(best.gain)}"
+        best, n = model.changes[0], len(model.changes)
+        evidence = evidence_in_words(best.gain - math.log(n))  # all are equally probable before the data
+        yield (
+            f"the most likely of {count_of(n, 'possible change')} is {_change_in_words(best)}; "
+            f"its evidence is too little for an answer: {evidence}"
+        )
+
+
+def _change_in_words(change: OnsetEvidence) -> str:
+    """A possible change: its parameter, whether the damper changes with it, and whether it grows."""
+    parameter, _, share = change.effect.name.partition(", dampers ")
+    words = f"{parameter} with its damper" if share and float(share) else parameter
+    return f"{words}, growing" if change.effect.grows else words

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from turnout.config.events import parse_utc
+from turnout.number_text import decimal_number
+
+MIN_DISTANCE_RATIO, MIN_TIME_APART = 2.0, 5.0  # -, s: a second train or passage in time is farther by as much
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,10 @@ def _listed_train(row: Mapping[str, str]) -> ListedTrain:
 def _number(text: str | None, column: str, low: float, high: float) -> float | None:
     if not text:
         return None
-    value = float(text)
+    try:
+        value = decimal_number(text)
+    except ValueError:
+        raise ValueError(f"{column} {text!r} is not a number") from None
     if not low <= value <= high:
         raise ValueError(f"{column} {text!r} is not between {low} and {high}")
     return value
@@ -106,6 +112,40 @@ def listed_for(moment: datetime, n_axles: int, trains: Sequence[ListedTrain], to
     return listed_at(moment, [t for t in trains if t.n_axles in (None, n_axles)], tolerance)
 
 
+def is_of_one_passage(moments: Sequence[datetime], rows: Sequence[ListedTrain]) -> list[bool]:
+    """Which passages keep the row of the train data that was found for them: a row describes one train.
+
+    Where several passages have the same row, the nearest in time keeps it, unless a second is nearly as near.
+
+    Parameters
+    ----------
+    moments : sequence of datetime
+        Time of each passage, naive UTC.
+    rows : sequence of ListedTrain
+        Row of each passage.
+
+    Returns
+    -------
+    list of bool
+        One per passage.
+
+    Examples
+    --------
+    >>> row = ListedTrain(datetime(2024, 5, 13, 10))
+    >>> is_of_one_passage([datetime(2024, 5, 13, 10, 0, 2), datetime(2024, 5, 13, 10, 1)], [row, row])
+    [True, False]
+    """
+    distances = [abs((row.passed_at - moment).total_seconds()) for moment, row in zip(moments, rows, strict=True)]
+    return [
+        all(
+            distances[other] >= MIN_DISTANCE_RATIO * distance + MIN_TIME_APART
+            for other, other_row in enumerate(rows)
+            if other_row is row and other != k
+        )
+        for k, (distance, row) in enumerate(zip(distances, rows))
+    ]
+
+
 def listed_at(moment: datetime, trains: Sequence[ListedTrain], tolerance: float) -> ListedTrain | None:
     """The listed train nearest in time to ``moment``, within ``tolerance`` [s], whatever its number of axles.
 
@@ -127,6 +167,6 @@ def listed_at(moment: datetime, trains: Sequence[ListedTrain], tolerance: float)
     """
     near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
     near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])
-    if not near or (len(near) > 1 and near[1][0] < 2.0 * near[0][0] + 5.0):
+    if not near or (len(near) > 1 and near[1][0] < MIN_DISTANCE_RATIO * near[0][0] + MIN_TIME_APART):
         return None
     return near[0][1]

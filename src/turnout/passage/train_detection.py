@@ -155,6 +155,7 @@ def audible_sensors(envelopes: SensorEnvelopes, is_other_track: Sequence[bool] |
 def train_track(envelopes: SensorEnvelopes, tracks: Sequence[str]) -> tuple[str, float]:
     """("main" | "diverging" | "unknown", difference): the track whose own sensors are the louder ones.
 
+    The median of the sensors of a track counts, so that the gain of one of them alone does not decide.
     ``difference`` is in nepers of power; at least twice the amplitude, 1.4 nepers, is required. With sensors of one
     track only, that track is taken if they are not much fainter than the sensors of both tracks. If they record
     nothing, the other track is taken.
@@ -174,9 +175,11 @@ def train_track(envelopes: SensorEnvelopes, tracks: Sequence[str]) -> tuple[str,
         Difference between the tracks. [nepers of power]
     """
     track_names, is_audible = np.asarray(tracks), loudness(envelopes) > 0.1
-    power = np.where(is_audible, np.log(np.maximum(envelopes.levels.loud_power, 1e-300)), -np.inf)
+    power = np.log(np.maximum(envelopes.levels.loud_power, 1e-300))
     mean = {
-        name: power[track_names == name].max() for name in ("main", "diverging", "both") if np.any(track_names == name)
+        name: float(np.median(audible)) if (audible := power[is_audible & (track_names == name)]).size else -np.inf
+        for name in ("main", "diverging", "both")
+        if np.any(track_names == name)
     }
     if "main" in mean and "diverging" in mean:
         difference = _difference(mean["main"], mean["diverging"])

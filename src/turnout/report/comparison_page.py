@@ -66,7 +66,9 @@ def spectra_csv(comparison: PassageComparison) -> str:
 def _time_chart(b: BandComparison) -> str:
     step = max(1, b.time.size // MAX_POINTS)
     reach = 1.05 * float(max(np.abs(b.recorded).max(), np.abs(b.simulated).max()))
-    title = f"{b.sensor}, {b.low:.0f}-{b.high:.0f} Hz: simulation {b.level_difference:+z.1f} dB, fit {b.fit:.0f} %"
+    by_chance = "" if b.fit_by_chance is None else f" (by chance {b.fit_by_chance:z.0f} %)"
+    level = f"simulation {b.level_difference:+z.1f} dB"
+    title = f"{b.sensor}, {b.low:.0f}-{b.high:.0f} Hz: {level}, fit {b.fit:z.0f} %{by_chance}"
     chart = Chart(
         Axis(float(b.time[0]), float(b.time[-1]), "time from the first axle [s]"),
         Axis(-reach, reach, "acceleration [m/s²]"),

@@ -25,6 +25,8 @@ from turnout.mismatch.calibrated import (
 from turnout.mismatch.calibrated.answers_against_file import INTOLERABLE
 from turnout.mismatch.calibrated.answers_of_change import surface_changes
 from turnout.mismatch.calibrated.constants import CALIBRATION
+from turnout.mismatch.calibrated.levels import IMPACTS, TRAINS, kind_of
+from turnout.mismatch.calibrated.model_answer import stated_unit
 from turnout.mismatch.calibrated.stiffness_under_load import candidates_under_load, with_evidence_under_load
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
 from turnout.mismatch.turnout.unproven_panels import reservation
@@ -64,7 +66,7 @@ class CalibratedModel:
     ``answers`` are those after the visits, the last two after the newest visit. ``held`` are visits with an open
     finding, which are not used, with their answers. ``computed`` are the visits that were fitted for this call,
     ``notes`` what could not be, and why recordings were not used or are doubted. ``reservation`` says that answers on
-    this track are not proven, "" where they are.
+    this track are not proven, "" where they are. ``n_hammer_tests`` and ``n_passages`` count those of the used visits.
     """
 
     history: History
@@ -75,6 +77,8 @@ class CalibratedModel:
     notes: tuple[str, ...]
     answers: tuple[ModelAnswer, ...] = ()
     reservation: str = ""
+    n_hammer_tests: int = 0
+    n_passages: int = 0
 
 
 def within_library(answer: ModelAnswer, without: Collection[str]) -> ModelAnswer:
@@ -197,6 +201,10 @@ def _model_of_visits(
         against_file,
         surface_changes(directions),
     )
+    used = {step.visit for step in history.used_steps}
+    n_used: Counter[str] = Counter()
+    for group in (g for v in visits_of(without_findings(stored)) if v.visit in used for g in v.groups):
+        n_used[kind_of(group.group)] += group.n_recordings
     notes: dict[str, Counter[tuple[str, str, bool]]] = {}  # all groups of a visit have those of the visit
     for s in stored:
         notes[s.visit] = notes.get(s.visit, Counter()) | Counter(s.notes)
@@ -213,6 +221,8 @@ def _model_of_visits(
         ),
         tuple(within_library(answer, without) for answer in answers),
         reservation(turnout_track),
+        n_used[IMPACTS],
+        n_used[TRAINS],
     )
 
 
@@ -236,8 +246,8 @@ def answer_rows(model: CalibratedModel) -> list[dict[str, Any]]:
             {
                 "visit": a.visit, "question": a.question, "verdict": a.verdict, "term": names[0],
                 "rival_term": names[1], "parameter": a.parameter or None, "position_m": a.position, "channel": channel,
-                "size": a.size, "size_se": a.sd, "unit": a.unit or None, "grows": a.grows, "total": a.total,
-                "total_se": a.total_sd, "onset_after": after, "onset_by": by, "gain_nats": a.gain,
+                "size": a.size, "size_se": a.sd, "unit": stated_unit(a.unit, a.group) or None, "grows": a.grows,
+                "total": a.total, "total_se": a.total_sd, "onset_after": after, "onset_by": by, "gain_nats": a.gain,
                 "reservation": model.reservation or None,
             }
         )  # fmt: skip

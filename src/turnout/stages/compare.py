@@ -22,6 +22,7 @@ from turnout.simulate.parameters import load_track, load_vehicle
 from turnout.simulate.passage import simulate_passage
 from turnout.simulate.sensor import Sensor
 from turnout.stages.calibrate import calibrate_to_files, resolve_track
+from turnout.stages.mismatch_trains import TrainUnknownError, speed_from_axles
 from turnout.stages.parameter_ranges import improbable_in_files
 from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
@@ -31,6 +32,7 @@ from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from typing import Any
 
     from turnout.config import TurnoutConfig
     from turnout.passage.result import Passage, PassageSensor
@@ -43,6 +45,7 @@ MARGIN = 0.3  # s before the first and after the last axle
 SMALLEST_RATE = 10e3  # Hz, of the simulation: 1.6 % error up to 1 kHz
 FILTER_ORDER = 4
 MAX_DELAY, DELAY_STEP = 0.03, 0.0005  # s, between the found axles and the recording
+N_SHIFTS, CHANCE_QUANTILE = 30, 0.95  # of the simulation in time, whose fits are those by chance
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,9 @@ class BandComparison:
     """One sensor in one band (``low``, ``high``) [Hz]: recorded and simulated.
 
     ``time`` (n,) [s] from the first axle, ``recorded`` and ``simulated`` (n,) [m/s²]; ``frequency`` (m,) [Hz] with the
-    power spectral densities ``recorded_density`` and ``simulated_density`` (m,) [(m/s²)²/Hz].
+    power spectral densities ``recorded_density`` and ``simulated_density`` (m,) [(m/s²)²/Hz]. ``fit_by_chance`` [%] is
+    the 95 % quantile of the fits of the same simulation shifted in time, None in a recording
+    that is too short.
     """
 
     sensor: str
@@ -62,6 +67,7 @@ class BandComparison:
     frequency: np.ndarray
     recorded_density: np.ndarray
     simulated_density: np.ndarray
+    fit_by_chance: float | None
 
     @property
     def level_difference(self) -> float:
@@ -72,6 +78,19 @@ class BandComparison:
     def fit(self) -> float:
         """Fit of the simulated time series (equation 22). [%]"""
         return fit_percent(self.recorded, self.simulated)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The comparison as numbers."""
+        (rms, peak), (simulated_rms, simulated_peak) = (
+            (float(np.sqrt(np.mean(x**2))), float(np.abs(x).max())) for x in (self.recorded, self.simulated)
+        )
+        return {
+            "sensor": self.sensor, "band_low_hz": self.low, "band_high_hz": self.high,
+            "rms_recorded_ms2": rms, "rms_simulated_ms2": simulated_rms,
+            "peak_recorded_ms2": peak, "peak_simulated_ms2": simulated_peak,
+            "level_db": self.level_difference, "fit_pct": self.fit, "fit_by_chance_pct": self.fit_by_chance,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -130,7 +149,7 @@ def compare_passage(
     Raises
     ------
     ConfigError
-        No train, an unknown type without ``vehicle``, or an unknown sensor.
+        No train, an unknown type without ``vehicle``, an unknown sensor, or axles that are not those of the vehicle.
     """
     every = load_configuration(configuration)
     turnout = with_raw(every.turnout(turnout_id), Path(raw))
@@ -139,10 +158,10 @@ def compare_passage(
     recording, passage = _recorded_train(path, turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
     vehicle = vehicle or _vehicle_of_type(passage, file)
-    train = _vehicle(vehicle, load, passage, file)
+    train, is_reversed = _vehicle(vehicle, load, passage, file)
     path = resolve_track(track, turnout_id, configuration)
     model = load_track(str(path), seed, path.parent)
-    notes = [f"track file {path}"]
+    notes = [f"track file {path}", *([f"{train.name} runs the other way round"] if is_reversed else [])]
     if calibrate:
         model = _calibrate(model, path, chosen, turnout, recording, raw, configuration, notes)
     simulated = _simulate(model, train, passage, chosen, recording.rate, seed)
@@ -189,14 +208,21 @@ def _vehicle_of_type(passage: Passage, file: str | Path) -> str:
     return passage.type.type.lower()
 
 
-def _vehicle(name: str, load: float, passage: Passage, file: str | Path) -> Vehicle:
-    """The vehicle in as many units as the axles of the train say."""
+def _vehicle(name: str, load: float, passage: Passage, file: str | Path) -> tuple[Vehicle, bool]:
+    """(vehicle in as many units and in the order that the axles of the train say, whether it is reversed)."""
     one = load_vehicle(name, load)
     units, rest = divmod(passage.n_axle, len(one.wheels))
     if rest or not units:
         observation = f"{passage.n_axle} axles were recorded, the vehicle {name} has {len(one.wheels)}"
         raise ConfigError(str(file), "train", observation, "Name the right vehicle file with --vehicle")
-    return one if units == 1 else load_vehicle(name, load, units=units)
+    vehicle, motion = one if units == 1 else load_vehicle(name, load, units=units), passage.train_motion
+    speed_se = None if passage.speed is None else KMH * passage.speed.se
+    row = {"axle_times_s": passage.offsets / motion.speed, "speed_se_kmh": speed_se}
+    try:
+        _, is_reversed = speed_from_axles(name, vehicle, row, motion.speed)
+    except TrainUnknownError as error:
+        raise ConfigError(str(file), "train", str(error), "Name the right vehicle file with --vehicle") from None
+    return vehicle.reverse() if is_reversed else vehicle, is_reversed
 
 
 def _calibrate(
@@ -284,12 +310,24 @@ def _compare_sensor(
         if not comparisons:  # the first band decides the delay of all
             at = at + _delay(time, ours, at, theirs)
         theirs = np.interp(time, at, theirs)
+        if not comparisons:
+            shifts = _shifts_by_chance(ours, theirs, rate)
+        by_chance = _fit_by_chance(ours, theirs, shifts)
         n = min(ours.size, round(rate))
         frequency, density = scipy.signal.welch(np.array([ours, theirs]), rate, "boxcar", nperseg=n, detrend=False)
         inside = (frequency >= low) & (frequency <= high)
         comparisons.append(
             BandComparison(
-                sensor.name, low, high, time, ours, theirs, frequency[inside], density[0, inside], density[1, inside]
+                sensor.name,
+                low,
+                high,
+                time,
+                ours,
+                theirs,
+                frequency[inside],
+                density[0, inside],
+                density[1, inside],
+                by_chance,
             )
         )
     return comparisons
@@ -300,6 +338,26 @@ def _delay(time: np.ndarray, recorded: np.ndarray, at: np.ndarray, simulated: np
     delays = np.arange(-MAX_DELAY, MAX_DELAY + 1e-9, DELAY_STEP)
     products = [float(recorded @ np.interp(time, at + delay, simulated)) for delay in delays]
     return float(delays[int(np.argmax(products))])
+
+
+def _shifts_by_chance(recorded: np.ndarray, simulated: np.ndarray, rate: float) -> np.ndarray:
+    """(n_shift,) shifts of the simulation by which it does not belong to the recording. [samples]
+
+    Evenly spaced, beyond ``2 MAX_DELAY``. Near each, that with the largest product is taken, as ``_delay`` does.
+    """
+    n, reach = recorded.size, round(MAX_DELAY * rate)
+    centres = np.linspace(3 * reach, n - 3 * reach, N_SHIFTS).astype(int) if n > 6 * reach else np.zeros(0, int)
+    products = np.fft.irfft(np.fft.rfft(recorded) * np.conj(np.fft.rfft(simulated)), n)
+    return np.array([k - reach + np.argmax(products[k - reach : k + reach + 1]) for k in centres], dtype=int)
+
+
+def _fit_by_chance(recorded: np.ndarray, simulated: np.ndarray, shifts: np.ndarray) -> float | None:
+    """Fit that 95 % of the ``shifts`` of the simulation do not reach, None without a shift. [%]
+
+    What leaves the recording at its end comes in at its beginning, so level and spectrum stay.
+    """
+    fits = [fit_percent(recorded, np.roll(simulated, shift)) for shift in shifts]
+    return float(np.quantile(fits, CHANCE_QUANTILE)) if fits else None
 
 
 def _in_band(samples: np.ndarray, low: float, high: float, rate: float) -> np.ndarray:

@@ -103,7 +103,7 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         speed = trusted_speed  # the measured one is from axle distances of another train, or from impacts between axles
     speed = float(speed) / KMH
     try:
-        speed, is_reversed = _speed_from_axles(type_name, vehicle, row, speed)
+        speed, is_reversed = speed_from_axles(type_name, vehicle, row, speed)
         further_doubts: tuple[str, ...] = (f"{type_name} runs the other way round",) if is_reversed else ()
         if is_reversed:  # its axles count from the other end: a separate train
             type_name, vehicle = f"{type_name} reversed", vehicle.reverse()
@@ -259,10 +259,30 @@ def _sprung_mass(vehicle: Vehicle) -> float:
     return sum(b.mass for k, b in enumerate(vehicle.bodies) if k not in set(vehicle.wheels))
 
 
-def _speed_from_axles(name: str, vehicle: Vehicle, row: Mapping[str, Any], speed: float) -> tuple[float, bool]:
-    """(speed [m/s], whether the train is reversed), from the vehicle's axle distances and the axle times.
+def speed_from_axles(name: str, vehicle: Vehicle, row: Mapping[str, Any], speed: float) -> tuple[float, bool]:
+    """Speed and order of the axles of a train, from the vehicle's axle distances and the axle times.
 
-    TrainUnknownError if the axles do not match the vehicle at any speed near ``speed``.
+    Parameters
+    ----------
+    name : str
+        Name of the vehicle file.
+    vehicle : Vehicle
+    row : mapping
+        Of the passage: ``axle_times_s`` (n_axle,) [s] and ``speed_se_kmh`` [km/h], either of which may be None.
+    speed : float
+        Speed that was found. [m/s]
+
+    Returns
+    -------
+    speed : float
+        [m/s]
+    is_reversed : bool
+        Whether the last axle of the vehicle file comes first.
+
+    Raises
+    ------
+    TrainUnknownError
+        The axles do not match the vehicle at any speed near ``speed``.
     """
     times = np.asarray(row.get("axle_times_s") if row.get("axle_times_s") is not None else (), dtype=float)
     positions = np.asarray(vehicle.wheel_positions, dtype=float)

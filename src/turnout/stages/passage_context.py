@@ -186,6 +186,12 @@ def read_clusters(path: Path) -> Clusters | None:
     return Clusters.of(json.loads(path.read_text(encoding="utf-8"))) if path.is_file() else None
 
 
+def _types_of(values: Mapping[str, Any]) -> tuple[str, ...] | None:
+    """Train types of a calibration in a file, None in the file of an earlier version."""
+    types = values.get("types")
+    return None if types is None else tuple(types)
+
+
 def read_loads(path: Path) -> dict[str, dict[str, LoadCalibration]]:
     """Axle load calibrations of all turnouts.
 
@@ -204,7 +210,9 @@ def read_loads(path: Path) -> dict[str, dict[str, LoadCalibration]]:
     document = json.loads(path.read_text(encoding="utf-8"))
     return {
         turnout: {
-            name: LoadCalibration(**{**values, "covariance": np.array(values["covariance"])})
+            name: LoadCalibration(
+                **{**values, "covariance": np.array(values["covariance"]), "types": _types_of(values)}
+            )
             for name, values in channels.items()
         }
         for turnout, channels in document.items()

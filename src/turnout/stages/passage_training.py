@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,8 @@ from turnout.passage.axle_patterns import Pattern
 from turnout.passage.cleaning import clean
 from turnout.passage.clusters import Clusters, fit_clusters
 from turnout.passage.result import Passage, PassageSensor
-from turnout.passage.timetable import ListedTrain, listed_for, listed_trains
+from turnout.passage.timetable import ListedTrain, is_of_one_passage, listed_for, listed_trains
+from turnout.passage.train_type import UNKNOWN
 from turnout.readers import read
 from turnout.records import LongRecording, Recording, Unit
 from turnout.stages.filed_times import time_of_label
@@ -91,10 +92,10 @@ def weighed_trains(
     Returns
     -------
     list of dict
-        Each has "file", "load" [t], "speed" [m/s] and "amplitudes": mean and standard error [m/s²] by channel.
+        Each has "file", "load" [t], "speed" [m/s], "type" and "amplitudes": mean and standard error [m/s²] by channel.
     """
     listed, _ = listed_trains([row for row in turnout.trains if row.get("axle_load_t")])
-    trains: list[dict] = []
+    trains: list[tuple[dict[str, Any], datetime, ListedTrain]] = []
     passage_units = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if listed else []
     for unit in sorted(passage_units, key=lambda u: u.label, reverse=True):
         started = time_of_label(unit.label)
@@ -103,7 +104,8 @@ def weighed_trains(
         trains += _weighed_in_unit(unit, turnout, raw_root, patterns, settings, listed)
         if len(trains) >= max_trains:
             break
-    return trains
+    of_one = is_of_one_passage([moment for _, moment, _ in trains], [row for *_, row in trains])
+    return [train for (train, *_), keeps_row in zip(trains, of_one) if keeps_row]
 
 
 def _weighed_in_unit(
@@ -113,7 +115,7 @@ def _weighed_in_unit(
     patterns: Sequence[Pattern],
     settings: PassageSettings,
     listed: Sequence[ListedTrain],
-) -> list[dict[str, Any]]:
+) -> list[tuple[dict[str, Any], datetime, ListedTrain]]:
     trains = []
     for path, *_ in unit.files:
         try:
@@ -139,15 +141,17 @@ def _weighed_train(
     patterns: Sequence[Pattern],
     settings: PassageSettings,
     listed: Sequence[ListedTrain],
-) -> list[dict[str, Any]]:
-    """Amplitudes of one passage as a list of one, [] if it is rejected or its load is not known."""
+) -> list[tuple[dict[str, Any], datetime, ListedTrain]]:
+    """(amplitudes, time, row of the train data) of one passage, [] if it is rejected or its load is not known."""
     passage = analyse(recording, sensors_of(turnout), patterns, settings)
     if passage.status != "accepted":
         return []
     moment = started + timedelta(seconds=round(float(passage.times[0]), 6))
     train = listed_for(moment, passage.n_axle, listed, settings.train_data_tolerance)
+    if train is None:
+        return []
     cleaned, _ = clean(recording, sensors_of(turnout))
-    return [] if train is None else [_sensor_amplitudes(path, cleaned, passage, sensors_of(turnout), train)]
+    return [(_sensor_amplitudes(path, cleaned, passage, sensors_of(turnout), train), moment, train)]
 
 
 def _sensor_amplitudes(
@@ -160,7 +164,14 @@ def _sensor_amplitudes(
     }
     if (speed := passage.speed) is not None:
         amplitudes = {name: with_speed_error(*a, speed.speed, speed.se) for name, a in amplitudes.items()}
-    return {"file": path, "load": train.axle_load, "speed": passage.train_motion.speed, "amplitudes": amplitudes}
+    recorded_type = UNKNOWN if passage.type is None else passage.type.type
+    return {
+        "file": path,
+        "load": train.axle_load,
+        "speed": passage.train_motion.speed,
+        "type": recorded_type,
+        "amplitudes": amplitudes,
+    }
 
 
 def learn_loads(
@@ -189,7 +200,8 @@ def learn_loads(
         loads, speeds = [t["load"] for t in recorded], [t["speed"] for t in recorded]
         calibration = calibrate(amplitudes, loads, speeds, settings.load_trains_minimum, errors)
         if calibration is not None:
-            calibrations[name] = calibration
+            types = tuple(sorted({t["type"] for t in recorded} - {UNKNOWN}))
+            calibrations[name] = replace(calibration, types=types)
     calibrations = with_error_correlation(calibrations, trains)
     path = Path(settings.assets) / "loads.json"
     by_turnout = read_loads(path)

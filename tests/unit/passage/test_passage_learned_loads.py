@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import replace
 from datetime import datetime, timedelta
 from types import SimpleNamespace
@@ -84,6 +85,37 @@ def test_trains_of_known_weight_calibrate_the_sensors_that_weigh_the_next_train(
     passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
     found = axle_load(recording, passage, known, settings)
     assert found.mean == pytest.approx(14.5, rel=0.05) and found.se < 0.025 * found.mean
+
+
+def test_a_row_of_the_train_data_counts_for_one_passage(turnout, tmp_path):
+    """A second train 40 s later, without a row of its own. Formerly it had the load of the first one."""
+    config, raw, settings = turnout
+    shutil.copytree(raw / "tommerup_s1", tmp_path / "tommerup_s1")
+    folder = tmp_path / "tommerup_s1" / "passages"
+    (first,) = folder.glob("20240513T0600*")
+    content = first.read_bytes().replace(b"2024-05-13T06:00:00", b"2024-05-13T06:00:40")
+    (folder / "20240513T060040Z.h5").write_bytes(content)
+    trains = weighed_trains(with_raw(config, tmp_path), tmp_path, PATTERNS, settings)
+    assert [t["load"] for t in trains].count(10.0) == 1 and len(trains) == 8
+    assert {t["type"] for t in trains} == {"IC3"}
+
+
+@pytest.mark.parametrize(("train_type", "is_calibrated"), [("IC3", True), ("freight", False), ("unknown", False)])
+def test_the_load_of_another_type_than_those_of_the_calibration_has_their_difference_in_its_error(
+    turnout, train_type, is_calibrated
+):
+    config, raw, settings = turnout
+    made = learn_loads(config, weighed_trains(config, raw, PATTERNS, settings), settings)
+    assert all(c.types == ("IC3",) for c in made.values())
+    recording = weighed(np.random.default_rng(32), 14.5, 36.0)
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    passage = replace(passage, type=replace(passage.type, type=train_type))
+    any_error = replace(settings, load_relative_error_maximum=1.0)
+    found = axle_load(recording, passage, read_loads(raw / "assets" / "loads.json")["tommerup_s1"], any_error)
+    same = axle_load(recording, passage, {n: replace(c, types=None) for n, c in made.items()}, any_error)
+    expected = same.se / same.mean if is_calibrated else np.hypot(same.se / same.mean, 0.03)
+    assert found.se / found.mean == pytest.approx(expected) and found.mean == pytest.approx(same.mean)
+    assert (axle_load(recording, passage, made, settings) is not None) == is_calibrated
 
 
 def test_too_few_trains_of_known_weight_give_no_calibration(turnout):

@@ -31,3 +31,17 @@ def test_sensors_of_the_other_track_are_left_out_by_the_layout(train_is_on, sett
     passage = analyse(replace(recording, samples=samples), sensors, PATTERNS, settings)
     assert passage.track == train_is_on and passage.n_axle == 8
     assert list(passage.at_sensor) == [s.name for s in sensors if s.track == train_is_on]
+
+
+@pytest.mark.parametrize("gain", [10.0, 30.0])
+@pytest.mark.parametrize("train_is_on", ["main", "diverging"])
+def test_the_gain_of_one_sensor_does_not_move_the_train_to_its_track(train_is_on, gain, settings):
+    """Three sensors at each track; the other one records a twentieth. Formerly the loudest sensor decided."""
+    tracks = ("main", "diverging") * 3
+    recording = rolling_noise(np.random.default_rng(6), IC3, 25.0, (0.0, 1.0, 9.0, 10.0, 18.0, 19.0))
+    samples = recording.samples * np.array([[1.0 if t == train_is_on else 0.05] for t in tracks])
+    samples[tracks.index("diverging" if train_is_on == "main" else "main")] *= gain
+    sensors = [replace(s, track=t) for s, t in zip(sensors_for(recording), tracks)]
+    passage = analyse(replace(recording, samples=samples), sensors, PATTERNS, settings)
+    assert (passage.track, passage.n_axle) == (train_is_on, 8)
+    assert {s.name for s in sensors if s.track == train_is_on} <= set(passage.at_sensor)

@@ -26,6 +26,7 @@ from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.calibration import calibrated_parameters, visit_groups
 from turnout.mismatch.turnout.further_passages import names_beyond, with_reserved_passages
 from turnout.mismatch.turnout.unproven_panels import UNPROVEN_SWITCH
+from turnout.number_text import evidence_in_words
 from turnout.simulate.blade import Blade
 from turnout.stages import calibrated_model as calibrated
 from turnout.stages import mismatch, mismatch_groups, mismatch_results, visit_fits
@@ -92,6 +93,29 @@ def test_the_model_of_a_track_with_a_switch_states_that_its_answers_are_not_prov
     assert switch.computed == () and list(model_text("t1", switch))[-1] == UNPROVEN_SWITCH
     rows = calibrated.answer_rows(switch)
     assert rows and all(row["reservation"] == UNPROVEN_SWITCH for row in rows)
+
+
+def test_the_text_counts_the_hammer_tests_and_passages_that_were_used(model):
+    """Two sections at each of the three visits that are used, and the trains of the first one."""
+    n_trains = sum(s.n_recordings for s in model[0].history.used_steps) - 6
+    assert n_trains > 0 and (model[0].n_hammer_tests, model[0].n_passages) == (6, n_trains)
+    assert next(model_text("t1", model[0])).startswith(f"t1: 6 hammer tests and {n_trains} passage")
+
+
+def test_a_change_without_an_answer_is_stated_with_the_evidence_that_an_answer_would_have(model):
+    """It is that of one of many possible changes, as ``gain`` of an answer; formerly that of this one alone."""
+    best = replace(model[0].changes[0], gains=np.full(3, 11.0))
+    n = len(model[0].changes)
+    found = replace(model[0], changes=(best, *model[0].changes[1:]), answers=())
+    (line,) = [line for line in model_text("t1", found) if "possible changes" in line]
+    assert n > 30 and evidence_in_words(11.0 - np.log(n)) in line and "too little for an answer" in line
+    assert f"the most likely of {n} possible changes is pad@18.00" in line and "dampers" not in line
+
+
+def test_a_logarithm_has_the_same_unit_in_the_rows_as_in_the_text(model):
+    """Formerly "-" in the rows, as if -0.7 were a factor."""
+    (row,) = [r for r in calibrated.answer_rows(model[0]) if r["question"] == "change"]
+    assert row["parameter"] == "pad@18.00" and row["size"] < 0.0 and row["unit"] == "ln"
 
 
 def test_the_channel_of_an_answer_may_have_an_underscore():
@@ -479,8 +503,10 @@ def test_no_answer_about_changes_is_printed_for_a_single_visit(changes):
         deviations=[],
         changes=changes,
         reservation="",
+        n_hammer_tests=0,
+        n_passages=2,
     )
     text = "\n".join(model_text("t1", model))
-    assert text.startswith("t1: 2 recordings of 1 visit (1 fitted now)")
+    assert text.startswith("t1: 0 hammer tests and 2 passages of 1 visit used; 1 visit fitted now\n")
     assert "changes: cannot tell from fewer than two visits that are used" in text
     assert "changes up to" not in text and "most likely change" not in text

@@ -9,9 +9,19 @@ import numpy as np
 import pytest
 
 from turnout.cli.main import main
+from turnout.errors import ConfigError
+from turnout.passage.kinematics import Motion
+from turnout.passage.result import Passage
 from turnout.readers.writing import write
 from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
-from turnout.stages.compare import compare_passage
+from turnout.stages.compare import (
+    MAX_DELAY,
+    N_SHIFTS,
+    _fit_by_chance,
+    _shifts_by_chance,
+    _vehicle,
+    compare_passage,
+)
 
 SENSORS = {"OT": -12.0, "A7": 24.6, "ASM": 36.0}
 OTHERS = {"SP": 3.6, "CLP": 13.8, "A8": 26.4, "A9": 28.2, "ASD": 36.0}
@@ -72,6 +82,43 @@ def test_the_same_train_agrees_and_a_factor_of_two_is_six_decibels(comparison):
     assert power == pytest.approx(
         np.mean(low.recorded**2), rel=0.25
     )  # Parseval's theorem, without the power that the filter passes above 40 Hz
+
+
+def test_the_fit_by_chance_separates_the_right_time_series_from_equal_levels(comparison):
+    """In 0-40 Hz the same train fits far better than the same simulation at other times."""
+    low, high = comparison.bands[:2]
+    assert low.fit > 80.0 and low.fit_by_chance < 20.0
+    shifted = _shifts_by_chance(low.recorded, low.recorded, 5e3)
+    assert len(shifted) == N_SHIFTS and abs(shifted).min() >= MAX_DELAY * 5e3
+    assert _fit_by_chance(low.recorded, low.recorded, np.array([0])) == pytest.approx(100.0)
+    assert _fit_by_chance(low.recorded, low.recorded, shifted) < 30.0
+    assert high.row["fit_by_chance_pct"] == high.fit_by_chance > -100.0
+
+
+def test_a_recording_too_short_for_shifts_has_no_fit_by_chance():
+    x = np.sin(np.arange(500.0))
+    assert _fit_by_chance(x, x, _shifts_by_chance(x, x, 5e3)) is None
+
+
+@pytest.mark.parametrize("runs_reversed", [False, True])
+def test_the_vehicle_is_simulated_in_the_order_of_the_recorded_axles(runs_reversed):
+    """A locomotive at the end is simulated there; formerly at the front, 9.5 m off."""
+    at = load_vehicle("intercity").wheel_positions
+    recorded = at[-1] - at[::-1] if runs_reversed else at
+    vehicle, is_reversed = _vehicle("intercity", 0.5, passage_with(recorded), "a.h5")
+    assert is_reversed == runs_reversed and vehicle.wheel_positions == pytest.approx(recorded)
+
+
+def test_a_vehicle_with_other_axle_distances_is_an_error_also_with_the_same_number():
+    """Two locomotives have eight axles, as an IC3. Formerly they were simulated in its place."""
+    recorded = load_vehicle("ic3").wheel_positions
+    with pytest.raises(ConfigError, match=r"axles lie \d\.\d+ m rms off those of locomotive\.yaml.*--vehicle"):
+        _vehicle("locomotive", 0.5, passage_with(recorded), "a.h5")
+    assert len(_vehicle("ic3", 0.5, passage_with(recorded), "a.h5")[0].wheels) == 8
+
+
+def passage_with(offsets):
+    return Passage("accepted", (), Motion(30.0), offsets=np.asarray(offsets))
 
 
 def test_the_command_states_an_improbable_value_of_the_track_file(passage, repository, tmp_path, capsys):

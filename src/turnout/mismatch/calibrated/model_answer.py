@@ -24,6 +24,28 @@ NAMES = {
 }
 
 
+def stated_unit(unit: str, group: str) -> str:
+    """Unit that is stated with a value: "ln" for the logarithm of a factor on the value of the file.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the parameter; "-" of a logarithm and of a gain.
+    group : str
+        Group of the parameter.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> stated_unit("-", "ballast"), stated_unit("-", "gain"), stated_unit("m", "seat")
+    ('ln', '-', 'm')
+    """
+    return "ln" if unit == "-" and group != "gain" else unit
+
+
 @dataclass(frozen=True)
 class StretchEnds:
     """Intervals of the positions of the first and the last support that have changed. [m]
