@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_track, add_turnout, add_warnings
+from turnout.cli.options import add_configuration, add_result, add_track, add_turnout, add_warnings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -84,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
         if calibration.is_adequate
         else f"does not meet these tests (chi-squared per degree of freedom {calibration.reduced:.0f})"
     )
+    add_result(args, calibration.rows)
     values = {name: value for name, value in calibration.values.items() if missed or calibration.is_determined(name)}
     print(_track_entry(args.section, values, calibration.sd, missed))
     return 1 if missed else 0

@@ -12,7 +12,7 @@ Each effect has the size from which a diagnosis begins to fit it, in the middle 
 import argparse
 
 from turnout.cli.option_types import RAIL_TEMPERATURE, SPEED, finite_number
-from turnout.cli.options import add_configuration, add_former, add_track, add_warnings
+from turnout.cli.options import add_configuration, add_former, add_result, add_track, add_warnings
 
 GROUP = "Simulate and diagnose"
 HELP = "show which effects a planned campaign can distinguish"
@@ -91,4 +91,9 @@ def run(args: argparse.Namespace) -> int:
     nameable = [n for n in matrix.names if matrix.can_be_named(n, settings.threshold, settings.margin)]
     print(f"enough evidence for a name: {', '.join(nameable) or 'no effect'}")
     print(advice)
+    rows = [
+        {"effect": name, "evidence_nats": float(nats), "confused_with": confused[name], "is_named": name in nameable}
+        for name, nats in zip(matrix.names, matrix.detectability)
+    ]
+    add_result(args, rows)
     return 0

@@ -10,6 +10,7 @@ Exit code 1 if no train is found, 2 if the command line or an input is wrong.
 from __future__ import annotations
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import (
@@ -17,6 +18,7 @@ from turnout.cli.options import (
     add_figure,
     add_former,
     add_raw,
+    add_result,
     add_turnout,
     add_work,
     check_output_files,
@@ -25,6 +27,7 @@ from turnout.constants import KMH, Z95
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import Any
 
     from turnout.config import TurnoutConfig
     from turnout.config.settings.passage import PassageSettings
@@ -100,11 +103,15 @@ def run(args: argparse.Namespace) -> int:
         print(f"Note: {problem}")
     _, context = passage_context(turnout.id, turnout.settings, args.work)
     has_train = False
+    rows: list[dict[str, Any]] = []
     records: list[Recording | LongRecording] = [*result.recordings, *result.long_recordings]
     for record in records:
         for recording, offset, name in trains_in(record, settings):
             out = None if has_train else args.figure
-            has_train |= _show(recording, offset if name else None, turnout, context, settings, args.no_fit, out)
+            row = _show(recording, offset if name else None, turnout, context, settings, args.no_fit, out)
+            has_train |= row["n_axles"] > 0
+            rows.append(row)
+    add_result(args, rows)
     return 0 if has_train else 1
 
 
@@ -116,8 +123,8 @@ def _show(
     settings: PassageSettings,
     no_fit: bool,
     out: str | None,
-) -> bool:
-    """Print one train and its fits, write its page; returns whether there is a train."""
+) -> dict[str, Any]:
+    """Print one train and its fits, write its page; returns the train as numbers."""
     from turnout.passage.analysis import analyse
     from turnout.stages.passage import sensors_of
 
@@ -130,7 +137,41 @@ def _show(
         print("\n".join(_fit_lines(fits, settings)))
     if out and passage.n_axle:
         _write_page(out, turnout.id, recording, passage, fits, _train_lines(recording, passage))
-    return bool(passage.n_axle)
+    return _train_row(recording, offset, passage, fits)
+
+
+def _train_row(
+    recording: Recording, offset: float | None, passage: Passage, fits: Mapping[str, ChannelFit | str]
+) -> dict[str, Any]:
+    """A train and the fit at each sensor as numbers."""
+    row: dict[str, Any] = {
+        "file": recording.source, "record": recording.record + 1, "offset_s": offset or 0.0, "status": passage.status,
+        "reasons": [f.reason for f in passage.findings], "n_axles": passage.n_axle, "direction": passage.direction,
+        "track": passage.track, "axles_m": [float(x) for x in passage.offsets],
+    }  # fmt: skip
+    if passage.speed is not None and passage.type is not None:
+        row |= {
+            "speed_kmh": KMH * passage.speed.speed, "speed_se_kmh": KMH * passage.speed.se,
+            "acceleration_ms2": passage.speed.acceleration, "acceleration_se_ms2": passage.speed.acceleration_se,
+            "train_type": passage.type.type, "train_type_probability": float(passage.type.probability),
+        }  # fmt: skip
+    return row | {"sensors": [_sensor_row(name, fit) for name, fit in fits.items()]}
+
+
+def _sensor_row(name: str, fit: ChannelFit | str) -> dict[str, Any]:
+    """The fit at one sensor as numbers, or why there is none."""
+    if isinstance(fit, str):
+        return {"sensor": name, "status": None, "detail": fit}
+    row: dict[str, Any] = {"sensor": name, "status": fit.status, "detail": fit.detail or None}
+    if fit.scores is None or fit.null is None or fit.test is None:
+        return row
+    numbers = {
+        "fit_pct": fit.scores.fit, "fit_null_pct": fit.null.fit,
+        "forecast_pct": fit.scores.forecast, "forecast_null_pct": fit.null.forecast,
+        "leave_one_out_pct": fit.scores.leave_one_out, "leave_one_out_null_pct": fit.null.leave_one_out,
+        "along_b_share": fit.test.along_share, "peak_ms2": fit.peak,
+    }  # fmt: skip
+    return row | {key: float(value) if math.isfinite(value) else None for key, value in numbers.items()}
 
 
 def _train_lines(recording: Recording, passage: Passage) -> list[str]:

@@ -13,7 +13,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_registry, add_turnouts, add_use
+from turnout.cli.options import add_configuration, add_raw, add_registry, add_result, add_turnouts, add_use
 from turnout.constants import KMH
 from turnout.counts import count_of
 
@@ -72,7 +72,10 @@ def run(args: argparse.Namespace) -> int:
     configuration = load_configuration(args.configuration)
     names = args.turnouts or list(configuration.rows)
     settings = configuration.settings["passage"]
+    with open_registry(args.registry):
+        pass  # without one there are no clusters: an error before anything is computed
     has_result = []  # of each turnout, then of the clusters
+    loads: list[dict[str, Any]] = []
     for name in names:
         turnout = with_raw(configuration.turnout(name), args.raw)
         if turnout.passages is None:
@@ -82,13 +85,36 @@ def run(args: argparse.Namespace) -> int:
         trains = weighed_trains(turnout, args.raw, patterns, settings)
         calibrations = learn_loads(turnout, trains, settings)
         has_result.append(bool(calibrations))
+        loads += [_load_row(name, channel, c) for channel, c in calibrations.items()]
         print("\n".join(_load_lines(name, trains, calibrations, settings)))
     with open_registry(args.registry) as connection:
         clusters = learn_clusters(connection, settings)
     has_result.append(bool(clusters.clusters))
     print("\n".join(_cluster_lines(clusters)))
+    add_result(args, {"loads": loads, "clusters": _cluster_rows(clusters)})
     add_use(args, sum(has_result), has_result.count(False))
     return 0
+
+
+def _load_row(turnout_id: str, channel: str, calibration: LoadCalibration) -> dict[str, Any]:
+    """The calibration of one sensor as numbers."""
+    c = calibration
+    return {
+        "turnout_id": turnout_id, "channel": channel, "scatter_pct": 100.0 * c.scatter, "speed_exponent": c.exponent,
+        "slowest_kmh": KMH * c.slowest, "fastest_kmh": KMH * c.fastest, "n": c.n, "train_types": c.types,
+    }  # fmt: skip
+
+
+def _cluster_rows(clusters: Clusters) -> list[dict[str, Any]]:
+    """The clusters as numbers."""
+    import numpy as np
+
+    rows = []
+    for c in clusters.clusters:
+        centre = np.exp(c.mean)
+        load = float(centre[1]) if len(centre) > 1 else None
+        rows.append({"cluster_id": c.id, "speed_kmh": float(centre[0]), "axle_load_t": load, "n": c.n})
+    return rows
 
 
 def _load_lines(
@@ -115,11 +141,8 @@ def _load_lines(
 
 def _cluster_lines(clusters: Clusters) -> list[str]:
     """The clusters in words."""
-    import numpy as np
-
     lines = [f"clusters, version {clusters.version}:"]
-    for c in clusters.clusters:
-        centre = np.exp(c.mean)
-        load = f", {centre[1]:.1f} t per axle" if len(centre) > 1 else ""
-        lines.append(f"  {c.id:<14}{centre[0]:.0f} km/h{load}, n = {c.n}")
+    for row in _cluster_rows(clusters):
+        load = "" if row["axle_load_t"] is None else f", {row['axle_load_t']:.1f} t per axle"
+        lines.append(f"  {row['cluster_id']:<14}{row['speed_kmh']:.0f} km/h{load}, n = {row['n']}")
     return lines if clusters.clusters else ["no clusters: no train of a known type yet"]

@@ -18,6 +18,7 @@ from turnout.units import PARAMETER_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from typing import Any
 
     from turnout.simulate.links import Link
     from turnout.simulate.track import Track
@@ -101,6 +102,19 @@ class Calibration:
             True also if only a combination with another parameter is determined.
         """
         return self.informed[name] or any(name in pair for pair in self.correlated)
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per parameter: value with its relative standard deviation, and how well the section fits."""
+        return [
+            {
+                "section": self.section, "parameter": name, "unit": PRINTED_UNITS[name],
+                "value": float(value) / PARAMETER_UNITS[PRINTED_UNITS[name]][1], "relative_sd": float(self.sd[name]),
+                "is_determined": self.is_determined(name), "chi_squared_reduced": float(self.reduced),
+                "is_adequate": self.is_adequate, "n": self.n,
+            }
+            for name, value in self.values.items()
+        ]  # fmt: skip
 
     def __str__(self) -> str:
         criterion = f"about 1: met within the errors; above {MAX_CHI_SQUARED:.0f}: not met"

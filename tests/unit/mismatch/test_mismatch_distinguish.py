@@ -1,5 +1,7 @@
 """Planned recordings determine which effects can be distinguished, before they are taken."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -58,6 +60,12 @@ def test_the_command_states_once_what_cannot_be_seen(capsys, monkeypatch):
         "enough evidence for a name: hum",
         "No single addition.",
     ]
+    assert main(["distinguish", "--sensor-positions", "23.4", "--impact-positions", "24.6", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["result"]
+    assert rows[1] == {
+        "effect": "sensor_gain", "evidence_nats": 4.0, "confused_with": ["none", "local_pad", "hum"], "is_named": False,
+    }  # fmt: skip
+    assert [r["is_named"] for r in rows] == [False, False, True]
 
 
 @pytest.mark.slow

@@ -1,11 +1,17 @@
 """`turnout passage` of a file without a train, and of a link to a file elsewhere."""
 
+import json
 from datetime import datetime
 
 import numpy as np
 import pytest
+from benchmarks.passage_truth import PATTERNS, RATE, impact_record, paper_model, sensors_for
 
 from turnout.cli.main import main
+from turnout.cli.passage import _train_row
+from turnout.config.settings.passage import PassageSettings
+from turnout.passage.analysis import analyse
+from turnout.passage.channel_fit import fit_channel
 from turnout.readers.writing import write
 from turnout.records import Channel, Recording
 
@@ -49,6 +55,23 @@ def test_a_file_without_a_train_is_reported_with_exit_code_1(folder_with_link, c
         samples[7] = broken
     code, printed = command_result(folder_with_link, samples, capsys)
     assert code == 1 and expected in printed
+
+
+def test_a_train_and_its_scores_are_numbers_for_other_programs():
+    """``--json`` had the text alone."""
+    rng = np.random.default_rng(12)
+    record = impact_record(rng)
+    recording = Recording(record.samples[None], RATE, (Channel("A7", "acceleration", 24.6),), "passage", source="a.h5")
+    settings = PassageSettings()
+    passage = analyse(recording, sensors_for(recording), PATTERNS, settings)
+    fit = fit_channel(record.samples, RATE, record.times / RATE, 44.4, paper_model("CP A7"), settings)
+    row = _train_row(recording, None, passage, {"A7": fit, "A8": "no model of its section"})
+    assert json.loads(json.dumps(row)) == row
+    assert (row["file"], row["n_axles"], row["train_type"]) == ("a.h5", 8, "IC3") and len(row["axles_m"]) == 8
+    assert abs(row["speed_kmh"] - 3.6 * 44.4) < 3.0 * row["speed_se_kmh"] + 0.5
+    first, second = row["sensors"]
+    assert first["fit_pct"] > 90.0 > first["fit_null_pct"] and first["status"] == "accepted"
+    assert second == {"sensor": "A8", "status": None, "detail": "no model of its section"}
 
 
 def filed(folder, name):

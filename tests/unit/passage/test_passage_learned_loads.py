@@ -20,6 +20,7 @@ from turnout.passage.analysis import analyse
 from turnout.passage.axle_load import axle_load, calibrate, train_amplitude, with_error_correlation
 from turnout.passage.kinematics import Motion
 from turnout.passage.result import Passage, SpeedFinding
+from turnout.passage.timetable import listed_trains
 from turnout.readers.writing import write
 from turnout.records import Channel
 from turnout.stages.passage_context import read_clusters, read_loads
@@ -273,8 +274,6 @@ def test_clusters_come_from_the_registry_and_keep_their_ids_when_nights_are_adde
 
 
 def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypatch, repository, capsys):
-    import shutil
-
     _, raw, _ = turnout
     shutil.copytree(repository / "config", tmp_path / "config")
     monkeypatch.chdir(tmp_path)
@@ -289,3 +288,25 @@ def test_the_command_prints_calibration_and_clusters(turnout, tmp_path, monkeypa
     )
     assert "clusters, version 1:" in output
     assert json.loads((tmp_path / "config" / "passages" / "loads.json").read_text())["tommerup_s1"]
+    assert main(["trains", "--turnouts", "tommerup_s1", "--raw", str(raw), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)["result"]
+    assert {(r["channel"], r["n"], *r["train_types"]) for r in result["loads"]} == {(n, 8, "IC3") for n in PLACES}
+    assert [set(c) for c in result["clusters"]] == 2 * [{"cluster_id", "speed_kmh", "axle_load_t", "n"}]
+
+
+def test_without_a_registry_nothing_is_calibrated(turnout, tmp_path, monkeypatch, repository, capsys):
+    """Formerly the loads were calibrated and stored, and the command said that it was not done."""
+    _, raw, _ = turnout
+    shutil.copytree(repository / "config", tmp_path / "config")
+    monkeypatch.chdir(tmp_path)
+    assert main(["trains", "--turnouts", "tommerup_s1", "--raw", str(raw)]) == 2
+    printed = capsys.readouterr()
+    assert "there is no registry here" in printed.err and not printed.out
+    assert not (tmp_path / "config" / "passages" / "loads.json").exists()
+
+
+def test_a_number_of_the_train_data_that_is_none_is_named_with_its_column():
+    rows = [{"passed_at_utc": "2024-05-13T10:00:00Z", "axle_load_t": text} for text in ("heavy", "1_2", "12.5")]
+    trains, errors = listed_trains(rows)
+    assert [t.axle_load for t in trains] == [12.5]
+    assert errors == ("row 1: axle_load_t 'heavy' is not a number", "row 2: axle_load_t '1_2' is not a number")

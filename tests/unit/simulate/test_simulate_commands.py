@@ -186,6 +186,12 @@ def test_each_value_of_a_calibration_has_its_unit_and_its_error_a_name(monkeypat
     assert ["pad_stiffness", "300", "MN/m", "±", "1.2", "%"] in lines
     assert next(line for line in lines if line[:1] == ["ballast_damping"])[1:7] == ["71", "kN", "s/m", "±", "80.0", "%"]
     assert "± is one standard deviation" in output
+    output, _ = calibrated(monkeypatch, capsys, ["--track", "tommerup", "--json"])
+    first, second = json.loads(output)["result"]
+    assert (first["parameter"], first["value"], first["unit"], first["relative_sd"]) == (
+        "pad_stiffness", 300.0, "MN/m", 0.012,
+    )  # fmt: skip
+    assert (second["is_determined"], second["unit"], second["n"]) == (False, "kN s/m", 1600)
 
 
 @pytest.mark.parametrize("own", ["aarup_n4", "tommerup"], ids=["turnout", "layout"])

@@ -1,6 +1,7 @@
 """A recorded passage beside its simulation: the same train agrees, and a scaled recording differs by its factor."""
 
 import csv
+import json
 import shutil
 from dataclasses import replace
 from datetime import datetime
@@ -141,6 +142,10 @@ def test_the_command_prints_a_row_per_band_and_writes_page_and_spectra(passage, 
     assert page.read_text(encoding="utf-8").count("<svg") >= 4
     rows = list(csv.DictReader(spectra.open()))
     assert {r["band_high_hz"] for r in rows} == {"40", "1000"} and float(rows[5]["recorded_psd"]) > 0.0
+    assert main([*arguments, "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)["result"]
+    assert (first["sensor"], first["band_high_hz"], second["band_low_hz"]) == ("A7", 40.0, 40.0)
+    assert first["fit_pct"] > first["fit_by_chance_pct"] and f"{first['fit_pct']:.1f} / " in text
     assert main([*arguments[:6], "--raw", str(passage.parent), "--sensors", "A9"]) == 2
     assert "A9: did not record the train" in capsys.readouterr().err
     assert main([*arguments[:6], "--raw", str(passage.parent), "--sensors", "A17"]) == 2
