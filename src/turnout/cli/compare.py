@@ -125,5 +125,5 @@ def comparison_lines(comparison: PassageComparison) -> list[str]:
             f"{r['level_db']:+z10.1f}{r['fit_pct']:9.1f} / {chance:>5}"
         )
     lines.append("level: power of the simulation over that of the recording")
-    lines.append("chance: 95 % of shifts of the simulation in time fit worse; a fit below it says nothing")
+    lines.append("chance: 95 % of shifts of the simulation in time fit worse; a fit below it or below 0 says nothing")
     return lines
