@@ -125,8 +125,10 @@ def _answers(model: CalibratedModel) -> Iterator[str]:
 
 
 def _table(model: CalibratedModel, show_all: bool) -> Iterator[str]:
+    from turnout.mismatch.calibrated import track_sds
+
     belief, parameters = model.history.belief, model.history.parameters
-    rows = list(zip(parameters, belief.mean, belief.sd))
+    rows = list(zip(parameters, belief.mean, track_sds(belief, parameters)))
     waves = [row for row in rows if row[0].group == "wave" and not show_all]
     others = [row for row in rows if row[0].group != "wave" or show_all]
     listed = [row for row in others if show_all or row[2] < MAX_SD_RATIO * row[0].sd]

@@ -19,7 +19,7 @@ from turnout.cli.twin import model_text
 from turnout.config import load_configuration, with_raw
 from turnout.constants import DAYS_PER_YEAR
 from turnout.errors import SimulationError
-from turnout.mismatch.calibrated import StateParameter, VisitInformation, estimate_history
+from turnout.mismatch.calibrated import StateParameter, VisitInformation, estimate_history, track_sds
 from turnout.mismatch.engine.diagnose import fit_base
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.turnout import TrackCase
@@ -110,6 +110,17 @@ def test_a_change_without_an_answer_is_stated_with_the_evidence_that_an_answer_w
     (line,) = [line for line in model_text("t1", found) if "possible changes" in line]
     assert n > 30 and evidence_in_words(11.0 - np.log(n)) in line and "too little for an answer" in line
     assert f"the most likely of {n} possible changes is pad@18.00" in line and "dampers" not in line
+
+
+def test_the_table_has_the_standard_deviations_of_the_page(model):
+    """With the error of the model. Formerly it had those of the belief."""
+    history = model[0].history
+    sds = track_sds(history.belief, history.parameters)
+    expected = dict(zip((p.name for p in history.parameters), sds))
+    rows = [line.split() for line in model_text("t1", model[0], show_all=True) if line.count("@") == 1]
+    printed = {row[0]: float(row[-3]) for row in rows if row[0] in expected}
+    assert len(printed) >= 40 and np.any(np.abs(sds - history.belief.sd) > 0.005)
+    assert printed == pytest.approx({name: expected[name] for name in printed}, rel=0.01)
 
 
 def test_a_logarithm_has_the_same_unit_in_the_rows_as_in_the_text(model):
