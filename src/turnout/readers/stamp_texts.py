@@ -26,7 +26,8 @@ DAYS_ALONE = {
 DIGITS_ALONE = re.compile(r" *(\d{4})(\d{2})(\d{2})[T_](\d{2})(\d{2})(\d{2})(?=[.,Z+-]|$)")
 # A time of day without colons behind a date, "2026-05-13 0820Z", and all in one word as armed forces write it.
 COMPACT_CLOCK = re.compile(
-    r"(?<=\d)([T ,_]+)([01]\d|2[0-3])([0-5]\d)([0-5]\d)?(?=(?:[.,]\d+)?(?: ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2}))? ?h?r?s?$)"
+    r"([T ,_]+)([01]\d|2[0-3])([0-5]\d)([0-5]\d)?"
+    r"(?=(?:[.,]\d+)?(?: ?(?:Z|UTC|GMT|[+-]\d{2}:?\d{2}))?(?: ?h(?:rs?)?)?$)"
 )
 DATE_AHEAD = re.compile(
     r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}(?:[-/.]\d{1,2}[-/.]|\.?[- ]?[^\W\d_]{3,9}\.?[-, ]*)\d{4})(?=[T ,_])"
@@ -179,8 +180,9 @@ def with_colons(text: str) -> str:
         return f"20{match[6][-2:]}-{month:02}-{day}T{hour}:{minute}:00{ZONE_LETTERS[letter]:+03}:00"
     if not (date_ahead := DATE_AHEAD.match(text)):
         return text
-    clock = COMPACT_CLOCK.sub(lambda match: match[1] + ":".join(filter(None, match.groups()[1:])), text)
-    return clock if COMPACT_CLOCK.search(text, date_ahead.end() - 1) else text
+    if not (match := COMPACT_CLOCK.match(text, date_ahead.end())):
+        return text  # also digits behind a time of day with colons: they are its fraction
+    return text[: match.start(2)] + ":".join(filter(None, match.groups()[1:])) + text[match.end() :]
 
 
 def with_western_marks(text: str) -> str:

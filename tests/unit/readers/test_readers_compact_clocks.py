@@ -41,6 +41,15 @@ def test_a_time_of_day_needs_no_colons(name, text, second, tmp_path):
     assert read_head(tmp_path, f"{name}: {text}") == (start, [])
 
 
+@pytest.mark.parametrize("fraction", ["1200", "1234", "102030", "235959"])
+@pytest.mark.parametrize(
+    "text", ["2026-05-13T10:20:30,{}", "13.05.2026 10:20:30,{}", "2026-05-13T08:20:30,{}Z", "13-May-2026 10:20:30,{}"]
+)
+def test_digits_behind_a_time_of_day_are_its_fraction(text, fraction, tmp_path):
+    start = datetime(2026, 5, 13, 8, 20, 30, int(fraction.ljust(6, "0")))
+    assert read_head(tmp_path, f"Start time: {text.format(fraction)}") == (start, [])
+
+
 @pytest.mark.parametrize("text", ["2026-05-13 2520", "2026-05-13 0861Z", "320820ZMAY2026", "130820ZMAYO2026"])
 def test_a_time_of_day_that_no_clock_shows_is_no_start(text, tmp_path):
     assert read_head(tmp_path, f"Start time: {text}")[0] is None
