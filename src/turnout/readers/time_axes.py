@@ -169,7 +169,8 @@ def _check_same_start(starts: Sequence[tuple[str, float, float, int]], where: st
         if abs(rate / first_rate - 1.0) < MAX_RATE_DIFFERENCE and 0.5 < abs(lag) < n_sample:
             problem = f"{place} begins {abs(lag):.6g} samples {'after' if lag > 0 else 'before'} {first_place}"
             remedy = (
-                "Export the channels cut to the stretch that they share; if all were sampled at once, leave one out"
+                "Export the channels cut to the stretch that they share; if all were sampled at once, leave one out, "
+                "or name it under 'checked_entries' if neither its name nor its unit is one of time"
             )
             raise source.error(where, problem, remedy, reason="clock_drift")
 

@@ -70,3 +70,11 @@ def test_a_text_and_a_position_need_an_entry(tmp_path):
     columns = {"force": FORCE, "rail": RAIL, "odometer [km]": 5.0 + TIME}
     result = read_columns(tmp_path, "a.csv", columns)
     assert not result.recordings and result.errors[0].reason == "channel_unknown"
+
+
+def test_a_time_since_the_trigger_beside_that_since_the_start_may_be_checked(tmp_path):
+    write_csv(tmp_path / "a.csv", {"time": TIME, "force": FORCE, "rail": RAIL, "since_trigger": TIME - 50 / RATE})
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=RATE))
+    assert result.errors[0].reason == "clock_drift" and "'checked_entries'" in str(result.errors[0])
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=RATE, checked_entries=("since_trigger",)))
+    assert len(result.recordings) == 1 and not result.errors
