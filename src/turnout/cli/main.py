@@ -7,6 +7,7 @@ import errno
 import gc
 import json
 import logging
+import math
 import os
 import re
 import signal
@@ -29,6 +30,7 @@ from turnout.threads import use_one_thread
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from types import FrameType
+    from typing import Any
 
 # Exit codes. `turnout nightly` also ends with that of Snakemake, and with 124 at its limit of time.
 DONE, PROBLEM_FOUND, NOT_FOLLOWED, PROGRAM_FAULT, INTERRUPTED = 0, 1, 2, 3, 130
@@ -313,12 +315,23 @@ def _json_text(
         "command": command,
         "exit_code": code,
         "text": text,
-        "result": result,
+        "result": _as_json(result),
         "warnings": warnings,
         "error": error or None,
     }
     is_utf8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
     return json.dumps(document, default=str, ensure_ascii=not is_utf8, indent=1)
+
+
+def _as_json(value: Any) -> Any:
+    """A result without what JSON lacks: NaN and infinity become null, numbers and arrays of NumPy those of Python."""
+    if isinstance(value, dict):
+        return {key: _as_json(x) for key, x in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_as_json(x) for x in value]
+    if hasattr(value, "tolist"):
+        return _as_json(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager

@@ -10,7 +10,6 @@ Exit code 1 if no train is found, 2 if the command line or an input is wrong.
 from __future__ import annotations
 
 import argparse
-import math
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import (
@@ -165,13 +164,12 @@ def _sensor_row(name: str, fit: ChannelFit | str) -> dict[str, Any]:
     row: dict[str, Any] = {"sensor": name, "status": fit.status, "detail": fit.detail or None}
     if fit.scores is None or fit.null is None or fit.test is None:
         return row
-    numbers = {
+    return row | {
         "fit_pct": fit.scores.fit, "fit_null_pct": fit.null.fit,
         "forecast_pct": fit.scores.forecast, "forecast_null_pct": fit.null.forecast,
         "leave_one_out_pct": fit.scores.leave_one_out, "leave_one_out_null_pct": fit.null.leave_one_out,
         "along_b_share": fit.test.along_share, "peak_ms2": fit.peak,
     }  # fmt: skip
-    return row | {key: float(value) if math.isfinite(value) else None for key, value in numbers.items()}
 
 
 def _train_lines(recording: Recording, passage: Passage) -> list[str]:

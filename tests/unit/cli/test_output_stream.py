@@ -38,6 +38,14 @@ def test_a_character_that_the_encoding_lacks_is_printed_as_an_escape_sequence(re
         assert "m/s² → 日".encode(encoding, "backslashreplace").decode(encoding) in printed
 
 
+def test_json_has_null_for_a_number_that_is_none(registry):
+    """JSON has neither NaN nor infinity, also within a list."""
+    numbers = "select 'nan'::double as a, '-inf'::double as b, ['inf'::double, 2.0] as c"
+    done = run(["query", numbers, "--json"], registry, stdout=subprocess.PIPE)
+    printed = json.loads(done.stdout, parse_constant=pytest.fail)
+    assert printed["result"] == [{"a": None, "b": None, "c": [None, 2.0]}]
+
+
 @pytest.mark.parametrize("words", [["query", "--list"], ["query", QUERY, "--json"], ["query", "from range(9999)"]])
 def test_a_closed_pipe_is_no_fault(registry, words):
     reading, writing = os.pipe()
