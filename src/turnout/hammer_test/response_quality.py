@@ -64,6 +64,7 @@ def find_track_impacts(
 
 # Least number of impacts, and least standard deviation of the logarithm of what their forces predict, for a slope.
 MIN_SLOPE_IMPACTS, MIN_FORCE_SPREAD = 5, 0.03
+MAX_NOISE = 0.33  # of a largest value, before the impact: noise does not grow with the force either
 MAX_SATURATED_SLOPE = 0.5  # slope of the logarithms of peaks: 1 for a linear track, 0 for a saturated channel
 
 
@@ -78,7 +79,8 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     shape of each pulse: the response to a short one follows its impulse, and samples may miss its peak. A saturated
     test has a smaller transfer function, but a prediction that grows with the force. A test is rejected if b lies below
     ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for its highest and for its lowest value, as a
-    channel may be limited on one side, and for its steepest slope, which an amplifier may limit.
+    channel may be limited on one side, and for its steepest slope, which an amplifier may limit. A value is not compared
+    if that of the noise before the impact is more than ``MAX_NOISE`` of it.
 
     Parameters
     ----------
@@ -104,7 +106,8 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
                 np.log([largest(a[i.onset :]) for i, a in zip(used, responses)])
                 for responses in (predictions, [i.acceleration for i in used])
             )
-        if not np.isfinite([x, y]).all() or np.std(x) < MIN_FORCE_SPREAD:
+        noise = np.median([largest(i.acceleration[: i.onset]) for i in used])
+        if not np.isfinite([x, y]).all() or np.std(x) < MIN_FORCE_SPREAD or noise > MAX_NOISE * np.exp(np.median(y)):
             continue
         slope, error = _slope(x, y)
         if slope + 3.0 * error < MAX_SATURATED_SLOPE:

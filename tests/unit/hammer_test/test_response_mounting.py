@@ -120,3 +120,13 @@ def test_a_response_that_is_limited_on_one_side_in_all_impacts_is_found(side):
     lower = min(np.median(np.max(side * a, axis=1)) for a in (whole[:, 1],))
     limited = test_samples(TRACKS[0], 5, lambda a, rng: side * np.minimum(side * a, 0.5 * lower))
     assert reasons_of(limited) == {"overload"}
+
+
+@pytest.mark.parametrize("modes", TRACKS[:2])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_response_beside_much_noise_is_not_limited(modes, seed):
+    """The steepest slope of noise does not grow with the force either."""
+    samples = test_samples(modes, seed)
+    level = 0.1 * np.abs(samples[:, 1]).max()
+    samples[:, 1] += level * np.random.default_rng(100).normal(size=samples[:, 1].shape)
+    assert "overload" not in reasons_of(samples)
