@@ -99,7 +99,7 @@ def judge_mounting(impacts: Sequence[Impact], response: str) -> tuple[Impact, ..
     if len(lines.frequency) < MIN_LINES or (share := even_order_share(lines, MAX_ALLOWED_DELAY)) < MAX_ACTIVE_SHARE:
         return tuple(impacts)
     detail = (
-        f"the phase of {response} is none of a rail beside the hammer at {100.0 * share:.0f} % of "
+        f"the phase of {response} is not that of a rail beside the hammer at {100.0 * share:.0f} % of "
         f"{len(lines.frequency)} frequencies, whatever the delay between the channels: the sensor is loose and "
         "vibrates on its mounting, or it is far from the hammer; for another structure than a track set "
         "receptance.minimum_peak_force: 0"

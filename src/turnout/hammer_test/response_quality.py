@@ -79,8 +79,8 @@ def judge_saturation(impacts: Sequence[Impact], response: str) -> tuple[Impact, 
     shape of each pulse: the response to a short one follows its impulse, and samples may miss its peak. A saturated
     test has a smaller transfer function, but a prediction that grows with the force. A test is rejected if b lies below
     ``MAX_SATURATED_SLOPE`` by three standard errors. The same holds for its highest and for its lowest value, as a
-    channel may be limited on one side, and for its steepest slope, which an amplifier may limit. A value is not compared
-    if that of the noise before the impact is more than ``MAX_NOISE`` of it.
+    channel may be limited on one side, and for its steepest slope, which an amplifier may limit. A value is not
+    compared if that of the noise before the impact is more than ``MAX_NOISE`` of it.
 
     Parameters
     ----------
