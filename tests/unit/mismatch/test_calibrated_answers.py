@@ -88,6 +88,39 @@ def test_a_growing_effect_is_a_change_with_its_onset_in_the_interval():
     assert answer.onset[0] <= STEP <= answer.onset[1]
 
 
+def during(name, size, first, last):
+    """A change of visits ``first`` to ``last`` alone, as by a logger with another gain for a month."""
+    return lambda v: step(name, size, first)(v) - step(name, size, last + 1)(v)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("last", [2, 3])
+def test_a_change_that_has_ended_is_stated_while_it_lasts_and_not_afterwards(last, seed):
+    visits = histories(np.random.default_rng(seed), 7, during("gain_A1", -0.5, 2, last))
+    answers = [a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0) if a.question == "change"]
+    assert [(a.verdict, a.parameter) for a in answers[2 : last + 1]] == [("named", "gain_A1")] * (last - 1)
+    assert [a.verdict for a in answers[last + 1 :]] == ["none"] * (6 - last)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_change_that_has_ended_does_not_hide_one_that_lasts(seed):
+    ended, lasting = during("gain_A1", -0.5, 2, 2), step("ballast@1.20", -0.4, 4)
+    answer = last_answers(histories(np.random.default_rng(seed), 7, lambda v: ended(v) + lasting(v)))["change"]
+    assert answer.verdict != "none" and answer.parameter == "ballast@1.20"
+    assert answer.onset[0] < 4 * STEP <= answer.onset[1]
+    assert answer.size == pytest.approx(-0.4, abs=4.0 * answer.sd)
+
+
+def test_a_visit_that_differs_alone_and_has_no_name_is_unknown_until_the_next_one():
+    """Signals of a train with another model error in one visit: no parameter explains them."""
+    visits = histories(np.random.default_rng(6), 6, lambda v: 0.0)
+    wrong = visits[3].groups[1]
+    noise = 60.0 * np.random.default_rng(7).standard_normal(len(NAMES))
+    visits[3] = replace(visits[3], groups=(visits[3].groups[0], replace(wrong, vector=wrong.vector + 4.0 * noise)))
+    answers = [a for a in answers_after_visits(PARAMETERS, visits, [], CANDIDATES, 12.0, 6.0) if a.question == "change"]
+    assert answers[3].verdict == "unknown" and [a.verdict for a in answers[4:]] == ["none", "none"]
+
+
 def test_softer_ballast_with_less_effect_on_trains_is_a_hanging_sleeper():
     visits = histories(np.random.default_rng(3), 4, step("ballast@1.20", -1.0, 2), trains_feel=0.3)
     assert last_answers(visits)["change"].names == ("hanging_sleeper",)

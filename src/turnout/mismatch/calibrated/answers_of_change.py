@@ -10,7 +10,7 @@ import numpy as np
 
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
-from turnout.mismatch.calibrated.change_course import courses_of
+from turnout.mismatch.calibrated.change_course import courses_of, visits_of_ended_change
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
@@ -157,7 +157,8 @@ def change_answer(
     Returns
     -------
     ModelAnswer
-        "unknown" if a visit differs from all before, and no name explains it.
+        "unknown" if a visit differs from all before, and no name explains it. A change that has ended before the last
+        visit is none: the visits that show it are left out.
     """
     visit = visits[-1].visit
     levels, history, evidence = _evidence_of_changes(parameters, visits, events, candidates, is_alarmed)
@@ -172,15 +173,24 @@ def change_answer(
         by_stated_errors = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
         answer = _answer_without_name(by_stated_errors, visit, by_name)
         if answer.verdict == "none" or is_alarmed:
+            if _has_ended(answer, parameters, visits, events, by_name):
+                return ModelAnswer(visit, CHANGE, "none")
             return _on_surface(answer, by_stated_errors, surface)
         return change_answer(  # what makes a visit differ has a name, however small it is
             parameters, visits, events, candidates, threshold, margin, True, with_trains, surface
         )
     leader = relevant[0]
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
+    without_loads = parameters, visits
     if is_under_load(leader.effect):
         parameters, visits = with_loads
         history = _history_of_changes(parameters, visits, events, levels)
+    if ended := visits_of_ended_change(history, leader.effect, margin):
+        parameters, visits = without_loads[0], _without(ended, without_loads[1])
+        with_trains = with_trains and (with_trains[0], _without(ended, with_trains[1]))
+        return change_answer(
+            parameters, visits, events, candidates, threshold, margin, is_alarmed, with_trains, surface
+        )
     courses = courses_of(history, leader.effect)
     sizes = (leader.size if leader.effect.grows else courses.last_size, courses.last_size)
     size, total = (_with_model_error(leader.effect, s) for s in sizes)
@@ -200,6 +210,26 @@ def change_answer(
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
     return replace(answer, changed=tuple(leader.effect.direction), total=total[0], total_sd=total[1], ends=ends)
+
+
+def _without(ended: Collection[str], visits: Sequence[VisitInformation]) -> list[VisitInformation]:
+    return [v for v in visits if v.visit not in ended]
+
+
+def _has_ended(
+    answer: ModelAnswer,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    by_name: Mapping[str, StateParameter],
+) -> bool:
+    """Whether the other visits agree, the last one among them, if those that differ are left out one after another."""
+    while answer.onset is not None and answer.onset[1] < visits[-1].time:
+        first = answer.onset[1]
+        visits = [v for v in visits if v.time != first]
+        history = estimate_history(parameters, visits, events, repeats_between_visits=False, accepted=None)
+        answer = _answer_without_name(history, visits[-1].visit, by_name)
+    return answer.verdict == "none"
 
 
 def _history_of_changes(

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
 
 from turnout.mismatch.calibrated.change import ChangeEffect, direction_of
 from turnout.mismatch.calibrated.constants import CALIBRATION
@@ -87,6 +88,55 @@ def courses_of(history: History, effect: ChangeEffect) -> ChangeCourses:
     times = np.array([s.time for s in history.steps])
     if times.size < 2:
         raise ValueError("a change needs two visits")
+    begins, intervals, courses, prior = _lasting_courses(times)
+    gains, sizes, sds = _of_courses(history, effect, courses)
+    log_weights = np.where(begins < effect.not_before, -np.inf, gains + np.log(prior))
+    weights = np.exp(log_weights - log_weights.max())
+    return ChangeCourses(times, intervals, weights / weights.sum(), sizes, sds)
+
+
+def visits_of_ended_change(history: History, effect: ChangeEffect, margin: float) -> tuple[str, ...]:
+    """Successive visits that alone show an effect: a later one no longer does.
+
+    A logger with a wrong gain for a month, for example. As a change that lasts it would have a size between that of
+    these visits and 0.
+
+    Parameters
+    ----------
+    history : History
+        As for ``compare_onsets``, of at least two visits.
+    effect : ChangeEffect
+        Whether it grows makes no difference.
+    margin : float
+        Evidence of a change that ends over one that lasts, each over all of its equally probable courses. [nats]
+
+    Returns
+    -------
+    tuple of str
+        () where the effect lasts up to the last visit, or less than the margin tells the two apart.
+    """
+    times = np.array([s.time for s in history.steps])
+    n = times.size
+    ranges = [(first, stop) for first in range(1, n) for stop in range(first + 1, n)]
+    if not ranges:
+        return ()
+    number = np.arange(n)[:, None]
+    firsts, stops = np.array(ranges).T
+    ended, _, _ = _of_courses(history, effect, ((number >= firsts) & (number < stops)).astype(float))
+    begins, _, courses, prior = _lasting_courses(times)
+    lasting, _, _ = _of_courses(history, effect, courses)
+    lasting = np.where(begins < effect.not_before, -np.inf, lasting)
+    if logsumexp(ended - np.log(len(ranges))) - logsumexp(lasting, b=prior) < margin:
+        return ()
+    first, stop = ranges[int(np.argmax(ended))]
+    return tuple(s.visit for s in history.steps[first:stop])
+
+
+def _lasting_courses(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Courses that do not end: (n_course,) begins [years] and intervals, (n_visit, n_course) sizes, (n_course,) prior.
+
+    A step, growth up to the last visit, or growth that has ended.
+    """
     n = times.size - 1
     n_days = max(MIN_DAYS, N_DAYS // n)
     edges = np.interp(np.arange(n * n_days + 1) / n_days, np.arange(n + 1), times)
@@ -99,10 +149,7 @@ def courses_of(history: History, effect: ChangeEffect) -> ChangeCourses:
     )
     begins, ends, intervals = (np.concatenate(parts) for parts in zip(*forms, strict=True))
     n_alike = np.concatenate([np.bincount(interval, minlength=n)[interval] for _, _, interval in forms])
-    gains, sizes, sds = _of_courses(history, effect, _courses(times, begins, ends))
-    log_weights = np.where(begins < effect.not_before, -np.inf, gains - np.log(n_alike))
-    weights = np.exp(log_weights - log_weights.max())
-    return ChangeCourses(times, intervals, weights / weights.sum(), sizes, sds)
+    return begins, intervals, _courses(times, begins, ends), 1.0 / (len(forms) * n * n_alike)
 
 
 def _courses(times: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> np.ndarray:
