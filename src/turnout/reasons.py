@@ -47,8 +47,6 @@ REASONS = {
     "noisy": "the level before the impact is too high",
     "late": "the impact is not at the trigger, began before the record, or leaves too little decay",
     "not_simultaneous": "the response begins before the force or long after it",
-    "loose_sensor": "the phase of the response is not that of a rail beside the hammer, whatever the delay",
-    "zero_shift": "the zero of the response shifts at the impact",
     "cut_off": "the record ends before the vibration has died away",
     "not_selected": "the test has more impacts than wanted, and the others agree better",
     "odd_one_out": "the response disagrees with all other impacts of the test",

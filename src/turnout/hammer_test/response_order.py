@@ -1,7 +1,6 @@
 """Which derivative of the displacement a response is, from the phase of the driving-point function.
 
-A velocity in mm/s read as an acceleration in m/s² is of the size of an acceleration. Its phase is not. Nor is that of a
-loose sensor, which lags behind the rail by half a period above the resonance of its mounting.
+A velocity in mm/s read as an acceleration in m/s² is of the size of an acceleration. Its phase is not.
 """
 
 from __future__ import annotations
@@ -24,12 +23,6 @@ ERRORS, MAX_PHASE_ERROR = 3.0, 0.3  # standard errors of a phase that noise expl
 MIN_IMPACTS, MIN_LINES = 3, 20  # below them the phases tell nothing
 # Share of the lines with a negative real part: passive structures have none, one line in fifty may be an interference.
 REFUTED, SUPPORTED = 0.1, 0.02
-# s, delay with which a response may still be that of a sensor that follows the rail: a delay changes no mode. None
-# explains the resonance of a mounting, which turns the phase by half a period.
-MAX_ALLOWED_DELAY = 1e-3
-MAX_ACTIVE_SHARE = 0.05  # of the lines; a sensor up to 0.2 m beside the hammer has 0.003 at most, 0.5 m 0.05
-MIN_MOUNTING_FREQUENCY = 100.0  # Hz: below, a shift of the zero turns the phase, and no mounting resonates
-DELAY_STEP = 2.5e-5  # s, between trial delays; 7 degrees at 800 Hz
 
 
 class PhaseLines(NamedTuple):
@@ -70,41 +63,6 @@ def judge_response_order(impacts: Sequence[Impact], response: str) -> tuple[Impa
         "has such a phase, too"
     )
     rejection = Rejection("out_of_scale", share, REFUTED, detail, response)
-    return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)
-
-
-def judge_mounting(impacts: Sequence[Impact], response: str) -> tuple[Impact, ...]:
-    """Reject a test if no delay makes the phases of its response those of a rail beside the hammer.
-
-    Above the resonance of its mounting a loose sensor lags behind the rail by half a period. Its resonance looks like a
-    mode of the track with a small error.
-
-    Parameters
-    ----------
-    impacts : sequence of Impact
-        All impacts of a test; the accepted ones are used.
-    response : str
-        Name of the response's channel, for the message.
-
-    Returns
-    -------
-    tuple of Impact
-        The impacts, with a rejection "loose_sensor" in the accepted ones of such a test.
-    """
-    accepted = [i for i in impacts if i.accepted]
-    if len(accepted) < MIN_IMPACTS:
-        return tuple(impacts)
-    lines = phase_lines(accepted)
-    lines = PhaseLines(*(values[lines.frequency >= MIN_MOUNTING_FREQUENCY] for values in lines))
-    if len(lines.frequency) < MIN_LINES or (share := even_order_share(lines, MAX_ALLOWED_DELAY)) < MAX_ACTIVE_SHARE:
-        return tuple(impacts)
-    detail = (
-        f"the phase of {response} is not that of a rail beside the hammer at {100.0 * share:.0f} % of "
-        f"{len(lines.frequency)} frequencies, whatever the delay between the channels: the sensor is loose and "
-        "vibrates on its mounting, or it is far from the hammer; for another structure than a track set "
-        "receptance.minimum_peak_force: 0"
-    )
-    rejection = Rejection("loose_sensor", share, MAX_ACTIVE_SHARE, detail, response)
     return tuple(replace(i, rejections=(rejection,)) if i.accepted else i for i in impacts)
 
 
@@ -160,25 +118,23 @@ def is_velocity(lines: PhaseLines) -> bool:
     return even_order_share(lines) >= REFUTED and odd_share <= SUPPORTED
 
 
-def even_order_share(lines: PhaseLines, max_delay: float = MAX_DELAY) -> float:
+def even_order_share(lines: PhaseLines) -> float:
     """The smaller ``active_share`` of a displacement and an acceleration, whose phases differ by the sign.
 
     Parameters
     ----------
     lines : PhaseLines
         Response per force.
-    max_delay : float
-        Of the response behind the force, or before it. [s]
 
     Returns
     -------
     float
         0 to 1.
     """
-    return min(active_share(lines, 0, max_delay), active_share(lines, 2, max_delay))
+    return min(active_share(lines, 0), active_share(lines, 2))
 
 
-def active_share(lines: PhaseLines, order: int, max_delay: float = MAX_DELAY) -> float:
+def active_share(lines: PhaseLines, order: int) -> float:
     r"""Share of the lines at which a response of a derivative order would be that of an active structure.
 
     The force feeds energy into a passive structure at every frequency, so its driving-point mobility has a real part
@@ -187,7 +143,7 @@ def active_share(lines: PhaseLines, order: int, max_delay: float = MAX_DELAY) ->
     .. math:: \mathrm{Re}\, Y(\omega) \ge 0, \qquad Y = (i\omega)^{1 - n} H_n
 
     with the response per force :math:`H_n` for the n-th derivative of the displacement. The least share for any delay
-    between the channels of at most ``max_delay`` counts.
+    between the channels of at most ``MAX_DELAY`` counts.
 
     Parameters
     ----------
@@ -195,8 +151,6 @@ def active_share(lines: PhaseLines, order: int, max_delay: float = MAX_DELAY) ->
         Response per force at the driving point.
     order : int
         0 for a displacement, 1 for a velocity, 2 for an acceleration. Two more have the reversed sign.
-    max_delay : float
-        [s]
 
     Returns
     -------
@@ -219,6 +173,6 @@ def active_share(lines: PhaseLines, order: int, max_delay: float = MAX_DELAY) ->
     """
     omega = 2.0 * np.pi * lines.frequency
     phase = np.angle((1j) ** (1 - order) * lines.h)
-    delays = np.linspace(-max_delay, max_delay, 2 * round(max_delay / DELAY_STEP) + 1)[:, None]
+    delays = np.linspace(-MAX_DELAY, MAX_DELAY, 9)[:, None]
     outside = np.cos(phase + omega * delays) < -np.sin(ERRORS * lines.error) - 1e-9
     return float(outside.mean(axis=1).min())

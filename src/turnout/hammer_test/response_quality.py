@@ -13,9 +13,8 @@ import numpy as np
 from turnout.hammer_test.best_subset import select_best
 from turnout.hammer_test.impacts import find_impacts
 from turnout.hammer_test.limited_response import contact_spectra, judge_limited_impacts, transfer_function
-from turnout.hammer_test.response_order import judge_mounting, judge_response_order
+from turnout.hammer_test.response_order import judge_response_order
 from turnout.hammer_test.response_scale import judge_response_scale
-from turnout.hammer_test.zero_shift import judge_zero_shift
 from turnout.records import Rejection
 
 if TYPE_CHECKING:
@@ -55,10 +54,8 @@ def find_track_impacts(
     impacts = judge_saturation(impacts, response)
     impacts = judge_limited_impacts(impacts, response)
     if is_track:
-        impacts = judge_zero_shift(impacts, response)
         impacts = judge_response_order(impacts, response)
         impacts = judge_response_scale(impacts, response)
-        impacts = judge_mounting(impacts, response)
     return select_best(impacts, settings)  # among those that no other test has rejected
 
 

@@ -104,11 +104,11 @@ def test_a_change_that_has_ended_is_stated_while_it_lasts_and_not_afterwards(las
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_change_that_has_ended_does_not_hide_one_that_lasts(seed):
-    ended, lasting = during("gain_A1", -0.5, 2, 2), step("ballast@1.20", -0.4, 4)
+    ended, lasting = during("gain_A1", -0.9, 2, 4), step("ballast@1.20", -0.5, 4)
     answer = last_answers(histories(np.random.default_rng(seed), 7, lambda v: ended(v) + lasting(v)))["change"]
     assert answer.verdict != "none" and answer.parameter == "ballast@1.20"
     assert answer.onset[0] < 4 * STEP <= answer.onset[1]
-    assert answer.size == pytest.approx(-0.4, abs=4.0 * answer.sd)
+    assert answer.size == pytest.approx(-0.5, abs=4.0 * answer.sd)
 
 
 def test_a_visit_that_differs_alone_and_has_no_name_is_unknown_until_the_next_one():

@@ -1,4 +1,4 @@
-"""A loose sensor, a zero that shifts at the impact and a channel limited on one side are found; sound tests are not."""
+"""A channel that is limited on one side is found; sound tests and noise are not taken for one."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ from scipy import signal
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.hammer_test.response_quality import find_track_impacts
-from turnout.hammer_test.zero_shift import MAX_SHARE, step_share
 from turnout.records import Channel, Recording
 
 RATE, FINE, N = 20_000.0, 8, 4000
@@ -57,67 +56,17 @@ def reasons_of(samples):
     return {r.reason for i in impacts_of(samples) for r in i.rejections}
 
 
-def on_mounting(frequency):
-    """A sensor that resonates on its mounting."""
-    w = 2.0 * np.pi * frequency
-    transfer = signal.bilinear([0.06 * w, w**2], [1.0, 0.06 * w, w**2], FINE * RATE)
-    return lambda a, rng: signal.lfilter(*transfer, a)
-
-
-def with_step(share, decay):
-    """A zero that shifts at the impact by a share of the peak and returns within some ``decay`` [s]."""
-
-    def change(a, rng):
-        time = np.arange(a.size) / (FINE * RATE) - ONSET
-        return a + np.where(time > 0.0, share * np.abs(a).max() * np.exp(-time / decay), 0.0)
-
-    return change
-
-
 @pytest.mark.parametrize("modes", TRACKS)
 @pytest.mark.parametrize("seed", range(4))
 def test_sound_tests_are_accepted(modes, seed):
-    impacts = impacts_of(test_samples(modes, seed))
-    assert all(i.accepted for i in impacts)
-    assert abs(step_share(impacts)[0]) < MAX_SHARE / 10.0
-
-
-@pytest.mark.parametrize("modes", TRACKS)
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("frequency", [550.0, 700.0])
-def test_a_sensor_that_resonates_on_its_mounting_is_found(modes, frequency, sign):
-    assert reasons_of(test_samples(modes, 1, on_mounting(frequency)) * [[1.0], [sign]]) == {"loose_sensor"}
-
-
-@pytest.mark.parametrize("samples", [-3, 2, 5])
-def test_a_delay_of_some_samples_is_no_loose_sensor(samples):
-    delayed = test_samples(TRACKS[0], 2)
-    delayed[:, 1] = np.roll(delayed[:, 1], samples, axis=1)
-    assert reasons_of(delayed) == set()
-
-
-@pytest.mark.parametrize("modes", TRACKS[:2])
-@pytest.mark.parametrize("share", [-0.1, 0.1])
-@pytest.mark.parametrize("decay", [0.1, 1.0])
-def test_a_zero_that_shifts_at_the_impact_is_found(modes, share, decay):
-    impacts = impacts_of(test_samples(modes, 3, with_step(share, decay)))
-    assert {r.reason for i in impacts for r in i.rejections} == {"zero_shift"}
-    assert "the zero of rail shifts" in impacts[0].rejections[0].detail
-
-
-def test_a_zero_that_drifts_at_random_is_no_shift():
-    def drift(a, rng):
-        time = np.arange(a.size) / (FINE * RATE)
-        return a + 0.1 * np.abs(a).max() * np.sin(2.0 * np.pi * 0.7 * time + rng.uniform(0.0, 6.3))
-
-    assert "zero_shift" not in reasons_of(test_samples(TRACKS[0], 4, drift))
+    assert all(i.accepted for i in impacts_of(test_samples(modes, seed)))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_response_that_is_limited_on_one_side_in_all_impacts_is_found(side):
     """Its peak grows all the same: that of the other side."""
     whole = test_samples(TRACKS[0], 5)
-    lower = min(np.median(np.max(side * a, axis=1)) for a in (whole[:, 1],))
+    lower = np.median(np.max(side * whole[:, 1], axis=1))
     limited = test_samples(TRACKS[0], 5, lambda a, rng: side * np.minimum(side * a, 0.5 * lower))
     assert reasons_of(limited) == {"overload"}
 
