@@ -53,8 +53,8 @@ class FittedGroup:
         return replace(self, fit=self.fit.without_jacobian())
 
 
-class KeyedInformation(MutableMapping[str, tuple[GroupInformation, ...]]):
-    """Information by ``key_of`` on disk, one file for each visit: that of another belief before it is replaced.
+class KeyedFits(MutableMapping[str, Mapping[str, Any]]):
+    """Results of new fits by ``key_of``, on disk, one file for each visit: that of another belief before is replaced.
 
     Parameters
     ----------
@@ -70,17 +70,18 @@ class KeyedInformation(MutableMapping[str, tuple[GroupInformation, ...]]):
         visit = key.rpartition("-")[0]
         return visit, self.folder / f"{visit}{SUFFIX}"
 
-    def __getitem__(self, key: str) -> tuple[GroupInformation, ...]:
+    def __getitem__(self, key: str) -> Mapping[str, Any]:
         visit, path = self._visit_and_path(key)
         value = read_value(path)
         if value["key"] != key or value["version"] != dict(self.versions[visit]):
             raise KeyError(key)
-        return unpacked_groups(value["groups"])
+        found: Mapping[str, Any] = value["fit"]
+        return found
 
-    def __setitem__(self, key: str, information: tuple[GroupInformation, ...]) -> None:
+    def __setitem__(self, key: str, fit: Mapping[str, Any]) -> None:
         visit, path = self._visit_and_path(key)
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_value(path, {"key": key, "version": dict(self.versions[visit]), "groups": packed_groups(information)})
+        write_value(path, {"key": key, "version": dict(self.versions[visit]), "fit": dict(fit)})
 
     def __delitem__(self, key: str) -> None:
         self._visit_and_path(key)[1].unlink()
@@ -128,7 +129,7 @@ def agreeing_visits(
     visits: Sequence[VisitInformation],
     events: Sequence[Event],
     fitted_groups: Callable[[str], Sequence[FittedGroup]],
-    store: MutableMapping[str, tuple[GroupInformation, ...]],
+    store: MutableMapping[str, Mapping[str, Any]],
     threshold: float,
 ) -> list[VisitInformation]:
     """The visits, those that agree with earlier ones after a new linearization with that information.
@@ -144,7 +145,7 @@ def agreeing_visits(
     fitted_groups : callable
         Visit -> its fits.
     store : mutable mapping
-        Key of a visit and the belief before it -> information, () where the visit differs.
+        Key of a visit and the belief before it -> "groups": its information packed, [] where the visit differs.
     threshold : float
         Evidence that a name needs. A visit whose own linear model overstates its difference by less is left as it is:
         about its own maximum, a true change is described better. [nats]
@@ -162,18 +163,17 @@ def agreeing_visits(
         if k is None:
             return current
         key = key_of(current[k], steps[k].predicted)
-        information = store.get(key)
-        if information is None:
+        if (found := store.get(key)) is None:
             try:
                 information = _information_given(
                     parameters, current[: k + 1], events, steps[k], fitted_groups, threshold
                 )
             except (SimulationError, np.linalg.LinAlgError):
                 information = ()
-            store[key] = information
-        if not information:
+            store[key] = found = {"groups": packed_groups(information)}
+        if not found["groups"]:
             return current
-        current[k] = replace(current[k], groups=information)
+        current[k] = replace(current[k], groups=unpacked_groups(found["groups"]))
         n_done = k + 1
 
 

@@ -31,7 +31,7 @@ from turnout.mismatch.calibrated.stiffness_under_load import candidates_under_lo
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
 from turnout.mismatch.turnout.unproven_panels import reservation
 from turnout.stages.accepted_changes import changes_of, further_candidates, without_accepted
-from turnout.stages.agreeing_visits import KeyedInformation, agreeing_visits
+from turnout.stages.agreeing_visits import KeyedFits, agreeing_visits
 from turnout.stages.combined_visits import (
     complete_visits,
     parameters_of,
@@ -49,7 +49,7 @@ from turnout.stages.track_files import track_of
 from turnout.stages.visit_fits import VisitFits
 from turnout.stages.visit_notes import summary_of_notes
 from turnout.stages.visit_time import day_of
-from turnout.stages.visits_unlike_others import notes_on_channels
+from turnout.stages.visits_unlike_others import notes_on_channels, unlike_visits
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -180,9 +180,12 @@ def _model_of_visits(
     events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
     settings = turnout.settings["mismatch"]
     versions = by_content(fits.versions)
-    again, restarted = (KeyedInformation(fits.folder / f / turnout.id, versions) for f in (AGREEING, RESTARTED))
+    again, restarted = (KeyedFits(fits.folder / f / turnout.id, versions) for f in (AGREEING, RESTARTED))
     informed = agreeing_visits(parameters, informed, events, fits.of_visit, again, settings.threshold)
-    informed = restarted_visits(parameters, informed, events, fits.of_visit, fits.from_belief, restarted)
+    informed, levels = restarted_visits(
+        parameters, informed, events, fits.of_visit, fits.from_belief, restarted, unlike_visits(stored)
+    )
+    stored = [replace(s, levels=levels.get((s.visit, s.sections), s.levels)) for s in stored]
     stored = with_information(stored, informed)
     history = estimate_history(parameters, visits_of(without_findings(stored)), events)
     changes = estimate_history(parameters, informed, events, repeats_between_visits=False, accepted=None)

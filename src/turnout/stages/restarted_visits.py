@@ -1,22 +1,23 @@
-"""Visits that differ from the earlier ones, fitted again from the values that these predict.
+"""Visits whose fit ended at a wrong maximum, fitted again from the values that other visits predict.
 
 A visit is fitted from the values of the file, and where something has changed much, such a fit may end at a wrong
-maximum. The turnout itself is known better from its earlier visits. Of the two fits the one with more evidence counts.
+maximum. The turnout itself is known better from its other visits. Of the two fits the one with more evidence counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, MutableMapping, Sequence
+from collections.abc import Callable, Collection, Mapping, MutableMapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.calibrated import Event, GroupInformation, StateParameter, VisitInformation, estimate_history
-from turnout.mismatch.turnout.calibration import visit_groups
-from turnout.stages.agreeing_visits import FittedGroup, key_of
+from turnout.mismatch.calibrated import Event, StateParameter, VisitInformation, estimate_history
+from turnout.mismatch.turnout.calibration import channel_levels, visit_groups
+from turnout.stages.agreeing_visits import FittedGroup, key_of, packed_groups, unpacked_groups
+from turnout.stages.visits_unlike_others import MIN_OTHER_VISITS
 
 if TYPE_CHECKING:
     from turnout.mismatch.calibrated.belief import Belief
@@ -29,11 +30,14 @@ def restarted_visits(
     events: Sequence[Event],
     fitted_groups: Callable[[str], Sequence[FittedGroup]],
     fit_from: Callable[[str, Belief], Sequence[FittedGroup]],
-    store: MutableMapping[str, tuple[GroupInformation, ...]],
-) -> list[VisitInformation]:
-    """The visits, with the fits that begin where the earlier visits predict them to be where these are better.
+    store: MutableMapping[str, Mapping[str, Any]],
+    unlike: Collection[str] = (),
+) -> tuple[list[VisitInformation], dict[tuple[str, str], Mapping[str, float]]]:
+    """The visits, with the fits that begin where other visits predict them to be where these are better.
 
-    Only visits that differ from all before and whose fits leave more than noise are fitted again.
+    Fitted again are the visits ``unlike`` the others, and those that differ from all before and whose fits leave more
+    than noise. A visit unlike the others begins at the values of those before it; the first ones have too few, and
+    begin at those of the next.
 
     Parameters
     ----------
@@ -45,45 +49,55 @@ def restarted_visits(
     fit_from : callable
         Visit and belief -> its fits, from the means of the belief, with their Jacobians.
     store : mutable mapping
-        Key of a visit and the belief before it -> information of the better fits, () where there is none.
+        Key of a visit and the belief that it begins from -> "groups" and "levels" of the better fits, empty where there
+        is none.
+    unlike : collection of str
+        Visits whose fits leave more of a channel than those of the others.
 
     Returns
     -------
-    list of VisitInformation
+    visits : list of VisitInformation
         In the order of time.
+    levels : dict
+        Visit and sections of each better fit -> its ``channel_levels``.
     """
     current = sorted(visits, key=lambda v: (v.time, v.visit))
+    levels: dict[tuple[str, str], Mapping[str, float]] = {}
 
-    def steps() -> Sequence[Step]:
-        return estimate_history(parameters, current, events, repeats_between_visits=False, accepted=None).steps
+    def steps(chosen: Sequence[VisitInformation]) -> Sequence[Step]:
+        return estimate_history(parameters, chosen, events, repeats_between_visits=False, accepted=None).steps
 
-    history = steps()
+    def use_better_fit(k: int, belief: Belief) -> None:
+        visit, key = current[k].visit, key_of(current[k], belief)
+        if (found := store.get(key)) is None:
+            again = partial(fit_from, visit, belief)
+            store[key] = found = _better_fits(fitted_groups(visit), again, is_unlike=visit in unlike)
+        replaced = {g.group: g for g in unpacked_groups(found["groups"])}
+        current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
+        levels.update({(visit, sections): of for sections, of in found["levels"].items()})
+
+    for k, visit in enumerate(current):
+        others = current[:k] if k >= MIN_OTHER_VISITS else [*current[:k], *current[k + 1 :]][:MIN_OTHER_VISITS]
+        if visit.visit in unlike:
+            use_better_fit(k, steps(others)[-1].belief)
+    history = steps(current)
     for k in range(1, len(current)):
-        step = history[k]
-        if step.innovation.is_expected:
-            continue
-        key = key_of(current[k], step.predicted)
-        information = store.get(key)
-        if information is None:
-            information = _better_information(fitted_groups(step.visit), partial(fit_from, step.visit, step.predicted))
-            store[key] = information
-        if information:
-            replaced = {g.group: g for g in information}
-            current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
-            history = steps()  # what later visits are compared with
-    return current
+        if current[k].visit not in unlike and not history[k].innovation.is_expected:
+            use_better_fit(k, history[k].predicted)
+            history = steps(current)  # what later visits are compared with
+    return current, levels
 
 
-def _better_information(
-    fitted: Sequence[FittedGroup], fit_again: Callable[[], Sequence[FittedGroup]]
-) -> tuple[GroupInformation, ...]:
-    """Information of the groups of sections whose second fit has more evidence than the first."""
-    evidence = {g.sections: g.fit.evidence for g in fitted if max(g.fit.scale.values()) > 1.0}
-    if not evidence:
-        return ()
+def _better_fits(
+    fitted: Sequence[FittedGroup], fit_again: Callable[[], Sequence[FittedGroup]], is_unlike: bool
+) -> dict[str, Any]:
+    """Groups of sections whose second fit has more evidence than the first: information, and levels by sections."""
+    evidence = {g.sections: g.fit.evidence for g in fitted if is_unlike or max(g.fit.scale.values()) > 1.0}
     try:
-        again = fit_again()
+        again = fit_again() if evidence else ()
     except (SimulationError, np.linalg.LinAlgError):
-        return ()
+        again = ()
     better = [g for g in again if g.fit.evidence > evidence.get(g.sections, np.inf)]
-    return tuple(i for g in better for i in visit_groups(g.case, g.fit, g.sections, g.route))
+    information = [i for g in better for i in visit_groups(g.case, g.fit, g.sections, g.route)]
+    levels = {g.sections: channel_levels(g.case, g.fit) for g in better}
+    return {"groups": packed_groups(information), "levels": levels}

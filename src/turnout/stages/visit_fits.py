@@ -92,7 +92,7 @@ class VisitFits:
     def _fit(self, label: str, start: Belief | None = None, stores: bool = False) -> list[FittedGroup]:
         about = {"turnout": self.turnout, "visit": label, "version": self.versions[label], "without": self.without}
         about["answers"] = {of: answer for (visit, of), answer in self.answers.items() if visit == label}
-        again = " from the values that earlier visits predict" if start else ""
+        again = " from the values that other visits predict" if start else ""
         print(f"{self.turnout.id}: fit of visit {label}{again}", file=sys.stderr, flush=True)
         paths = self.folder, self.raw_root, self.work, self.track
         fitted, reasons = _fit_visit(*paths, self.units[label], about, start, stores)

@@ -33,20 +33,40 @@ def notes_on_channels(turnout_id: str, stored: Iterable[StoredVisit]) -> list[st
     list of str
         In the order of the visits.
     """
+    return [
+        f"visit {visit}: {channel} differs from the fitted simulation {ratio:.2g} times as much as at the other visits "
+        f"(mean square, {n} visits): turnout diagnose --turnout {turnout_id} --visit {visit} examines it"
+        for (visit, _), of_visit in sorted(_unlike_channels(stored).items())
+        for ratio, channel, n in [max(of_visit)]
+    ]
+
+
+def unlike_visits(stored: Iterable[StoredVisit]) -> set[str]:
+    """Visits whose fits leave more of a channel than those of the other visits.
+
+    Parameters
+    ----------
+    stored : iterable of StoredVisit
+        All visits.
+
+    Returns
+    -------
+    set of str
+    """
+    return {visit for visit, _ in _unlike_channels(stored)}
+
+
+def _unlike_channels(stored: Iterable[StoredVisit]) -> dict[tuple[str, str], list[tuple[float, str, int]]]:
+    """Visit and sections -> ratio of a level to that of the other visits, channel, and number of these visits."""
     levels: dict[tuple[str, str], dict[str, float]] = {}
     for s in stored:
         for channel, level in s.levels.items():
             levels.setdefault((s.sections, channel), {})[s.visit] = level
-    ratios: dict[tuple[str, str], list[tuple[float, str, int]]] = {}
+    unlike: dict[tuple[str, str], list[tuple[float, str, int]]] = {}
     for (sections, channel), by_visit in levels.items():
         for visit, level in by_visit.items():
             others = [other for v, other in by_visit.items() if v != visit]
             if len(others) >= MIN_OTHER_VISITS and level > MAX_RATIO * float(np.median(others)):
                 ratio = level / float(np.median(others))
-                ratios.setdefault((visit, sections), []).append((ratio, channel, len(others)))
-    return [
-        f"visit {visit}: {channel} differs from the fitted simulation {ratio:.2g} times as much as at the other visits "
-        f"(mean square, {n} visits): turnout diagnose --turnout {turnout_id} --visit {visit} examines it"
-        for (visit, _), of_visit in sorted(ratios.items())
-        for ratio, channel, n in [max(of_visit)]
-    ]
+                unlike.setdefault((visit, sections), []).append((ratio, channel, len(others)))
+    return unlike

@@ -16,7 +16,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.turnout.relinearization import NormalPrior, fit_all_recordings, fit_given_belief
 from turnout.stages import agreeing_visits as agreeing
-from turnout.stages.agreeing_visits import FittedGroup, KeyedInformation, agreeing_visits
+from turnout.stages.agreeing_visits import FittedGroup, KeyedFits, agreeing_visits
 
 ERROR = 0.1
 SHARED = {name: StateParameter(name, 0.0, 2.0, group="surface") for name in ("length", "depth")}
@@ -204,12 +204,12 @@ def test_a_visit_is_not_linearized_again_if_its_linear_model_errs_by_less_than_a
 
 def test_stored_linearizations_are_used_until_earlier_visits_or_the_code_change(history, tmp_path):
     versions = {f"{2020 + k}-01-01": {"code": "a"} for k in range(3)}
-    store = KeyedInformation(tmp_path, versions)
+    store = KeyedFits(tmp_path, versions)
     first = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], store)
-    again = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedInformation(tmp_path, versions))
+    again = history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedFits(tmp_path, versions))
     assert (first.asked, again.asked) == (["2021-01-01"], [])
     for a, b in zip(first.after, again.after):
         assert all(np.array_equal(x.matrix, y.matrix) for x, y in zip(a.groups, b.groups))
-    assert history([1.02, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedInformation(tmp_path, versions)).asked == ["2021-01-01"]
+    assert history([1.02, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedFits(tmp_path, versions)).asked == ["2021-01-01"]
     other_code = {day: {"code": "b"} for day in versions}
-    assert history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedInformation(tmp_path, other_code)).asked == ["2021-01-01"]
+    assert history([1.0, 1.0, 1.0], [1.0, -1.0, 1.0], KeyedFits(tmp_path, other_code)).asked == ["2021-01-01"]

@@ -15,7 +15,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.stages import restarted_visits as restarted
 from turnout.stages import visit_fits
-from turnout.stages.agreeing_visits import FittedGroup, KeyedInformation
+from turnout.stages.agreeing_visits import FittedGroup, KeyedFits
 from turnout.stages.restarted_visits import restarted_visits
 from turnout.stages.visit_fits import VisitFits
 
@@ -48,8 +48,9 @@ def information_of(case, fit, sections="S1", route="main"):
 def history(monkeypatch):
     """Lengths of the visits and where the fits of each begin -> lengths by the information before and after."""
     monkeypatch.setattr(restarted, "visit_groups", information_of)
+    monkeypatch.setattr(restarted, "channel_levels", lambda case, fit: {"train": float(np.mean(fit.white[0] ** 2))})
 
-    def of(lengths, starts, fit_from=None, store=None, scale=None):
+    def of(lengths, starts, fit_from=None, store=None, scale=None, unlike=()):
         cases = {f"{2020 + k}-01-01": Waves(length, k) for k, length in enumerate(lengths)}
         fits = {day: fit_jointly(c, values={"length": s}) for (day, c), s in zip(cases.items(), starts)}
         if scale:
@@ -64,12 +65,12 @@ def history(monkeypatch):
             begun[day] = belief.mean.item()
             return group(day, fit_jointly(cases[day], values={"length": begun[day]}))
 
-        after = restarted_visits(
+        after, levels = restarted_visits(
             [PARAMETER], visits, (), lambda day: group(day, fits[day].without_jacobian()), fit_from or from_belief,
-            {} if store is None else store,
+            {} if store is None else store, unlike,
         )  # fmt: skip
         means = [[(v.groups[0].vector / v.groups[0].matrix).item() for v in of_visits] for of_visits in (visits, after)]
-        return SimpleNamespace(before=means[0], after=means[1], begun=begun)
+        return SimpleNamespace(before=means[0], after=means[1], begun=begun, levels=levels)
 
     return of
 
@@ -79,6 +80,26 @@ def test_a_change_is_found_from_the_earlier_values_where_the_fit_from_the_file_m
     assert abs(result.before[2]) < 0.5
     assert result.begun == {"2022-01-01": pytest.approx(1.0, abs=0.1)}
     assert result.after == [*result.before[:2], pytest.approx(1.3, abs=0.1)]
+
+
+@pytest.mark.parametrize(("k", "begin"), [(0, 1.0), (1, 1.0), (3, 1.0)])
+def test_a_visit_unlike_the_others_is_fitted_again_from_their_values_also_if_it_is_the_first(history, k, begin):
+    """Its fit leaves no more than the noise of any turnout, but more than the others."""
+    starts = [FILE if v == k else OWN for v in range(4)]
+    lengths = [1.3 if v == k else 1.0 for v in range(4)]
+    day = f"{2020 + k}-01-01"
+    result = history(lengths, starts, scale=1.0, unlike=(day,))
+    assert abs(result.before[k]) < 0.5 and result.begun == {day: pytest.approx(begin, abs=0.1)}
+    assert result.after[k] == pytest.approx(1.3, abs=0.1)
+    assert list(result.levels) == [(day, "S1")] and result.levels[day, "S1"]["train"] < 2.0
+    assert [a for v, a in enumerate(result.after) if v != k] == [b for v, b in enumerate(result.before) if v != k]
+
+
+def test_a_visit_unlike_the_others_stays_where_its_fit_was_right(history):
+    """A logger was wrong: from the values of the others the fit ends at the same maximum."""
+    result = history([1.0, 1.0, 1.0], [OWN, OWN, OWN], unlike=("2021-01-01",))
+    assert list(result.begun) == ["2021-01-01"]
+    assert result.after == pytest.approx(result.before, abs=1e-6)
 
 
 def test_later_visits_begin_where_all_corrected_ones_predict_them(history):
@@ -117,7 +138,7 @@ def test_a_visit_that_cannot_be_fitted_again_stays(history):
 def test_stored_fits_are_used_until_an_earlier_visit_changes(history, tmp_path):
     versions = {f"{2020 + k}-01-01": {"code": "a"} for k in range(3)}
     first, again, other = (
-        history([length, 1.0, 1.3], [OWN, OWN, FILE], store=KeyedInformation(tmp_path, versions))
+        history([length, 1.0, 1.3], [OWN, OWN, FILE], store=KeyedFits(tmp_path, versions))
         for length in (1.0, 1.0, 1.02)
     )
     assert list(first.begun) == list(other.begun) == ["2022-01-01"] and again.begun == {}
