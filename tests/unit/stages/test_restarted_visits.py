@@ -99,7 +99,7 @@ def test_a_visit_unlike_the_others_stays_where_its_fit_was_right(history):
     """A logger was wrong: from the values of the others the fit ends at the same maximum."""
     result = history([1.0, 1.0, 1.0], [OWN, OWN, OWN], unlike=("2021-01-01",))
     assert list(result.begun) == ["2021-01-01"]
-    assert result.after == pytest.approx(result.before, abs=1e-6)
+    assert result.after == pytest.approx(result.before, abs=1e-4)  # a hundredth of the standard error
 
 
 def test_later_visits_begin_where_all_corrected_ones_predict_them(history):
