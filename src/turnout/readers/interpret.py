@@ -253,7 +253,8 @@ class _Conversion:
         vibrations = [record.samples[m.index] for m in channel_maps if m.channel.quantity != "temperature"]
         first, stop = measured_span(vibrations) if vibrations else (0, n_sample)
         of_marks += _end_remarks(n_sample, first, stop, where, source)
-        of_marks += _silence_remarks(record, channel_maps, first, stop, where, source)
+        if description.kind != "passage":  # whose analysis reports a sensor that is lost
+            of_marks += _silence_remarks(record, channel_maps, first, stop, where, source)
         n_sample = stop - first
         started_at = started_at + timedelta(seconds=first / rate) if started_at else None
         block_reader = BlockReader(record, channel_maps, where, source, source.state(), first)

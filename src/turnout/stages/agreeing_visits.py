@@ -75,8 +75,8 @@ class KeyedFits(MutableMapping[str, Mapping[str, Any]]):
         value = read_value(path)
         if value["key"] != key or value["version"] != dict(self.versions[visit]):
             raise KeyError(key)
-        found: Mapping[str, Any] = value["fit"]
-        return found
+        new_fit: Mapping[str, Any] = value["fit"]
+        return new_fit
 
     def __setitem__(self, key: str, fit: Mapping[str, Any]) -> None:
         visit, path = self._visit_and_path(key)
@@ -163,17 +163,17 @@ def agreeing_visits(
         if k is None:
             return current
         key = key_of(current[k], steps[k].predicted)
-        if (found := store.get(key)) is None:
+        if (new_fit := store.get(key)) is None:
             try:
                 information = _information_given(
                     parameters, current[: k + 1], events, steps[k], fitted_groups, threshold
                 )
             except (SimulationError, np.linalg.LinAlgError):
                 information = ()
-            store[key] = found = {"groups": packed_groups(information)}
-        if not found["groups"]:
+            store[key] = new_fit = {"groups": packed_groups(information)}
+        if not new_fit["groups"]:
             return current
-        current[k] = replace(current[k], groups=unpacked_groups(found["groups"]))
+        current[k] = replace(current[k], groups=unpacked_groups(new_fit["groups"]))
         n_done = k + 1
 
 

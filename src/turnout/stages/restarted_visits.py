@@ -69,17 +69,17 @@ def restarted_visits(
 
     def use_better_fit(k: int, belief: Belief) -> None:
         visit, key = current[k].visit, key_of(current[k], belief)
-        if (found := store.get(key)) is None:
+        if (new_fit := store.get(key)) is None:
             again = partial(fit_from, visit, belief)
-            store[key] = found = _better_fits(fitted_groups(visit), again, is_unlike=visit in unlike)
-        replaced = {g.group: g for g in unpacked_groups(found["groups"])}
+            store[key] = new_fit = _better_fits(fitted_groups(visit), again, is_unlike=visit in unlike)
+        replaced = {g.group: g for g in unpacked_groups(new_fit["groups"])}
         current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
-        levels.update({(visit, sections): of for sections, of in found["levels"].items()})
+        levels.update({(visit, sections): by_channel for sections, by_channel in new_fit["levels"].items()})
 
     for k, visit in enumerate(current):
-        others = current[:k] if k >= MIN_OTHER_VISITS else [*current[:k], *current[k + 1 :]][:MIN_OTHER_VISITS]
-        if visit.visit in unlike:
-            use_better_fit(k, steps(others)[-1].belief)
+        reference = current[:k] if k >= MIN_OTHER_VISITS else [*current[:k], *current[k + 1 :]][:MIN_OTHER_VISITS]
+        if visit.visit in unlike and reference:
+            use_better_fit(k, steps(reference)[-1].belief)
     history = steps(current)
     for k in range(1, len(current)):
         if current[k].visit not in unlike and not history[k].innovation.is_expected:

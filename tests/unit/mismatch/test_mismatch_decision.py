@@ -206,7 +206,7 @@ def evidence_with_names_of_two_words():
     return {
         "NUMERICS_RULES": NumericalError(2.0, 3.0, 1.0, 0.1),
         "EFFECT_RULES": effect,
-        "SECOND_RULES": SimpleNamespace(location=" at 3.0 m", second=choice),
+        "SECOND_RULES": SimpleNamespace(location="", alternative=", or soft pad is only similar", second=choice),
         "PAIR_RULES": pair,
         "NAME_RULES": NameEvidence(soft, 2.0, 0.5, **case),
         "TOLERATED_RULES": ToleratedEvidence(soft, settings),

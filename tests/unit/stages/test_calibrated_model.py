@@ -249,7 +249,10 @@ def test_the_stage_writes_the_state_after_a_visit_and_leaves_out_a_visit_with_a_
     assert main(["twin", "--turnout", "t1"]) == 0
     printed = capsys.readouterr().out
     assert f"visit {DAYS[3]} A, B is not used: its diagnosis is named, and not accepted" in printed
-    assert "(3 fitted now)" in printed and "differences from the track file: none" in printed
+    assert (
+        "6 hammer tests and 2 passages of 3 visits used; 3 visits fitted now" in printed
+        and "differences from the track file: none" in printed
+    )
     size, sd = map(float, re.search(r"local pad, pad@18.00 (-[\d.]+) ± ([\d.]+) ln", printed).groups())
     assert printed.count("\n± is one standard deviation\n") == 1
     assert size == pytest.approx(np.log(small.SOFT), abs=3.0 * sd)
