@@ -17,10 +17,10 @@ def test_the_sample_has_the_heading_the_basis_and_a_row_with_a_known_status_per_
 
 
 def test_the_uncertainties_are_95_percent_intervals_as_on_the_pages(repository):
-    """The standard errors 0.1 km/h and 0.056 m/s² are those of the sample."""
+    """The standard errors 0.14 km/h and 0.06 m/s² are those of the sample."""
     recording = SimpleNamespace(source="a.h5", record=0, duration=3.7)
     speed = SimpleNamespace(
-        speed=140.1 / 3.6, se=0.1 / 3.6, source="both", acceleration=0.0, acceleration_se=0.056, disagreement=None
+        speed=140.1 / 3.6, se=0.14 / 3.6, source="both", acceleration=0.01, acceleration_se=0.06, disagreement=None
     )
     type_ = SimpleNamespace(type="IC3", probability=1.0, residual=None, vehicles=())
     passage = SimpleNamespace(

@@ -164,13 +164,18 @@ def calibrate_turnout(
         raise SimulationError(
             f"{turnout_id}: no visit can be fitted; {'; '.join(reasons) or 'no section has recordings'}"
         )
-    return _model_of_visits(stored, fits, missing, each_visit)
+    model = _model_of_visits(stored, fits, missing)
+    if not each_visit:
+        return model
+    labels = [v.visit for v in sorted(visits_of(stored), key=lambda v: (v.time, v.visit))]
+    earlier = (  # as one had it on the day of each visit
+        _model_of_visits([s for s in stored if s.visit in labels[:n]], fits, missing) for n in range(1, len(labels))
+    )
+    return replace(model, answers=tuple(a for m in (*earlier, model) for a in m.answers))
 
 
-def _model_of_visits(
-    stored: list[StoredVisit], fits: VisitFits, computed: Sequence[str], each_visit: bool
-) -> CalibratedModel:
-    """The model from the stored information of all visits, of which ``computed`` were fitted for it."""
+def _model_of_visits(stored: list[StoredVisit], fits: VisitFits, computed: Sequence[str]) -> CalibratedModel:
+    """The model from the stored information of these visits, of which ``computed`` were fitted for it."""
     turnout, without = fits.turnout, fits.without
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
@@ -200,7 +205,7 @@ def _model_of_visits(
         candidates,
         settings.threshold,
         settings.margin,
-        1 if each_visit else len(informed),
+        len(informed),
         against_file,
         surface_changes(directions),
     )
