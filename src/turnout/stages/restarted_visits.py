@@ -35,9 +35,8 @@ def restarted_visits(
 ) -> tuple[list[VisitInformation], dict[tuple[str, str], Mapping[str, float]]]:
     """The visits, with the fits that begin where other visits predict them to be where these are better.
 
-    Fitted again are the visits ``unlike`` the others, and those that differ from all before and whose fits leave more
-    than noise. A visit unlike the others begins at the values of those before it; the first ones have too few, and
-    begin at those of the next.
+    Fitted again are the visits ``unlike`` the others, and those that differ from all before. They begin at the values
+    of the visits before; the first of those unlike the others have too few, and begin at the values of the next.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def restarted_visits(
         visit, key = current[k].visit, key_of(current[k], belief)
         if (new_fit := store.get(key)) is None:
             again = partial(fit_from, visit, belief)
-            store[key] = new_fit = _better_fits(fitted_groups(visit), again, is_unlike=visit in unlike)
+            store[key] = new_fit = _better_fits(fitted_groups(visit), again)
         replaced = {g.group: g for g in unpacked_groups(new_fit["groups"])}
         current[k] = replace(current[k], groups=tuple(replaced.get(g.group, g) for g in current[k].groups))
         levels.update({(visit, sections): by_channel for sections, by_channel in new_fit["levels"].items()})
@@ -88,13 +87,11 @@ def restarted_visits(
     return current, levels
 
 
-def _better_fits(
-    fitted: Sequence[FittedGroup], fit_again: Callable[[], Sequence[FittedGroup]], is_unlike: bool
-) -> dict[str, Any]:
+def _better_fits(fitted: Sequence[FittedGroup], fit_again: Callable[[], Sequence[FittedGroup]]) -> dict[str, Any]:
     """Groups of sections whose second fit has more evidence than the first: information, and levels by sections."""
-    evidence = {g.sections: g.fit.evidence for g in fitted if is_unlike or max(g.fit.scale.values()) > 1.0}
+    evidence = {g.sections: g.fit.evidence for g in fitted}
     try:
-        again = fit_again() if evidence else ()
+        again = fit_again()
     except (SimulationError, np.linalg.LinAlgError):
         again = ()
     better = [g for g in again if g.fit.evidence > evidence.get(g.sections, np.inf)]
