@@ -5,6 +5,7 @@ from datetime import date
 
 import numpy as np
 import pytest
+from benchmarks.random_tracks import RandomTrack
 
 from turnout.config.settings.receptance import ReceptanceSettings
 from turnout.demo.hammer import RATE, hammer_test, pulse, response_to, simulated_response
@@ -13,12 +14,14 @@ from turnout.hammer_test.response_quality import find_track_impacts
 from turnout.hammer_test.response_scale import (
     AREA,
     MASS,
+    MAX_INCOMPLETE,
     RAILS,
     RATES,
     SECOND_MOMENT,
     SHEAR_COEFFICIENT,
     SHEAR_MODULUS,
     YOUNGS_MODULUS,
+    _resistance,
     equivalent_free_rails,
     free_rail_mobility,
 )
@@ -59,7 +62,7 @@ def test_the_closed_form_is_the_integral_over_the_wave_number(s, foundation):
     assert free_rail_mobility(s, foundation) == pytest.approx(integral, rel=3e-3)
 
 
-def test_rails_and_crossings_are_within_the_range_and_outside_with_the_smallest_factor():
+def test_rails_and_crossings_are_within_the_range_and_outside_with_wrong_factors():
     """Rails 45 to 60 kg/m, or a crossing of up to twice the mass and four times the stiffness of 60E1."""
     rng, values = np.random.default_rng(20), []
     for k in range(4000):
@@ -72,8 +75,34 @@ def test_rails_and_crossings_are_within_the_range_and_outside_with_the_smallest_
     values = np.array(values)
     outside = np.mean((values < RAILS[0]) | (values > RAILS[1]))
     assert outside <= 1e-3
-    seen = (values * 4.448 <= RAILS[1]), (values / 4.448 >= RAILS[0])
-    assert np.mean(seen[0]) == 0.0 and np.mean(seen[1]) <= 1e-3
+    assert np.all(values * 9.81 > RAILS[1]) and np.mean(values / 4.448 >= RAILS[0]) <= 1e-3
+    # Newton read as pounds-force: a light rail beyond 5.4 / 4.448 = 1.21 is found.
+    assert np.array_equal(values * 4.448 > RAILS[1], values > 1.214)
+
+
+def test_stiff_tracks_stay_within_the_range_with_the_accelerometer_beside_the_hammer():
+    """Transfer mobilities up to 0.2 m from the impact, by the closed form of the benchmark in the wave number."""
+    rng, inside, n_stiff = np.random.default_rng(22), [], 0
+    for k in range(2000):
+        is_crossing = k % 2
+        pad, ballast = np.exp(rng.uniform(*np.log(((50e6, 15e6), (1500e6, 300e6)))))
+        mass, second_moment = rng.uniform(49.0, 60.3), 3055e-8
+        if is_crossing:
+            mass, second_moment = mass * rng.uniform(1.0, 2.0), second_moment * rng.uniform(1.0, 4.0)
+        track = RandomTrack(mass, second_moment, (pad, 1e-4 * pad), rng.uniform(35.0, 300.0), (ballast, 5e-4 * ballast))
+        distance = rng.uniform(0.0, 0.2)
+        mobilities = [s * abs(track.receptance(np.array([-1j * s]), distance)[0]) for s in RATES]
+        rails, limits = _resistance(*mobilities)
+        inside.append(limits[0] <= rails <= limits[1])
+        n_stiff += rails > 3.45
+    assert np.mean(inside) >= 0.999
+    assert n_stiff > 20  # a limit for an accelerometer at the hammer rejected these
+
+
+@pytest.mark.parametrize(("rate", "is_measured"), [(5_000.0, False), (7_900.0, False), (8_000.0, True)])
+def test_a_sampling_rate_that_does_not_resolve_the_first_moments_gives_no_value(rate, is_measured):
+    impacts = [i for i in find_impacts(track_test("SP"), "force", "rail") if i.accepted]
+    assert (equivalent_free_rails([replace(i, rate=rate) for i in impacts]) is not None) == is_measured
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -84,6 +113,8 @@ def test_tracks_are_accepted_and_each_factor_is_found(section, ballast, railpad)
     rails, limits, is_track = equivalent_free_rails(impacts)
     assert RAILS[0] <= rails <= RAILS[1] and limits == RAILS and is_track
     for factor in FACTORS:
+        if factor == 4.448 and rails < 1.25:
+            continue  # newton read as pounds-force on a light rail, and what noise may change
         scaled = [replace(i, acceleration=i.acceleration * factor, noise_acceleration=i.noise_acceleration * factor)
                   for i in impacts]  # fmt: skip
         assert not equivalent_free_rails(scaled).is_track, factor
@@ -112,7 +143,7 @@ def test_a_track_is_within_the_range_with_any_contact_time_and_lag_of_a_filter(c
     rails, limits, _ = rails_of(recordings)
     assert RAILS[0] <= rails <= RAILS[1]
     assert rails / 4.448 < limits[0]
-    assert shift > 0 or rails * 4.448 > limits[1] == RAILS[1]
+    assert shift > 0 or rails * 9.81 > limits[1]
 
 
 def test_a_single_mass_of_a_heavy_track_is_accepted_and_not_ten_times_as_much():
@@ -127,7 +158,7 @@ def test_a_single_mass_of_a_heavy_track_is_accepted_and_not_ten_times_as_much():
         samples = np.stack([force, rail]) + rng.normal(size=(2, t.size)) * [[6.0], [0.01 * np.max(np.abs(rail))]]
         recordings.append(Recording(samples, RATE, CHANNELS, "a", record=k))
     rails, limits, _ = rails_of(recordings)
-    assert RAILS[1] < rails < limits[1] < 9.81 * rails
+    assert 5.0 < rails < limits[1] == MAX_INCOMPLETE < 9.81 * rails
 
 
 def test_without_impacts_or_response_there_is_no_value():
