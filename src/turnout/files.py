@@ -5,15 +5,19 @@ detect that.
 """
 
 import errno
+import glob
 import json
 import logging
 import os
 import secrets
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+
+MIN_LEFTOVER_AGE = 3600.0  # s since the last write: an unfinished file is then that of a command that was killed
 
 
 def temporary_path(path: Path) -> Path:
@@ -70,6 +74,8 @@ def write_atomic(path: os.PathLike | str, write: Callable) -> None:
 def whole_file(path: os.PathLike | str) -> Iterator[Path]:
     """Context in which a library writes a file that appears under its name when it is complete, or not at all.
 
+    Unfinished files of the same name that a killed command left are deleted.
+
     Parameters
     ----------
     path : path-like
@@ -96,6 +102,10 @@ def whole_file(path: os.PathLike | str) -> Iterator[Path]:
         return
     path = path.resolve() if path.is_symlink() else path
     make_folder(path.parent)
+    for leftover in path.parent.glob(f".{glob.escape(path.stem)}.{'[0-9a-f]' * 12}{glob.escape(path.suffix)}"):
+        with suppress(OSError):  # another command may delete it, too
+            if time.time() - leftover.stat().st_mtime > MIN_LEFTOVER_AGE:
+                leftover.unlink()
     with _unfinished_file(path, path.with_name(f".{path.stem}.{secrets.token_hex(6)}{path.suffix}")) as temporary:
         yield temporary
         if path.exists():

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.options import add_registry
 from turnout.counts import count_of
-from turnout.registry.spreadsheet import FORMULA_STARTS, QUOTE
+from turnout.registry.spreadsheet import FORMULA_STARTS, MARK, QUOTE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,25 +107,33 @@ def _require_tables(con: duckdb.DuckDBPyConnection, names: Sequence[str]) -> Non
 
 def _write(con: duckdb.DuckDBPyConnection, name: str, folder: Path, form: str) -> tuple[Path, int]:
     """(path, number of rows) of one written table or view; an existing one is replaced."""
+    from turnout.files import whole_file
+    from turnout.registry.schema import literal
+
     quoted = _identifier(name)
     if form == "delta":
         return folder / name, _delta(con, quoted, folder / name)
     path = folder / f"{name}.{form}"
-    written = str(path).replace("'", "''")
     options = "format parquet, compression zstd" if form == "parquet" else "format csv, header"
-    rows = f"select * from {quoted}" if form == "parquet" else _rows_without_formulas(con, quoted)
-    return path, con.execute(f"copy ({rows}) to '{written}' ({options})").fetchall()[0][0]
+    rows = f"select * from {quoted}" if form == "parquet" else _rows_for_spreadsheets(con, quoted)
+    with whole_file(path) as unfinished:
+        return path, con.execute(f"copy ({rows}) to {literal(str(unfinished))} ({options})").fetchall()[0][0]
 
 
-def _rows_without_formulas(con: duckdb.DuckDBPyConnection, quoted: str) -> str:
-    """SQL of the rows of a table or view with its texts as ``without_formula`` writes them."""
+def _rows_for_spreadsheets(con: duckdb.DuckDBPyConnection, quoted: str) -> str:
+    """SQL of the rows of a table or view with its texts as ``without_formula`` writes them, and ``MARK`` in front."""
     starts = ", ".join(f"chr({ord(start)})" for start in FORMULA_STARTS)
+    columns = con.execute(f"describe {quoted}").fetchall()
     changes = ", ".join(
         f"case when left({name}, 1) in ({starts}) then chr({ord(QUOTE)}) || {name} else {name} end as {name}"
-        for name, kind in ((_identifier(row[0]), row[1]) for row in con.execute(f"describe {quoted}").fetchall())
+        for name, kind in ((_identifier(row[0]), row[1]) for row in columns)
         if kind == "VARCHAR"
     )
-    return f"select * replace ({changes}) from {quoted}" if changes else f"select * from {quoted}"
+    rows = f"select * replace ({changes}) from {quoted}" if changes else f"select * from {quoted}"
+    first = columns[0][0]
+    if not first.isidentifier():  # in quotes the mark would be part of the name
+        return rows
+    return f"select * rename ({_identifier(first)} as {_identifier(MARK + first)}) from ({rows})"
 
 
 def _delta(con: duckdb.DuckDBPyConnection, quoted: str, path: Path) -> int:

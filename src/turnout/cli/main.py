@@ -16,6 +16,7 @@ import threading
 import time
 import traceback
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from decimal import Decimal
 from difflib import get_close_matches
 from importlib import import_module
 from io import StringIO
@@ -324,13 +325,17 @@ def _json_text(
 
 
 def _as_json(value: Any) -> Any:
-    """A result without what JSON lacks: NaN and infinity become null, numbers and arrays of NumPy those of Python."""
+    """A result without what JSON lacks: NaN and infinity become null; decimal numbers of DuckDB, and numbers and arrays
+    of NumPy, those of Python.
+    """
     if isinstance(value, dict):
         return {key: _as_json(x) for key, x in value.items()}
     if isinstance(value, (list, tuple)):
         return [_as_json(x) for x in value]
     if hasattr(value, "tolist"):
         return _as_json(value.tolist())
+    if isinstance(value, Decimal):  # of SQL such as 100.0 * count(*)
+        return float(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

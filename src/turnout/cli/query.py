@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 from turnout.cli.option_types import at_least_one
 from turnout.cli.options import add_csv, add_registry, add_result, check_output_files
 from turnout.counts import first_texts
-from turnout.registry.spreadsheet import without_formula
+from turnout.registry.spreadsheet import MARK, without_formula
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -94,9 +94,9 @@ def run(args: argparse.Namespace) -> int:
                 return 0
             if args.json:
                 add_result(args, [dict(zip(result.columns, row)) for row in result.fetchall()])
-            elif args.csv:
+            if args.csv:
                 _write_csv(result, args.csv)
-            else:
+            elif not args.json:
                 table = format_table(result, args.rows, get_terminal_size().columns if sys.stdout.isatty() else None)
                 print(table)
                 if not args.quiet and table.endswith("(0 rows)"):
@@ -160,7 +160,9 @@ def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:
 
 @contextmanager
 def open_output(path: str) -> Iterator[TextIO]:
-    """The file at ``path`` open for writing, standard output for "-". No part of a file is left if writing fails.
+    """The CSV file at ``path`` open for writing, with the mark of UTF-8 that spreadsheets need; standard output for "-".
+
+    No part of a file is left if writing fails.
 
     Parameters
     ----------
@@ -185,6 +187,8 @@ def open_output(path: str) -> Iterator[TextIO]:
         return
     try:
         with whole_file(path) as unfinished, open(unfinished, "w", newline="", encoding="utf-8") as stream:
+            if str(unfinished) != path:  # a pipe or a device is for a program
+                stream.write(MARK)
             yield stream
     except OSError as error:
         raise RegistryError(

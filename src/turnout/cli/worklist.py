@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     import duckdb
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
+NEWEST_CAMPAIGN_QUERY = """
+    select campaign_name(turnout_id, last_measured_at_utc) from chart_status
+    where last_measured_at_utc = newest_charted() order by turnout_id limit 1"""
 GROUP = "Worklist and maintenance"
 HELP = "show what to inspect, what to plan, and where the data allow no answer"
 
@@ -73,12 +76,13 @@ def run(args: argparse.Namespace) -> int:
         ((newest,),) = con.execute("select newest_charted()").fetchall()
         is_past = bool(day) and newest is not None and day[0] < newest
         counts = counts_of(con, today if is_past or not day else f"timestamp '{day[0]}'")
+        campaign = "".join(name for (name,) in con.execute(NEWEST_CAMPAIGN_QUERY).fetchall())
     add_result(args, [dict(zip(names, row)) for row in rows])
     if args.csv:
         with open_output(args.csv) as stream:
             _write(stream, names, rows)
     else:
-        print(as_text([dict(zip(names, row)) for row in rows], *(counts[:1] if is_past else counts)))
+        print(as_text([dict(zip(names, row)) for row in rows], *(counts[:1] if is_past else (*counts, campaign))))
     return 0
 
 
@@ -88,6 +92,7 @@ def as_text(
     n_suppressed: int = 0,
     n_unmeasured: int = 0,
     newest: datetime | None = None,
+    campaign: str = "",
 ) -> str:
     """The list for a terminal: one paragraph per row, then the number of rows left out and of charts.
 
@@ -99,6 +104,8 @@ def as_text(
         Number of charts, of those that somebody suppressed, and of those not measured for too long.
     newest : datetime, optional
         Time of the newest campaign; None for the list of an earlier day.
+    campaign : str
+        Name of the newest campaign; "" for the day of ``newest``.
 
     Returns
     -------
@@ -122,7 +129,7 @@ def as_text(
     exclusions = [(n_suppressed, "suppressed by a user"), (n_unmeasured, "not measured for too long")]
     phrases = [f"{n} {word}" for n, word in exclusions if n]
     text.append(
-        f"Of {n_charts} charts, newest campaign {newest:%Y-%m-%d}"
+        f"Of {n_charts} charts, newest campaign {campaign or f'{newest:%Y-%m-%d}'}"
         + (": " + ", ".join(phrases) if phrases else "")
         + "."
     )

@@ -1,10 +1,11 @@
-"""Text for CSV files that people open in a spreadsheet: none of it is taken for a formula."""
+"""Text for CSV files that people open in a spreadsheet: no letter is garbled, and nothing is taken for a formula."""
 
 from __future__ import annotations
 
 from typing import TypeVar
 
 T = TypeVar("T")
+MARK = "\ufeff"  # at the begin of a file: without this byte order mark a spreadsheet may not read it as UTF-8
 QUOTE = "'"  # before a text: a spreadsheet shows the text as it is
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
 

@@ -11,7 +11,7 @@ from turnout.registry.as_of import list_day
 from turnout.registry.connection import limit_memory
 from turnout.registry.database import open_registry
 from turnout.registry.derived_tables import publish
-from turnout.registry.spreadsheet import without_formula
+from turnout.registry.spreadsheet import MARK, without_formula
 from turnout.workflow.current_results import current_results
 
 
@@ -54,7 +54,7 @@ def worklist_job(
         rows = [[_cell(value) for value in row] for row in cursor.fetchall()]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([names, *rows])
-    write_text(worklist, text.getvalue())
+    write_text(worklist, MARK + text.getvalue())
     return len(diagnoses)
 
 

@@ -38,7 +38,7 @@ def test_in_csv_no_text_is_a_formula_and_numbers_and_times_are_as_they_are(expor
     assert header == ['the "note"', "change_pct", "at_utc"]
     assert [row[0] for row in rows] == [without_formula(text) or "" for text in TEXTS]
     assert {tuple(row[1:]) for row in rows} == {("-1.5", "2026-04-02 14:30:00")}
-    assert export("numbers", "csv").read_text().split() == ["change_pct", *["-1.5"] * len(TEXTS)]
+    assert export("numbers", "csv").read_text(encoding="utf-8-sig").split() == ["change_pct", *["-1.5"] * len(TEXTS)]
 
 
 def test_in_parquet_texts_are_as_they_are(export):

@@ -1,7 +1,16 @@
 """Every command that writes a file makes missing folders, and says before it computes that a file cannot be written."""
 
+import codecs
+import json
 import os
+import secrets
+import shlex
+import subprocess
+import sys
+import time
+from pathlib import Path
 
+import duckdb
 import pytest
 
 from turnout.cli.main import build_parser, main
@@ -80,6 +89,45 @@ def test_a_simulation_makes_the_folder_of_its_file(folder):
 def test_a_table_makes_the_folder_of_its_file(folder, registry, command):
     words = ["query", "from turnouts"] if command == "query" else ["worklist"]
     assert main([*words, "--csv", "new/folder/a.csv"]) == 0 and (folder / "new/folder/a.csv").is_file()
+
+
+@pytest.mark.parametrize("words", [["query", "select 'Ørsted ± 1' as name"], ["worklist"]])
+def test_a_table_is_written_beside_json(folder, registry, capsys, words):
+    assert main([*words, "--json", "--csv", "a.csv"]) == 0
+    n_rows = len((folder / "a.csv").read_text(encoding="utf-8-sig").splitlines()) - 1
+    assert len(json.loads(capsys.readouterr().out)["result"]) == n_rows
+
+
+@pytest.mark.parametrize(
+    "line", ["query 'from turnouts' --csv a.csv", "worklist --csv a.csv", "export . --format csv --only turnouts"]
+)
+def test_a_spreadsheet_reads_a_table_as_utf_8(folder, registry, line):
+    assert main(shlex.split(line)) == 0
+    (table,) = folder.glob("*.csv")
+    assert table.read_bytes().startswith(codecs.BOM_UTF8) and table.read_bytes().count(codecs.BOM_UTF8) == 1
+    assert "turnout_id" in duckdb.sql(f"from read_csv('{table}', header = true)").columns
+
+
+@pytest.mark.parametrize("path", ["-", "/dev/stdout"])
+def test_a_program_gets_a_table_without_a_mark(folder, registry, path):
+    command = [sys.executable, "-m", "turnout", "query", "select 1 as name", "--csv", path]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
+    assert done.stdout.split() == [b"name", b"1"]
+
+
+@pytest.mark.parametrize("line", ["query 'from turnouts' --csv 'a[1].csv'", "export 'new' --only turnouts"])
+def test_what_a_killed_command_left_is_deleted_by_the_next(folder, registry, line):
+    target = Path("a[1].csv") if "csv" in line else Path("new/turnouts.parquet")
+    target.parent.mkdir(exist_ok=True)
+    old, present, other = (
+        target.with_name(f".{stem}.{secrets.token_hex(6)}{target.suffix}") for stem in (target.stem, target.stem, "b")
+    )
+    for file in (old, present, other):
+        file.write_text("half a tab")
+    for file in (old, other):
+        os.utime(file, (time.time() - 7200, time.time() - 7200))
+    assert main(shlex.split(line)) == 0
+    assert target.is_file() and present.exists() and other.exists() and not old.exists()
 
 
 def test_all_functions_that_write_files_make_folders(folder):

@@ -46,6 +46,11 @@ def test_json_has_null_for_a_number_that_is_none(registry):
     assert printed["result"] == [{"a": None, "b": None, "c": [None, 2.0]}]
 
 
+def test_json_has_a_number_for_a_decimal_number(registry):
+    done = run(["query", "select 100.0 * 3 as a, [0.5] as b", "--json"], registry, stdout=subprocess.PIPE)
+    assert json.loads(done.stdout)["result"] == [{"a": 300.0, "b": [0.5]}]
+
+
 @pytest.mark.parametrize("words", [["query", "--list"], ["query", QUERY, "--json"], ["query", "from range(9999)"]])
 def test_a_closed_pipe_is_no_fault(registry, words):
     reading, writing = os.pipe()

@@ -58,6 +58,29 @@ def test_the_row_states_the_deviation_and_the_campaign_to_repeat(settings):
     assert ("confirm now", 2) in states
 
 
+def test_the_row_names_the_campaign_as_its_folder_does(settings):
+    """A test after midnight local time: in UTC it began on the day before."""
+    rows = with_loss(Fleet(turnouts=2, weeks=60), 5, 33.0, [-1])
+    newest = rows["measured_at_utc"].max()
+    night = newest.floor("D") - pd.Timedelta(hours=1.5)
+    rows.loc[rows["measured_at_utc"] == newest, "measured_at_utc"] = night
+    folder = f"{newest:%Y-%m-%d}"
+    models = pd.DataFrame(
+        {
+            "model_id": ["m"], "turnout_id": ["T00000"], "section_id": ["T00000/S0"],
+            "campaign_id": [f"T00000/{folder}"], "measured_at_utc": [night],
+        }
+    )  # fmt: skip
+    later = night + pd.Timedelta(days=200)
+    why = f"select why from cannot_see(timestamp '{later}') where turnout_id = ? and state = 'not measured'"
+    with evaluated_views(rows, settings, models=models) as con:
+        sentences = dict(con.execute("select turnout_id, sentence from worklist where state = 'confirm now'").fetchall())
+        unmeasured = [con.execute(why, [turnout]).fetchall()[0] for turnout in ("T00000", "T00001")]
+    assert sentences["T00000"].startswith(f"the campaign of {folder} lies ")
+    assert sentences["T00001"].startswith(f"the campaign of {night:%Y-%m-%d} lies ")  # no model: the day in UTC
+    assert unmeasured == [(f"last measured {folder}",), (f"last measured {night:%Y-%m-%d}",)]
+
+
 def test_a_loss_of_the_whole_turnout_is_listed_as_well(settings):
     fleet = Fleet(turnouts=2, weeks=60)
     with evaluated_views(with_loss(fleet, 5, 20.0, [-1], range(8)), settings) as con:

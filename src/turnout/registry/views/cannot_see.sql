@@ -5,16 +5,16 @@ create or replace macro up_to_a_tenth(pct) as (ceil(10 * pct - 1e-6) / 10);
 -- enough, not measured; and one of band 'all' where no newer recording could be used, and until the next campaign where an open
 -- alarm was taken back. detectable_pct is the smallest change of frequency that it shows within a year with 90 %;
 -- in stiffness about twice as much (one degree of freedom).
--- needs: chart_status_at, unusable, in_service
+-- needs: campaign_name, chart_status_at, unusable, in_service
 create or replace macro cannot_see("asof" := null) as table
 select
     turnout_id, section_id, band, source,
     case when state in ('alarm', 'confirm_now', 'ok') then 'cannot tell' else replace(state, '_', ' ') end as state,
     case
         when reason = 'never' then 'not measured by then'
-        when reason = 'too_long_ago' then 'last measured ' || strftime(last_measured_at_utc, '%Y-%m-%d')
+        when reason = 'too_long_ago' then 'last measured ' || campaign_name(turnout_id, last_measured_at_utc)
             || coalesce('; the campaign of '
-                || strftime(case when set_aside_at_utc > last_measured_at_utc then set_aside_at_utc end, '%Y-%m-%d')
+                || campaign_name(turnout_id, case when set_aside_at_utc > last_measured_at_utc then set_aside_at_utc end)
                 || ' waits for a second one: so long after all others, its clock may be wrong', '')
         when reason = 'constant' then 'the value never changes: stuck or copied'
         when reason = 'no_temperature' then
@@ -50,7 +50,7 @@ from unusable(coalesce("asof", newest_measurement()))
 union all by name
 select
     turnout_id, section_id, 'all' as band, source, 'cannot tell' as state,
-    'the alarm of ' || strftime(raised_at_utc, '%Y-%m-%d') || ' (' || band || ', ' || direction
+    'the alarm of ' || campaign_name(turnout_id, raised_at_utc) || ' (' || band || ', ' || direction
         || ') is not raised again: what it rested on was corrected, or the spread or memory of the charts is another' as why,
     closed_at_utc as last_measured_at_utc
 from alarms

@@ -37,7 +37,8 @@ known as not materialized (
         and coalesce(at_utc <= "asof", "asof" >= newest_measurement(), true)
 ),
 last_used as (
-    select part, max(at_utc) filter (is_used) as used_at_utc
+    select part, max(at_utc) filter (is_used) as used_at_utc,
+        max_by(what, at_utc) filter (is_used) as used
     from known
     group by part
     having coalesce(max(at_utc) filter (not is_used) > used_at_utc, used_at_utc is null)
@@ -45,7 +46,7 @@ last_used as (
 failed as (
     select
         any_value(turnout_id) as turnout_id, any_value(section_id) as section_id, any_value(source) as source,
-        any_value(used_at_utc) as used_at_utc, count(distinct what) as n,
+        any_value(used_at_utc) as used_at_utc, any_value(used) as used, count(distinct what) as n,
         max(at_utc) as at_utc, coalesce(max_by(what, at_utc), min(what)) as what,
         mode(reason order by reason) as usual_reason, max_by(reason, at_utc) as reason
     from known join last_used using (part)
@@ -69,11 +70,13 @@ files as (
 select
     f.turnout_id, f.section_id, f.source, f.used_at_utc, f.n, f.at_utc,
     case f.source when 'hammer' then 'no hammer test' else 'no passage' end
-        || ' could be used ' || coalesce('since ' || strftime(f.used_at_utc, '%Y-%m-%d'), 'yet')
+        || ' could be used ' || coalesce('since ' || case f.source
+            when 'hammer' then split_part(f.used, '/', -1) else strftime(f.used_at_utc, '%Y-%m-%d')
+        end, 'yet')
         || ' (' || f.n || ' tried); '
         || case
             when f.source = 'passage' then 'most often: ' || f.usual_reason
-            else coalesce(strftime(f.at_utc, '%Y-%m-%d') || ': ', '') || coalesce(
+            else coalesce(split_part(f.what, '/', -1) || ': ', '') || coalesce(
                 nullif(concat_ws(', ',
                     b.n_rejected || ' of ' || b.n || ' impacts rejected (' || b.reason || ')',
                     d.n || case when d.n = 1 then ' file' else ' files' end || ' in quarantine (' || d.reason || ')'

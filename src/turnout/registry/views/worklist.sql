@@ -3,7 +3,7 @@
 -- asof at or after the newest measurement uses everything; an earlier one uses only what was measured by then
 -- (change and date then come from the sums alone, and a slow drift is not among the plans).
 -- An alarm that follows from the other resonance of a section refers to its row, if that one is listed.
--- needs: chart_states, cannot_see, chart_status_at, acknowledgement_counts, in_service, is_below_target, stiffness_words, findings_current
+-- needs: chart_states, campaign_name, cannot_see, chart_status_at, acknowledgement_counts, in_service, is_below_target, stiffness_words, findings_current
 create or replace macro worklist("asof", most := null) as table
 with then_status as (select * from chart_status_at("asof")),
 recent as (
@@ -93,7 +93,7 @@ confirming as (
         case when c.deviation_pct < 0 then 'down' else 'up' end as direction, c.deviation_pct as change_pct,
         c.deviation_pct - coalesce(100 * (c.expected_high_hz / c.expected_hz - 1), 0) as low_pct,
         c.deviation_pct + coalesce(100 * (c.expected_high_hz / c.expected_hz - 1), 0) as high_pct,
-        printf('the campaign of %s lies %.1f %%', strftime(c.measured_at_utc, '%Y-%m-%d'), abs(c.deviation_pct))
+        printf('the campaign of %s lies %.1f %%', campaign_name(c.turnout_id, c.measured_at_utc), abs(c.deviation_pct))
             || coalesce(printf(' (± %.1f, 95 %%)', 100 * (c.expected_high_hz / c.expected_hz - 1)), '')
             || case when c.deviation_pct < 0 then ' below' else ' above' end || ' its expected value; not yet confirmed'
             as why
@@ -255,7 +255,7 @@ select
             || (case when h.follows_other then '; it follows from the ' ||
                 (case h.changed_component when 'pad' then 'railpads' else 'ballast' end)
                 || ', whose own row says what to do' else '' end)
-            || coalesce('; not measured since ' || strftime(h.not_since_utc, '%Y-%m-%d'), '')
+            || coalesce('; not measured since ' || campaign_name(h.turnout_id, h.not_since_utc), '')
             || (case when h.is_small then printf('; below the target of %.1f %%: nobody needs to go there', h.target_pct)
                 else '' end)
             || coalesce('; acknowledged by ' || h.acknowledged, '')

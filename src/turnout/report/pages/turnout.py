@@ -8,6 +8,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from turnout.counts import count_of, first_texts
+from turnout.registry.as_of import chart_in_words
 from turnout.report import panels
 from turnout.report.departures import departure_rows, departure_sentences
 from turnout.report.formatting import (
@@ -134,7 +135,7 @@ def mismatches_with_limits(
 
 
 def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Rows of the worklist as lines of the page; a sentence without a change gets the section and band in front.
+    """Rows of the worklist as lines of the page; a sentence that names no section gets section and band in front.
 
     Behind an alarm stands what the newest diagnosis of the section says, or why there is no decision. Alarms that rest
     on the same diagnosis show it once.
@@ -156,8 +157,8 @@ def lines_of(worklist: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
             "badge": badge(work["state"]),
             "words": (
                 ""
-                if work["change_pct"] is not None
-                else f"{work['sections']}, {work['band'].replace('amplitude', 'acceleration')}: "
+                if work["change_pct"] is not None and work["state"] != "confirm now"
+                else f"{work['sections']}, {chart_in_words(work['band'])}: "
             )
             + work["sentence"],
             "diagnosis": result_and_evidence(diagnosis)[0],
