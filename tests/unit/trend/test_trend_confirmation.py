@@ -1,5 +1,7 @@
 """A campaign far outside its expected range is listed on the same day, and raises no alarm alone."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -88,6 +90,36 @@ def test_a_loss_of_the_whole_turnout_is_listed_as_well(settings):
         sentences = con.execute("select sentence from worklist where state = 'confirm now'").fetchall()
     assert sorted(rows) == [("T00000", "whole turnout"), ("T00001", "whole turnout")]
     assert all(s.startswith("whole turnout: the campaign of") and "; likewise S0, S1, S2" in s for (s,) in sentences)
+
+
+def test_sections_that_lie_on_opposite_sides_have_rows_of_their_own(settings):
+    """As after files of two sections were exchanged: what holds for one holds for the other with the other sign."""
+    fleet = Fleet(turnouts=2, weeks=60, band="ballast", frequency=150.0)
+    change = np.zeros((2, 8, 60))
+    change[0, 1, -1], change[0, [2, 5], -1] = -22.0, [28.0, 35.0]
+    query = "select sections, direction, sentence, look_at, change_pct from worklist where state = 'confirm now'"
+    with evaluated_views(modes(fleet, 5, change), settings) as con:
+        above, below = con.execute(f"{query} order by direction desc").fetchall()
+    assert below[:2] == ("S1", "down") and above[:2] == ("S2, S5", "up")
+    assert f"lies {-below[4]:.1f} %" in below[2] and "below" in below[2] and "likewise" not in below[2]
+    assert above[2].startswith("S5: the campaign of") and f"lies {above[4]:.1f} %" in above[2] and "above" in above[2]
+    assert above[4] == pytest.approx(35.0, abs=3.0) and re.search(r"; likewise S2 \(2\d\.\d %\)$", above[2])
+    assert "voids" in below[3] and "frost" in above[3] and "voids" not in above[3]
+
+
+def test_charts_that_cannot_tell_are_together_only_for_the_same_reason(settings):
+    """The number of the first section is stated in words, those of the others behind their names."""
+    rows = modes(Fleet(turnouts=1, weeks=130, sigma=2.0, campaign=0.0), 3, None)
+    rows.loc[rows["section_id"] == "T00000/S0", "frequency_hz"] = 450.0
+    with evaluated_views(rows, settings) as con:
+        rows = dict(con.execute("select sections, sentence from worklist where state = 'cannot tell'").fetchall())
+        query = "select split_part(section_id, '/', 2), up_to_a_tenth(detectable_pct) from cannot_see() where section_id <> '*'"
+        detectable = dict(con.execute(query).fetchall())
+    assert rows["S0"] == "the value never changes: stuck or copied"
+    sentence = rows["S1, S2, S3, S4, S5, S6, S7"]
+    others = [detectable[label] for label in ("S2", "S3", "S4", "S5", "S6", "S7")]
+    assert sentence.startswith(f"S1: a change below {detectable['S1']:.1f} % of frequency")
+    assert sentence.endswith(f"; likewise S2, S3, S4, S5, S6, S7 ({min(others):.1f} to {max(others):.1f} %)")
 
 
 def test_two_low_campaigns_raise_an_alarm_and_a_normal_campaign_ends_the_confirmation(settings):

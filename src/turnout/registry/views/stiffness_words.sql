@@ -59,3 +59,11 @@ create or replace macro peak_advice(direction, is_support_unchanged, panel, posi
             || ': a dipped weld or joint' || worn_parts(panel) || ', corrugation; if it is smooth, the mounting of the sensor'
     end
 );
+
+-- For words: to a tenth, without the sign of a negative zero.
+create or replace macro to_a_tenth(number) as (round(number, 1) + 0.0);
+
+-- Two numbers in percent, one where both read alike; NULL without numbers.
+create or replace macro one_or_range(low, high) as (
+    case when printf('%.1f', low) = printf('%.1f', high) then printf('%.1f %%', low) else printf('%.1f to %.1f %%', low, high) end
+);

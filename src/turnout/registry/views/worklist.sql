@@ -108,7 +108,7 @@ silent as (
         turnout_id, section_id, band, source, state, null::varchar as direction, null::timestamp as raised_at_utc,
         null::double as ratio, null::varchar as acknowledged, null::double as change_pct, null::double as low_pct,
         null::double as high_pct, null::timestamp as since_at_utc, null::timestamp as since_earliest_utc,
-        null::timestamp as since_latest_utc, why
+        null::timestamp as since_latest_utc, why, up_to_a_tenth(detectable_pct) as detectable_pct
     from cannot_see("asof") c
     where (section_id <> '*' or band = 'all') and state in ('learning', 'cannot tell')
         -- nobody measures better for the damping alone; its resonance has a row of its own
@@ -152,6 +152,23 @@ rows_to_list as (
         from not_silenced
     )
 ),
+grouped as (
+    -- sections whose rows say the same but for their numbers. The whole turnout speaks for them, else of campaigns to
+    -- confirm the farthest, of others the first
+    select
+        *, row_number() over (
+            partition by turnout_id, band, source, state, reason
+            order by section_id <> '*', abs(change_pct) desc nulls last, section_id
+        ) = 1 as speaks
+    from (
+        select
+            *, split_part(section_id, '/', -1) as label, coalesce(abs(change_pct), detectable_pct) as size_pct,
+            case when state = 'confirm now' then direction when band = 'all' then why
+                else regexp_replace(why, '[0-9]+', '', 'g') end as reason
+        from rows_to_list
+        where why is not null
+    )
+),
 listed as (
     select
         *, case when section_id = '*' then 'whole turnout' else split_part(section_id, '/', -1) end as sections
@@ -161,20 +178,17 @@ listed as (
     select
         turnout_id, case when count(*) = 1 then min(section_id) end as section_id,
         case min(section_id)
-            when '*' then 'whole turnout' else string_agg(split_part(section_id, '/', -1), ', ' order by section_id)
-        end as sections, band, source, state,
-        (case when count(distinct why) = 1 then ''
-            else replace(split_part(min(section_id), '/', -1), '*', 'whole turnout') || ': ' end)
-            || min_by(why, section_id)
-            || (case when count(distinct why) = 1 then '' else
-                '; likewise ' || array_to_string(list(split_part(section_id, '/', -1) order by section_id)[2:], ', ')
-            end) as why,
-        max_by(direction, abs(change_pct)) as direction, max_by(change_pct, abs(change_pct)) as change_pct,
-        max_by(low_pct, abs(change_pct)) as low_pct, max_by(high_pct, abs(change_pct)) as high_pct,
-        max(target_pct) as target_pct
-    from rows_to_list
-    where why is not null
-    group by turnout_id, band, source, state, case band when 'all' then why end
+            when '*' then 'whole turnout' else string_agg(label, ', ' order by section_id)
+        end as sections, band, source, state, max(direction) as direction,
+        case when count(distinct why) = 1 then min(why)
+            else replace(max(label) filter (speaks), '*', 'whole turnout') || ': ' || max(why) filter (speaks)
+                || '; likewise ' || string_agg(label, ', ' order by section_id) filter (not speaks)
+                || coalesce(' (' || one_or_range(min(size_pct) filter (not speaks), max(size_pct) filter (not speaks)) || ')', '')
+        end as why,
+        max(change_pct) filter (speaks) as change_pct, max(low_pct) filter (speaks) as low_pct,
+        max(high_pct) filter (speaks) as high_pct, max(target_pct) as target_pct
+    from grouped
+    group by turnout_id, band, source, state, reason
 ),
 fleet as (
     select
@@ -243,8 +257,8 @@ select
             || (case when not coalesce(h.told, true) then ', mean of its last campaigns since the sum began to grow,' else '' end)
             || (case when h.change_pct < 0 then ' fell by ' else ' rose by ' end)
             || printf('%.1f %% (%.1f to %.1f, 95 %%)', abs(h.change_pct),
-                least(abs(h.low_pct), abs(h.high_pct)) * (case when h.low_pct * h.high_pct < 0 then -1 else 1 end),
-                greatest(abs(h.low_pct), abs(h.high_pct)))
+                to_a_tenth(case when h.change_pct < 0 then -h.high_pct else h.low_pct end),
+                to_a_tenth(case when h.change_pct < 0 then -h.low_pct else h.high_pct end))
             || coalesce(', since ' || strftime(h.since_at_utc, '%Y-%m-%d')
                 || coalesce(' (' || strftime(h.since_earliest_utc, '%Y-%m-%d') || ' to '
                     || strftime(h.since_latest_utc, '%Y-%m-%d') || ')', ''), '')
