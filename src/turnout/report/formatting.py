@@ -212,6 +212,27 @@ def day(when: datetime | None) -> str:
     return "–" if when is None else f"{when:%Y-%m-%d}"
 
 
+def day_and_time(when: datetime) -> str:
+    """The day of work, with its time where it has one: it decides about the tests of that day.
+
+    Parameters
+    ----------
+    when : datetime
+        Time in UTC; midnight stands for the day.
+
+    Returns
+    -------
+    str
+        YYYY-MM-DD, or with "HH:MM UTC" behind it.
+
+    Examples
+    --------
+    >>> day_and_time(datetime(2026, 4, 2)), day_and_time(datetime(2026, 4, 2, 14, 30))
+    ('2026-04-02', '2026-04-02 14:30 UTC')
+    """
+    return f"{when:%Y-%m-%d %H:%M} UTC" if when.hour or when.minute else f"{when:%Y-%m-%d}"
+
+
 def campaign_of(row: Mapping[str, Any], time: str = "measured_at_utc") -> str:
     """The name of a campaign, as its folder and ``campaigns.csv`` have it: the local day. Its start in UTC may be a day
     earlier.

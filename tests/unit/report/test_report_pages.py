@@ -150,6 +150,19 @@ def test_a_line_without_a_change_names_its_sections_and_resonance():
     ]
 
 
+@pytest.mark.parametrize(("band", "words"), [("railpad", "railpad"), ("amplitude", "acceleration")])
+def test_a_line_of_a_campaign_to_confirm_names_its_sections_and_chart(band, words):
+    row = {
+        "turnout_id": "W1",
+        "state": "confirm now",
+        "sections": "A8",
+        "band": band,
+        "change_pct": -22.0,
+        "sentence": "the campaign of 2026-05-13 lies 22.0 % below its expected value",
+    }
+    assert lines_of([row])[0]["words"] == f"A8, {words}: {row['sentence']}"
+
+
 def test_a_diagnosis_of_two_alarms_is_shown_once():
     row = {
         "turnout_id": "W1",

@@ -15,7 +15,7 @@ from turnout.report.formatting import (
     STIFFNESS_NOTE,
     badge,
     campaign_of,
-    day,
+    day_and_time,
     diagnoses_once,
     has_stiffness,
     number_ranges,
@@ -338,7 +338,7 @@ def _worst_states(charts: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 def _event(event: Mapping[str, Any]) -> dict[str, str]:
     resets = [band for band in BANDS if event[f"resets_{band}"]]
     return {
-        "day": day(event["event_at_utc"]),
+        "day": day_and_time(event["event_at_utc"]),
         "section": (event["section_id"] or "/all").split("/")[-1],
         "kind": event["kind"].replace("_", " "),
         "resets": ", ".join(resets) or "nothing",

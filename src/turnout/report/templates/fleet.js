@@ -46,7 +46,7 @@
       return Array.prototype.map.call(row.cells, function (cell) { return field(cell.textContent.trim()); }).join(",");
     });
     var link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([lines.join("\r\n")], { type: "text/csv" }));
+    link.href = URL.createObjectURL(new Blob(["\ufeff" + lines.join("\r\n")], { type: "text/csv" }));
     link.download = "turnouts.csv";
     link.click();
     URL.revokeObjectURL(link.href);
