@@ -169,8 +169,8 @@ def _effect(args: argparse.Namespace) -> int:
         cursor = con.execute(
             "select event_at_utc, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
             "n_before, n_after, held_until_utc, last_measured_at_utc, "
-            "campaign_name(turnout_id, coalesce(held_until_utc, last_measured_at_utc)) as campaign from maintenance_effect "
-            "where turnout_id = coalesce(nullif($1, ''), turnout_id) and "
+            "campaign_name(turnout_id, coalesce(held_until_utc, last_measured_at_utc)) as campaign "
+            "from maintenance_effect where turnout_id = coalesce(nullif($1, ''), turnout_id) and "
             "section_id = coalesce(nullif($2, ''), section_id) order by event_at_utc, section_id, band",
             [turnout, section and f"{turnout}/{section}"],
         )

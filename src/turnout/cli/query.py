@@ -160,9 +160,9 @@ def _write_csv(result: duckdb.DuckDBPyRelation, path: str) -> None:
 
 @contextmanager
 def open_output(path: str) -> Iterator[TextIO]:
-    """The CSV file at ``path`` open for writing, with the mark of UTF-8 that spreadsheets need; standard output for "-".
+    """The CSV file at ``path`` open for writing, standard output for "-". No part of a file is left if writing fails.
 
-    No part of a file is left if writing fails.
+    A file begins with ``MARK``.
 
     Parameters
     ----------
