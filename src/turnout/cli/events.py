@@ -168,9 +168,8 @@ def _effect(args: argparse.Namespace) -> int:
         turnout, section = _turnout_and_section(args, {name for (name,) in rows})
         cursor = con.execute(
             "select event_at_utc, section_id, band, kinds, verdict, gain_pct, gain_low_pct, gain_high_pct, "
-            "n_before, n_after, held_until_utc, last_measured_at_utc, "
-            "campaign_name(turnout_id, coalesce(held_until_utc, last_measured_at_utc)) as campaign "
-            "from maintenance_effect where turnout_id = coalesce(nullif($1, ''), turnout_id) and "
+            "n_before, n_after, held_until_utc, last_measured_at_utc from maintenance_effect "
+            "where turnout_id = coalesce(nullif($1, ''), turnout_id) and "
             "section_id = coalesce(nullif($2, ''), section_id) order by event_at_utc, section_id, band",
             [turnout, section and f"{turnout}/{section}"],
         )
@@ -180,8 +179,12 @@ def _effect(args: argparse.Namespace) -> int:
             labels = con.execute("select label from sections where turnout_id = $1", [turnout]).fetchall()
             _check_section(turnout, section, {label for (label,) in labels} or {section})
     add_result(args, [dict(zip(names, row)) for row in rows])
-    for at, section, band, kinds, verdict, gain, low, high, before, after, lost_at, _, campaign in rows:
-        retention = f"half of it lost by {campaign}" if lost_at else f"holds until {campaign}, the newest campaign"
+    for at, section, band, kinds, verdict, gain, low, high, before, after, retention, last in rows:
+        retention = (
+            f"half of it lost by {retention:%Y-%m-%d}"
+            if retention
+            else f"holds until {last:%Y-%m-%d}, the newest campaign"
+        )
         interval = "no interval" if low is None or high is None else f"{low:+z.1f} to {high:+z.1f}, 95 %"
         size = "" if gain is None else f", {gain:+z.1f} %"
         print(

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 FIRST_MEASUREMENT_QUERY = "select min(measured_at_utc) from charts where state <> 'wrong_time'"
 NEWEST_CAMPAIGN_QUERY = """
-    select campaign_name(turnout_id, last_measured_at_utc) from chart_status
-    where last_measured_at_utc = newest_charted() order by turnout_id limit 1"""
+    select coalesce(min(split_part(campaign_id, '/', -1)), '') from models_current
+    where measured_at_utc = newest_charted()"""
 GROUP = "Worklist and maintenance"
 HELP = "show what to inspect, what to plan, and where the data allow no answer"
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         ((newest,),) = con.execute("select newest_charted()").fetchall()
         is_past = bool(day) and newest is not None and day[0] < newest
         counts = counts_of(con, today if is_past or not day else f"timestamp '{day[0]}'")
-        campaign = "".join(name for (name,) in con.execute(NEWEST_CAMPAIGN_QUERY).fetchall())
+        ((campaign,),) = con.execute(NEWEST_CAMPAIGN_QUERY).fetchall()
     add_result(args, [dict(zip(names, row)) for row in rows])
     if args.csv:
         with open_output(args.csv) as stream:

@@ -55,6 +55,17 @@ def test_a_section_whose_newest_tests_failed_is_listed_with_the_last_good_day_un
     assert bench.ask(LIST) == []
 
 
+def test_a_test_after_midnight_local_time_has_the_day_of_its_folder(bench):
+    """In UTC it began on the day before."""
+    good, bad = hammer_result(), rejected_result(day="2026-02-09")
+    for result, night in ((good, "2026-01-04T22:30:00"), (bad, "2026-02-08T22:30:00")):
+        for row in (*result.tables["models"], *result.tables["modes"]):
+            row["measured_at_utc"] = night
+    bench.register(good, bad)
+    expected = "no hammer test could be used since 2026-01-05 (1 tried); 2026-02-09: 6 of 6 impacts rejected"
+    assert bench.ask(LIST)[0][4].startswith(expected)
+
+
 @pytest.mark.parametrize(("reason", "n"), [("truncated", 1), ("entry_unknown", 0), ("condition_lost", 0)])
 def test_a_remark_about_a_used_recording_does_not_put_the_section_on_the_list(bench, reason, n):
     bench.register(hammer_result(), quarantined_result(day="2026-03-09", reason=reason))

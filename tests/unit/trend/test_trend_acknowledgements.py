@@ -1,5 +1,6 @@
 """config/acknowledgements.csv: lines entered by command or by hand; errors state the line and the remedy."""
 
+import codecs
 import shutil
 from datetime import UTC, datetime, time
 from types import SimpleNamespace
@@ -241,6 +242,7 @@ def test_a_bad_line_hides_no_alarm(configuration, tmp_path, capsys, caplog):
     small_registry(root, modes(Fleet(turnouts=1, weeks=60), 3))
     done = trend_job(root / "_generation.json", tmp_path / "state", configuration)
     assert worklist_job(root / "_generation.json", tmp_path / "list.csv", tmp_path / "work") == 0
+    assert (tmp_path / "list.csv").read_bytes().startswith(codecs.BOM_UTF8)  # for spreadsheets
     with open_registry(root) as con:
         assert con.execute("select turnout_id, action from acknowledgements").fetchall() == [(turnout, "acknowledge")]
     assert (tmp_path / "list.csv").exists()
