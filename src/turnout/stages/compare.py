@@ -27,6 +27,7 @@ from turnout.stages.parameter_ranges import improbable_in_files
 from turnout.stages.passage import sensors_of
 from turnout.stages.passage_context import known_patterns
 from turnout.stages.requested_units import passage_file
+from turnout.stages.simulated_speed import SimulatedSpeed, recorded_times, simulated_speed, speed_at_sensors
 from turnout.stages.track_files import files_of_track, files_of_vehicle
 from turnout.workflow.scan import scan
 
@@ -158,16 +159,21 @@ def compare_passage(
     recording, passage = _recorded_train(path, turnout)
     chosen = _chosen_sensors(sensors, passage, sensors_of(turnout), file)
     vehicle = vehicle or _vehicle_of_type(passage, file)
-    train, is_reversed = _vehicle(vehicle, load, passage, file)
+    place_error = turnout.settings["passage"].place_error
+    train, is_reversed, speed = _vehicle(vehicle, load, passage, [s.name for s in chosen], place_error, file)
     path = resolve_track(track, turnout_id, configuration)
     model = load_track(str(path), seed, path.parent)
-    notes = [f"track file {path}", *([f"{train.name} runs the other way round"] if is_reversed else [])]
+    notes = [f"track file {path}", speed.note, *([f"{train.name} runs the other way round"] if is_reversed else [])]
     if calibrate:
         model = _calibrate(model, path, chosen, turnout, recording, raw, configuration, notes)
-    simulated = _simulate(model, train, passage, chosen, recording.rate, seed)
-    bands = tuple(band for sensor in chosen for band in _compare_sensor(sensor, recording, passage, *simulated))
-    speed = KMH * passage.train_motion.speed
-    words = f"{train.name}, {passage.n_axle} axles, {speed:.1f} km/h, {passage.direction}, track {passage.track}"
+    samples, axles = _simulate(model, train, speed, passage, chosen, recording.rate, seed)
+    bands = tuple(
+        band
+        for sensor, signal in zip(chosen, samples)
+        for band in _compare_sensor(sensor, recording, passage, signal, axles[sensor.name], speed)
+    )
+    heading = f"{passage.direction}, track {passage.track}"
+    words = f"{train.name}, {passage.n_axle} axles, {KMH * speed.speed:.1f} km/h, {heading}"
     warnings = improbable_in_files([*files_of_track(path), *files_of_vehicle(vehicle)])
     return PassageComparison(words, tuple(notes), bands, tuple(warnings))
 
@@ -208,21 +214,28 @@ def _vehicle_of_type(passage: Passage, file: str | Path) -> str:
     return passage.type.type.lower()
 
 
-def _vehicle(name: str, load: float, passage: Passage, file: str | Path) -> tuple[Vehicle, bool]:
-    """(vehicle in as many units and in the order that the axles of the train say, whether it is reversed)."""
+def _vehicle(
+    name: str, load: float, passage: Passage, sensors: Sequence[str], place_error: float, file: str | Path
+) -> tuple[Vehicle, bool, SimulatedSpeed]:
+    """(vehicle in as many units and in the order that the axles of the train say, whether it is reversed, its speed).
+
+    ``place_error`` [m] is the least standard deviation of a recorded axle.
+    """
     one = load_vehicle(name, load)
     units, rest = divmod(passage.n_axle, len(one.wheels))
     if rest or not units:
         observation = f"{passage.n_axle} axles were recorded, the vehicle {name} has {len(one.wheels)}"
         raise ConfigError(str(file), "train", observation, "Name the right vehicle file with --vehicle")
-    vehicle, motion = one if units == 1 else load_vehicle(name, load, units=units), passage.train_motion
+    vehicle = one if units == 1 else load_vehicle(name, load, units=units)
+    recorded = speed_at_sensors(passage, sensors)
     speed_se = None if passage.speed is None else KMH * passage.speed.se
-    row = {"axle_times_s": passage.offsets / motion.speed, "speed_se_kmh": speed_se}
+    row = {"axle_times_s": passage.offsets / recorded, "speed_se_kmh": speed_se}
     try:
-        _, is_reversed = speed_from_axles(name, vehicle, row, motion.speed)
+        speed, is_reversed = speed_from_axles(name, vehicle, row, recorded)
     except TrainUnknownError as error:
         raise ConfigError(str(file), "train", str(error), "Name the right vehicle file with --vehicle") from None
-    return vehicle.reverse() if is_reversed else vehicle, is_reversed
+    vehicle = vehicle.reverse() if is_reversed else vehicle
+    return vehicle, is_reversed, simulated_speed(passage, vehicle, speed, recorded, place_error)
 
 
 def _calibrate(
@@ -260,17 +273,23 @@ def _calibrate(
 
 
 def _simulate(
-    model: TurnoutTrack, train: Vehicle, passage: Passage, sensors: Sequence[PassageSensor], rate: float, seed: int
-) -> tuple[np.ndarray, float, dict[str, float]]:
-    """Simulated samples (n_sensor, n), their rate [Hz], and when the first axle passes each sensor [s]."""
+    model: TurnoutTrack,
+    train: Vehicle,
+    speed: SimulatedSpeed,
+    passage: Passage,
+    sensors: Sequence[PassageSensor],
+    rate: float,
+    seed: int,
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Simulated samples (n_sensor, n), and when the axles pass each sensor in them (n_axle,) [s]."""
     substeps = max(1, math.ceil(SMALLEST_RATE / rate))
-    speed, lead = passage.train_motion.speed, 0.3 + MARGIN
+    lead = 0.3 + MARGIN
     direction = passage.direction if passage.direction in ("facing", "trailing") else "facing"
     route = passage.track if passage.track in model.routes else next(iter(model.routes))
     recording = simulate_passage(
         model,
         train,
-        speed,
+        speed.speed,
         [Sensor(s.name, s.position, "rail web") for s in sensors],
         direction,
         route,
@@ -282,26 +301,26 @@ def _simulate(
     )
     sign = 1.0 if direction == "facing" else -1.0
     places = sign * np.array([s.position for s in sensors])
-    first = {s.name: lead + (place - places.min()) / speed for s, place in zip(sensors, places)}
-    return cast("np.ndarray", recording.samples), rate, first
+    behind = np.sort(train.wheel_positions) - np.min(train.wheel_positions)
+    axles = {s.name: lead + (place - places.min() + behind) / speed.speed for s, place in zip(sensors, places)}
+    return cast("np.ndarray", recording.samples), axles
 
 
 def _compare_sensor(
     sensor: PassageSensor,
     recording: Recording,
     passage: Passage,
-    samples: np.ndarray,
-    rate: float,
-    first: dict[str, float],
+    simulated: np.ndarray,
+    simulated_axles: np.ndarray,
+    speed: SimulatedSpeed,
 ) -> list[BandComparison]:
     axles = np.sort(passage.at_sensor[sensor.name])
-    recorded = recording.signal(sensor.name)
+    recorded, rate = recording.signal(sensor.name), recording.rate
     recorded = recorded - np.median(recorded)
-    simulated = samples[list(first).index(sensor.name)]
     start = max(int((axles[0] - MARGIN) * rate), 0)
     stop = min(int((axles[-1] + MARGIN) * rate), recorded.size)
     time = np.arange(start, stop) / rate - axles[0]
-    at = np.arange(simulated.size) / rate - first[sensor.name]
+    at = recorded_times(np.arange(simulated.size) / rate, simulated_axles, passage, sensor, speed.recorded) - axles[0]
     comparisons: list[BandComparison] = []
     for low, high in BANDS:
         high = min(high, 0.45 * rate)

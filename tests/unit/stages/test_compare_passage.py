@@ -12,7 +12,7 @@ import pytest
 from turnout.cli.main import main
 from turnout.errors import ConfigError
 from turnout.passage.kinematics import Motion
-from turnout.passage.result import Passage
+from turnout.passage.result import Passage, PassageSensor, SpeedFinding
 from turnout.readers.writing import write
 from turnout.simulate import Sensor, load_track, load_vehicle, simulate_passage
 from turnout.stages.compare import (
@@ -23,6 +23,7 @@ from turnout.stages.compare import (
     _vehicle,
     compare_passage,
 )
+from turnout.stages.simulated_speed import recorded_times, speed_at_sensors
 
 SENSORS = {"OT": -12.0, "A7": 24.6, "ASM": 36.0}
 OTHERS = {"SP": 3.6, "CLP": 13.8, "A8": 26.4, "A9": 28.2, "ASD": 36.0}
@@ -106,7 +107,7 @@ def test_the_vehicle_is_simulated_in_the_order_of_the_recorded_axles(runs_revers
     """A locomotive at the end is simulated there; formerly at the front, 9.5 m off."""
     at = load_vehicle("intercity").wheel_positions
     recorded = at[-1] - at[::-1] if runs_reversed else at
-    vehicle, is_reversed = _vehicle("intercity", 0.5, passage_with(recorded), "a.h5")
+    vehicle, is_reversed, _ = _vehicle("intercity", 0.5, passage_with(recorded), ["A7"], 0.05, "a.h5")
     assert is_reversed == runs_reversed and vehicle.wheel_positions == pytest.approx(recorded)
 
 
@@ -114,12 +115,62 @@ def test_a_vehicle_with_other_axle_distances_is_an_error_also_with_the_same_numb
     """Two locomotives have eight axles, as an IC3. Formerly they were simulated in its place."""
     recorded = load_vehicle("ic3").wheel_positions
     with pytest.raises(ConfigError, match=r"axles lie \d\.\d+ m rms off those of locomotive\.yaml.*--vehicle"):
-        _vehicle("locomotive", 0.5, passage_with(recorded), "a.h5")
-    assert len(_vehicle("ic3", 0.5, passage_with(recorded), "a.h5")[0].wheels) == 8
+        _vehicle("locomotive", 0.5, passage_with(recorded), ["A7"], 0.05, "a.h5")
+    assert len(_vehicle("ic3", 0.5, passage_with(recorded), ["A7"], 0.05, "a.h5")[0].wheels) == 8
 
 
-def passage_with(offsets):
-    return Passage("accepted", (), Motion(30.0), offsets=np.asarray(offsets))
+def passage_with(offsets, speed=None, motion=None):
+    offsets, motion = np.asarray(offsets), motion or Motion(30.0)
+    return Passage("accepted", (), motion, speed, offsets, at_sensor={"A7": motion.passing(offsets, 24.6)})
+
+
+@pytest.mark.parametrize(
+    ("source", "share", "se", "is_from_axles"),
+    [
+        ("sensors", 0.8, 0.25, True),
+        ("bogie", 0.94, 0.16, True),
+        ("both", 1.0, 1e-4, False),
+        ("axle spacing", 0.99, 1e-4, True),
+    ],
+)
+def test_the_more_exact_speed_is_simulated(source, share, se, is_from_axles):
+    """The recorded axles lie at ``share`` of the true distances, as a speed with this error places them.
+
+    Formerly a train of unknown type was simulated at its recorded speed, up to a quarter off.
+    """
+    found = SpeedFinding(30.0 * share, 30.0 * se, 0.0, 0.1, source)
+    recorded = load_vehicle("ic3").wheel_positions * share
+    _, _, speed = _vehicle("ic3", 0.5, passage_with(recorded, found, Motion(30.0 * share)), ["A7"], 0.05, "a.h5")
+    assert speed.is_from_axles == is_from_axles
+    assert speed.speed == pytest.approx(30.0, rel=1e-3)
+    assert ("from the axle distances" in speed.note) == is_from_axles
+    assert f"{108.0 * share:.1f}" in speed.note
+
+
+def test_the_speed_of_a_train_that_brakes_is_that_at_the_sensors():
+    """Braking by 0.5 m/s² from 20 m/s over 53 m and 25 m: in the middle of its time at A7 v² = 20² - 2 * 0.5 * 51."""
+    positions = load_vehicle("ic3").wheel_positions
+    passage = passage_with(positions, motion=Motion(20.0, acceleration=-0.5))
+    assert speed_at_sensors(passage, ["A7"]) == pytest.approx(np.sqrt(400.0 - 51.0), rel=2e-3)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("share", [1.0, 0.8])
+def test_a_train_that_brakes_is_compared_where_it_was(direction, share):
+    """Every simulated axle is at the time of the recorded one, though only the latter train brakes.
+
+    Formerly the series were shifted alone: at 20 m/s and -0.5 m/s² the last axle of an IC3 was 0.2 s early.
+    """
+    positions = load_vehicle("ic3").wheel_positions
+    passage = passage_with(positions * share, motion=Motion(20.0, 1.0, -0.5, direction))
+    recorded = speed_at_sensors(passage, ["A7"])
+    simulated_axles = 0.9 + positions / (recorded / share)
+    at = recorded_times(simulated_axles, simulated_axles, passage, PassageSensor("A7", "A7", 24.6), recorded)
+    assert at == pytest.approx(passage.at_sensor["A7"], abs=1e-6)
+
+
+def test_the_comparison_states_the_simulated_speed(comparison):
+    assert sum(note.startswith("speed 1") and "km/h (95 %) from the" in note for note in comparison.notes) == 1
 
 
 def test_the_command_states_an_improbable_value_of_the_track_file(passage, repository, tmp_path, capsys):
