@@ -88,85 +88,73 @@ def _number(text: str | None, column: str, low: float, high: float) -> float | N
     return value
 
 
-def listed_for(moment: datetime, n_axles: int, trains: Sequence[ListedTrain], tolerance: float) -> ListedTrain | None:
+@dataclass(frozen=True)
+class OtherPassage:
+    """Another train that passed near in time: ``moment`` in naive UTC, ``n_axles`` None where they are not known."""
+
+    moment: datetime
+    n_axles: int | None = None
+
+
+def listed_for(
+    moment: datetime,
+    n_axles: int | None,
+    trains: Sequence[ListedTrain],
+    tolerance: float,
+    rivals: Sequence[OtherPassage] = (),
+) -> ListedTrain | None:
     """The listed train nearest in time to ``moment``, within ``tolerance`` [s].
 
-    None where it has another number of axles, or where a second one fits nearly as well.
+    None where a second one fits nearly as well, or where it is nearer to another train, or nearly as near.
 
     Parameters
     ----------
     moment : datetime
         Time of the passage, naive UTC.
-    n_axles : int
-        Axles of the passage.
+    n_axles : int or None
+        Axles of the passage, which those of the row must equal; None: whatever their number.
     trains : sequence of ListedTrain
         Trains to choose from.
     tolerance : float
         Largest difference in time. [s]
+    rivals : sequence of OtherPassage
+        Other trains. One with a row of its own nearer to it does not compete for this one.
 
     Returns
     -------
     ListedTrain or None
         The train, if it is certain.
-    """
-    return listed_at(moment, [t for t in trains if t.n_axles in (None, n_axles)], tolerance)
-
-
-def is_of_one_passage(moments: Sequence[datetime], rows: Sequence[ListedTrain]) -> list[bool]:
-    """Which passages keep the row of the train data that was found for them: a row describes one train.
-
-    Where several passages have the same row, the nearest in time keeps it, unless a second is nearly as near.
-
-    Parameters
-    ----------
-    moments : sequence of datetime
-        Time of each passage, naive UTC.
-    rows : sequence of ListedTrain
-        Row of each passage.
-
-    Returns
-    -------
-    list of bool
-        One per passage.
 
     Examples
     --------
     >>> row = ListedTrain(datetime(2024, 5, 13, 10))
-    >>> is_of_one_passage([datetime(2024, 5, 13, 10, 0, 2), datetime(2024, 5, 13, 10, 1)], [row, row])
-    [True, False]
+    >>> first, second = (datetime(2024, 5, 13, 10, 0, second) for second in (2, 42))
+    >>> listed_for(first, 8, [row], 90.0, [OtherPassage(second)]) is row
+    True
+    >>> listed_for(second, 8, [row], 90.0, [OtherPassage(first)])
     """
-    distances = [abs((row.passed_at - moment).total_seconds()) for moment, row in zip(moments, rows, strict=True)]
-    return [
-        all(
-            distances[other] >= MIN_DISTANCE_RATIO * distance + MIN_TIME_APART
-            for other, other_row in enumerate(rows)
-            if other_row is row and other != k
-        )
-        for k, (distance, row) in enumerate(zip(distances, rows))
-    ]
-
-
-def listed_at(moment: datetime, trains: Sequence[ListedTrain], tolerance: float) -> ListedTrain | None:
-    """The listed train nearest in time to ``moment``, within ``tolerance`` [s], whatever its number of axles.
-
-    None where a second one fits nearly as well.
-
-    Parameters
-    ----------
-    moment : datetime
-        Time of the passage, naive UTC.
-    trains : sequence of ListedTrain
-        Trains to choose from.
-    tolerance : float
-        Largest difference in time. [s]
-
-    Returns
-    -------
-    ListedTrain or None
-        The train, if it is certain.
-    """
-    near = [(abs((t.passed_at - moment).total_seconds()), t) for t in trains]
-    near = sorted((x for x in near if x[0] <= tolerance), key=lambda x: x[0])
-    if not near or (len(near) > 1 and near[1][0] < MIN_DISTANCE_RATIO * near[0][0] + MIN_TIME_APART):
+    near = sorted(((_distance(t, moment), t) for t in _fitting(trains, n_axles)), key=lambda x: x[0])
+    near = [x for x in near if x[0] <= tolerance]
+    if not near:
         return None
-    return near[0][1]
+    distance, row = near[0]
+    limit = MIN_DISTANCE_RATIO * distance + MIN_TIME_APART
+    if len(near) > 1 and near[1][0] < limit:
+        return None
+    as_near = (rival for rival in rivals if _distance(row, rival.moment) < limit)
+    return None if any(_is_nearest(row, rival, trains) for rival in as_near) else row
+
+
+def _fitting(trains: Sequence[ListedTrain], n_axles: int | None) -> list[ListedTrain]:
+    """Rows that a train with this number of axles may have."""
+    return [t for t in trains if n_axles is None or t.n_axles in (None, n_axles)]
+
+
+def _distance(train: ListedTrain, moment: datetime) -> float:
+    return abs((train.passed_at - moment).total_seconds())
+
+
+def _is_nearest(row: ListedTrain, rival: OtherPassage, trains: Sequence[ListedTrain]) -> bool:
+    """Whether ``row`` fits ``rival``, and no other one that does is nearer to it."""
+    fitting = _fitting(trains, rival.n_axles)
+    return row in fitting and _distance(row, rival.moment) <= min(_distance(t, rival.moment) for t in fitting)

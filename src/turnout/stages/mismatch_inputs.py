@@ -10,7 +10,6 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,6 @@ from turnout.config.turnout import TurnoutConfig
 from turnout.errors import ReadError
 from turnout.mismatch.turnout import HammerInput, PassageInput
 from turnout.passage.cleaning import clean
-from turnout.passage.timetable import listed_at, listed_trains
 from turnout.readers import read
 from turnout.reasons import REASONS
 from turnout.records import LongRecording, Recording, Rejection, Unit
@@ -26,7 +24,7 @@ from turnout.signal.cleaning import without_artefacts
 from turnout.simulate.turnout_track import position_by_mounting
 from turnout.stages.copied_files import without_copies
 from turnout.stages.layout_checks import position_fault
-from turnout.stages.mismatch_trains import TrainUnknownError, train_of
+from turnout.stages.mismatch_trains import TrainUnknownError, train_notes, train_of
 from turnout.stages.passage import PassageContext, passage_unit, sensors_of, trains_in
 from turnout.stages.passage_context import known_patterns
 from turnout.stages.recording_notes import doubt_of_rail_temperature, noted_rail_temperature, rail_temperature
@@ -240,9 +238,10 @@ def _read_passages(
     inputs, n = VisitInputs(), 0
     for recording in _trains(unit, turnout, raw_root, inputs.notes):
         name = _passage_name(unit) + (f":{n}" if len(rows) > 1 else "")
-        passage = _passage_input(
-            name, recording, rows[n] if n < len(rows) else {}, turnout, track, quarantine, inputs.notes
-        )
+        row = rows[n] if n < len(rows) else {}
+        rivals = [r for r in rows if r is not row]
+        conditions = train_notes(row, rivals, recording, turnout, unit.files[0][0], raw_root)
+        passage = _passage_input(name, recording, row, conditions, turnout, track, quarantine, inputs.notes)
         n += 1
         if passage is not None:
             inputs.passages.append(passage)
@@ -254,6 +253,7 @@ def _passage_input(
     name: str,
     recording: Recording,
     row: Mapping[str, Any],
+    conditions: Mapping[str, Any],
     turnout: TurnoutConfig,
     track: TurnoutTrack,
     quarantine: Sequence[Mapping[str, Any]],
@@ -266,7 +266,7 @@ def _passage_input(
         notes.append(Note("two trains at the same time, not used", name))
         return None
     try:
-        train = train_of(row, _train_notes(row, recording, turnout), Path(turnout.folder) / "vehicles")
+        train = train_of(row, conditions, Path(turnout.folder) / "vehicles")
     except TrainUnknownError as error:
         notes.append(Note(str(error), name, contradicted_train=error.train))
         return None
@@ -284,19 +284,6 @@ def _passage_input(
     return PassageInput(
         name, usable, train.vehicle, train.speed, train.name, *heading, _passage_conditions(row, usable), train.load_sd
     )
-
-
-def _train_notes(row: Mapping[str, Any], recording: Recording, turnout: TurnoutConfig) -> Mapping[str, Any]:
-    """Notes in the file, with the number of axles of the train data where the file has none and the type agrees."""
-    notes, moment = recording.conditions, row.get("passed_at_utc") or recording.started_at
-    trains, _ = listed_trains(turnout.trains)
-    if moment is None or not trains:
-        return notes
-    moment = datetime.fromisoformat(str(moment)).replace(tzinfo=None)
-    listed = listed_at(moment, trains, turnout.settings["passage"].train_data_tolerance)
-    if listed is None or listed.n_axles is None or notes.get("train_type") not in (None, listed.train_type):
-        return notes
-    return {"n_axles": listed.n_axles, **notes}
 
 
 def _trains(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, notes: list[Note]) -> Iterator[Recording]:

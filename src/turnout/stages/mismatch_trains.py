@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,13 +13,18 @@ import numpy as np
 from turnout.constants import KMH, NEWTON_PER_TONNE
 from turnout.errors import ConfigError, SimulationError
 from turnout.mismatch.turnout.priors import TRACK
+from turnout.passage.timetable import OtherPassage, listed_for, listed_trains
 from turnout.simulate import load_vehicle
 from turnout.simulate.vehicle import Vehicle
+from turnout.stages.neighbouring_files import passages_beside
 from turnout.stages.recording_notes import noted_number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
+
+    from turnout.config import TurnoutConfig
+    from turnout.records import Recording
 
 MAX_AXLE_RMS = 0.4  # m rms between measured axles and the vehicle file's: half a short bogie is 0.9
 MIN_SPEED_TOLERANCE = 0.03  # least share by which the axle distances may correct the speed
@@ -126,6 +132,55 @@ def train_of(row: Mapping, notes: Mapping, folder: Path) -> IdentifiedTrain:
         load_sd,
         route_doubts,
     )
+
+
+def train_notes(
+    row: Mapping[str, Any],
+    rows_beside: Sequence[Mapping[str, Any]],
+    recording: Recording,
+    turnout: TurnoutConfig,
+    path: str,
+    raw_root: str | Path,
+) -> Mapping[str, Any]:
+    """Notes in the file, with the number of axles of the train data where the file has none and the type agrees.
+
+    Parameters
+    ----------
+    row : mapping
+        Row of the passage stage, {} without one.
+    rows_beside : sequence of mapping
+        Those of the other trains in the file.
+    recording : Recording
+        The train.
+    turnout : TurnoutConfig
+        With its rows of trains.csv.
+    path : str
+        Path of the file below ``raw_root``.
+    raw_root : str or Path
+        Folder that the path starts from.
+
+    Returns
+    -------
+    mapping
+        The conditions of the recording, with ``n_axles`` in addition.
+    """
+    notes, trains = recording.conditions, listed_trains(turnout.trains)[0]
+    moment = _moment(row) or _moment({"passed_at_utc": recording.started_at})
+    if moment is None or not trains:
+        return notes
+    tolerance = turnout.settings["passage"].train_data_tolerance
+    rivals = [OtherPassage(at, n) for r in rows_beside if (n := r.get("n_axles")) and (at := _moment(r))]
+    rivals += [] if rows_beside else passages_beside(path, raw_root, moment, tolerance)
+    listed = listed_for(moment, None, trains, tolerance, rivals)
+    if listed is None or listed.n_axles is None or notes.get("train_type") not in (None, listed.train_type):
+        return notes
+    return {"n_axles": listed.n_axles, **notes}
+
+
+def _moment(row: Mapping[str, Any]) -> datetime | None:
+    """When the train of a row passed, naive UTC."""
+    value = row.get("passed_at_utc")
+    return None if value is None else datetime.fromisoformat(str(value)).replace(tzinfo=None)
 
 
 def _is_uncertain(row: Mapping[str, Any]) -> bool:

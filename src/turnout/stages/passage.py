@@ -15,17 +15,18 @@ from turnout.config.settings.passage import PassageSettings
 from turnout.config.turnout import TurnoutConfig
 from turnout.errors import PartlyComputed, ReadError
 from turnout.passage.analysis import analyse
-from turnout.passage.axle_load import LoadCalibration, axle_load
+from turnout.passage.axle_load import LoadCalibration, LoadFinding, axle_load
 from turnout.passage.axle_patterns import Pattern
 from turnout.passage.channel_fit import find_peak, fit_channel
 from turnout.passage.cleaning import clean
 from turnout.passage.clusters import Clusters
 from turnout.passage.result import Passage, PassageSensor
 from turnout.passage.segmentation import cut_passages
-from turnout.passage.timetable import listed_for, listed_trains
+from turnout.passage.timetable import OtherPassage, listed_for, listed_trains
 from turnout.records import LongRecording, ModalModel, Recording, Unit
 from turnout.registry.ids import content_id
 from turnout.stages.filed_times import MAX_NAME_OFFSET, TIME_REMEDY, time_contradiction, time_of_label
+from turnout.stages.neighbouring_files import passages_beside
 from turnout.stages.passage_rows import finding_rows, fit_row, passage_row
 from turnout.stages.raw_files import quarantine_row, read_or_quarantine, recording_row
 from turnout.units import IGNORED
@@ -103,6 +104,7 @@ def passage_unit(
             rows["quarantine"] += [_without_sensor(path, r.record, base, turnout, recording_id) for r in records]
             rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=None))
             continue
+        trains: list[_AnalysedTrain] = []
         for recording in records:
             started_at = recording.started_at or time_of_label(unit.label)
             if started_at is None:
@@ -115,7 +117,9 @@ def passage_unit(
             try:
                 for train_recording, offset, name in trains_in(recording, turnout.settings["passage"]):
                     moment = started_at + timedelta(seconds=offset)
-                    _add_train(train_recording, moment, recording_id, path, turnout, context, rows, name)
+                    trains.append(
+                        _analyse_train(train_recording, moment, recording_id, path, turnout, context, rows, name)
+                    )
             except ReadError as error:  # a long record is read in pieces: its file may be damaged or change meanwhile
                 rows["quarantine"].append(
                     quarantine_row(error, base, "passage", "passage", recording.record, recording_id)
@@ -124,6 +128,7 @@ def passage_unit(
                 raise
             except Exception as error:
                 faults.append((path, recording.record, error))
+        _add_trains(trains, path, raw_root, turnout, context, rows)
         first = rows["passages"][0]["passage_id"] if rows["passages"] else None
         rows["recordings"].append(recording_row(result, path, size, description, base, "passage", passage_id=first))
     if faults:
@@ -227,7 +232,25 @@ def trains_in(
         yield train_recording, piece.start / recording.rate, (str(piece.start),)
 
 
-def _add_train(
+@dataclass(frozen=True)
+class _AnalysedTrain:
+    """A train before its row of the train data is known; ``name`` distinguishes it from others in its record."""
+
+    passage: Passage
+    identity: dict[str, Any]
+    record: int
+    name: tuple[str, ...]
+    conditions: Mapping[str, Any]
+    load: LoadFinding | None
+    fits: list[dict[str, Any]]
+
+    @property
+    def in_time(self) -> OtherPassage:
+        """When it passed, with its axles."""
+        return OtherPassage(self.identity["passed_at_utc"], self.passage.n_axle)
+
+
+def _analyse_train(
     recording: Recording,
     started_at: datetime,
     recording_id: str,
@@ -236,32 +259,49 @@ def _add_train(
     context: PassageContext,
     rows: dict[str, list[dict]],
     name: tuple[str, ...] = (),
-) -> None:
-    """Add the rows of one train; ``name`` distinguishes it from others in the same record."""
+) -> _AnalysedTrain:
+    """Analyse one train, and add its findings to the rows."""
     settings = turnout.settings["passage"]
     sensors = sensors_of(turnout)
     passage = analyse(recording, sensors, context.patterns, settings)
     recording, _ = clean(recording, sensors)  # for loads and fits
-    base = {"turnout_id": turnout.id}
     first = float(passage.times[0]) if passage.n_axle else 0.0
     passed_at = started_at + timedelta(seconds=round(first, 3))
-    rows["quarantine"] += finding_rows(passage, base, path, recording.record, recording_id)
-    listed, _ = listed_trains(turnout.trains)
-    listed_train = (
-        listed_for(passed_at, passage.n_axle, listed, settings.train_data_tolerance) if passage.n_axle else None
-    )
+    rows["quarantine"] += finding_rows(passage, {"turnout_id": turnout.id}, path, recording.record, recording_id)
     load = axle_load(recording, passage, context.loads, settings) if passage.n_axle else None
-    identity = {**base, "recording_id": recording_id, "passed_at_utc": passed_at}
-    row = passage_row(passage, identity, listed_train, load, recording.conditions)
-    if context.clusters is not None and passage.n_axle:
-        row["cluster_id"] = context.clusters.assign(row.get("train_type"), row.get("speed_kmh"), row.get("axle_load_t"))
+    identity = {"turnout_id": turnout.id, "recording_id": recording_id, "passed_at_utc": passed_at}
     fits = _fit_rows(recording, passage, sensors, turnout, context, identity, settings) if passage.n_axle else []
-    # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
-    # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
-    passage_id = {"passage_id": content_id("passage", path, str(recording.record), *name, row, fits)}
-    # The codes repeat what the row states in words, so they are not part of the id.
-    rows["passages"].append(passage_id | row | {"reason_codes": [f.reason for f in passage.findings]})
-    rows["passage_fits"] += [passage_id | fit for fit in fits]
+    return _AnalysedTrain(passage, identity, recording.record, name, recording.conditions, load, fits)
+
+
+def _add_trains(
+    trains: Sequence[_AnalysedTrain],
+    path: str,
+    raw_root: str | Path,
+    turnout: TurnoutConfig,
+    context: PassageContext,
+    rows: dict[str, list[dict]],
+) -> None:
+    """Add the rows of the trains of a file. A row of the train data belongs to one of them at most."""
+    listed, _ = listed_trains(turnout.trains)
+    tolerance = turnout.settings["passage"].train_data_tolerance
+    for train in trains:
+        passage, listed_train = train.passage, None
+        if listed and passage.n_axle:
+            rivals = [t.in_time for t in trains if t is not train and t.passage.n_axle]
+            if not train.name:  # the files of a continuous logger do not begin with a train
+                rivals += passages_beside(path, raw_root, train.in_time.moment, tolerance)
+            listed_train = listed_for(train.in_time.moment, passage.n_axle, listed, tolerance, rivals)
+        row = passage_row(passage, train.identity, listed_train, train.load, train.conditions)
+        if context.clusters is not None and passage.n_axle:
+            values = (row.get(key) for key in ("train_type", "speed_kmh", "axle_load_t"))
+            row["cluster_id"] = context.clusters.assign(*values)
+        # The id depends on the whole row: train data, models, clusters and loads change it as well as the file does.
+        # It depends on the path too, so that the row of a copy stays when that of its original is withdrawn.
+        passage_id = {"passage_id": content_id("passage", path, str(train.record), *train.name, row, train.fits)}
+        # The codes repeat what the row states in words, so they are not part of the id.
+        rows["passages"].append(passage_id | row | {"reason_codes": [f.reason for f in passage.findings]})
+        rows["passage_fits"] += [passage_id | fit for fit in train.fits]
 
 
 def _fit_rows(

@@ -35,7 +35,7 @@ from turnout.stages.calibrate import calibrate_to_files
 from turnout.stages.mismatch_groups import groups, neighbours_of, unit_of
 from turnout.stages.mismatch_inputs import MAX_SIMILAR_PASSAGES, Note, VisitInputs, _thin_out, gather_inputs
 from turnout.stages.mismatch_results import Results, diagnose_turnout
-from turnout.stages.mismatch_trains import train_of
+from turnout.stages.mismatch_trains import train_notes, train_of
 from turnout.stages.recording_choice import select_passages
 from turnout.stages.recording_notes import noted_number, rail_temperature
 from turnout.stages.track_files import digest_of_model, track_of
@@ -130,14 +130,14 @@ def test_the_noted_number_of_axles_is_used_if_the_recorded_axles_match_no_train(
         ({"n_axles": 16}, "ic3", 16),
     ],
 )
-def test_train_data_give_the_number_of_axles_that_the_file_does_not_state(known, listed_type, axles):
+def test_train_data_give_the_number_of_axles_that_the_file_does_not_state(known, listed_type, axles, tmp_path):
     rows = ({"passed_at_utc": "2024-07-16T13:00:02", "train_type": listed_type, "n_axles": "8"},)
     settings = {"passage": SimpleNamespace(train_data_tolerance=60.0)}
     turnout = SimpleNamespace(trains=rows, settings=settings)
     recording = SimpleNamespace(conditions=known, started_at=datetime(2024, 7, 16, 13, tzinfo=UTC))
-    assert mismatch_inputs._train_notes({}, recording, turnout).get("n_axles") == axles
+    assert train_notes({}, [], recording, turnout, "p/a.h5", tmp_path).get("n_axles") == axles
     later = {"passed_at_utc": datetime(2024, 7, 16, 13, 30)}
-    assert mismatch_inputs._train_notes(later, recording, turnout) == known
+    assert train_notes(later, [], recording, turnout, "p/a.h5", tmp_path) == known
 
 
 def test_twice_as_many_impacts_as_axles_are_not_taken_as_a_second_unit(repository):
