@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import turnout
 from turnout_blind.isolation import HiddenFolders
 from turnout_blind.limited_process import run, with_cpu_limit
-from turnout_blind.seal import BlindError, digest, digest_of_folder, read_commit
+from turnout_blind.seal import BlindError, check_seals, digest, digest_of_folder, read_commit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -79,7 +79,8 @@ def diagnose_set(
     Raises
     ------
     BlindError
-        If the tool or the command has changed, if the set was made for another tool, or if it is revealed already.
+        If the tool or the command has changed, if the set was made for another tool, if it is revealed already, if a
+        truth or recording does not match its seal, or if there is no such case.
     """
     out, commit = Path(out).resolve(), read_commit(out)
     tool, folder = Path(turnout.__file__).parent, diagnosis_folder(out, label)
@@ -100,6 +101,10 @@ def diagnose_set(
     revealed_folder = out / "revealed"
     if label is None and revealed_folder.exists():
         raise BlindError(revealed_folder, "truth", "this set is open", "Judge a set made again, or an ablation")
+    if missing := sorted(set(only or ()) - set(commit["cases"])):
+        some = ", ".join([*sorted(commit["cases"])[:5], *(["..."] if len(commit["cases"]) > 5 else [])])
+        raise BlindError(out, "--cases", f"there is no case {missing[0]!r}", f"There are {some}")
+    check_seals(out, truth)  # before hours of work, and because the folder that is hidden must be that of this set
     diagnosis |= {"commit_sha256": digest((out / "commit.json").read_bytes()), "command": command}
     diagnosis |= {"budget": {"wall_s": timeout, "cpu_s": cpu}}
     (folder / "findings").mkdir(parents=True, exist_ok=True)

@@ -49,6 +49,24 @@ def reveal(out: str | Path, truth: str | Path) -> dict[str, Any]:
     return truths
 
 
+def undiagnosed_cases(out: str | Path) -> list[str]:
+    """Cases that have not been run.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+
+    Returns
+    -------
+    list of str
+        All cases before a diagnosis.
+    """
+    record = Path(out) / "diagnosis.json"
+    diagnosed = json.loads(record.read_text())["cases"] if record.exists() else {}
+    return [case for case in read_commit(out)["cases"] if case not in diagnosed]
+
+
 def read_revealed(
     out: str | Path, label: str | None = None
 ) -> tuple[dict[str, Any], dict[str, list | None], dict[str, Any]]:

@@ -206,9 +206,27 @@ def verify(out: str | Path, truth: str | Path) -> dict[str, Any]:
     BlindError
         At the first truth or recording that does not match its seal.
     """
+    check_seals(out, truth)
+    return {case: json.loads((Path(truth) / f"{case}.json").read_bytes()) for case in read_commit(out)["cases"]}
+
+
+def check_seals(out: str | Path, truth: str | Path) -> None:
+    """Compare every truth and recording with its seal.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truth : str or Path
+        Folder of the truths.
+
+    Raises
+    ------
+    BlindError
+        At the first truth or recording that does not match its seal.
+    """
     out, truth, commit = Path(out), Path(truth), read_commit(out)
     _check_seal(truth / SET_FILE, commit["set_sha256"])
-    truths = {}
     for case, seals in commit["cases"].items():
         _check_seal(truth / f"{case}.json", seals["truth_sha256"])
         digests = file_digests(out / "cases" / case)
@@ -220,12 +238,39 @@ def verify(out: str | Path, truth: str | Path) -> dict[str, Any]:
         for name, sha in digests.items():
             if sha != seals["files"][name]:
                 raise BlindError(out / "cases" / case, name, "not the sealed content", "Take the sealed set again")
-        truths[case] = json.loads((truth / f"{case}.json").read_bytes())
-    return truths
+
+
+def check_kind(out: str | Path, truth: str | Path, histories: bool) -> None:
+    """Compare the kind of a set with the option that a step was given.
+
+    Parameters
+    ----------
+    out : str or Path
+        Folder of the set.
+    truth : str or Path
+        Folder of the truths, or of the revealed ones.
+    histories : bool
+        Whether the step expects histories.
+
+    Raises
+    ------
+    BlindError
+        The set is of the other kind. A folder without the truth of a set is no error here.
+    """
+    path = Path(truth) / SET_FILE
+    if not path.is_file() or bool(json.loads(path.read_bytes()).get("histories")) == histories:
+        return
+    if histories:
+        raise BlindError(out, "--histories", "this set has single campaigns, no histories", "Leave --histories out")
+    raise BlindError(out, "--histories", "this set has histories", "Give --histories")
 
 
 def _check_seal(path: Path, sha: str) -> None:
     if not path.exists():
         raise BlindError(path, "the path", "there is no such truth", "Give the folder of the truth with --truth")
-    if digest(path.read_bytes()) != sha:
-        raise BlindError(path, "line 1", "not the truth that was sealed", "This set proves nothing: make a new one")
+    if digest(path.read_bytes()) == sha:
+        return
+    if path.name == SET_FILE:
+        remedy = "Give the folder of its truth with --truth; if this is it, the set proves nothing"
+        raise BlindError(path, "line 1", "the truth of another set, or not as it was sealed", remedy)
+    raise BlindError(path, "line 1", "not the truth that was sealed", "This set proves nothing: make a new one")

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from turnout.cli.main import main
 from turnout.config.campaign_notes import with_raw
 from turnout.config.load import load_configuration
 from turnout.readers import read
@@ -299,6 +300,68 @@ def test_a_tool_that_changes_during_the_diagnosis_is_rejected(copy, monkeypatch)
 def test_a_set_is_not_opened_before_the_tool_has_answered(copy):
     with pytest.raises(BlindError, match="nothing has been diagnosed yet"):
         reveal(*copy)
+
+
+STUB = "{python} -c 'print([])'"
+
+
+def test_nothing_is_diagnosed_under_the_truth_of_another_set(copy, tmp_path):
+    """Formerly the folder of the other truth was hidden from the tool, and the true one was not."""
+    out, truth = copy
+    foreign = tmp_path / "foreign"
+    shutil.copytree(truth, foreign)
+    (foreign / "set.json").write_text('{"seed": 1}')
+    with pytest.raises(BlindError, match=r"the truth of another set.*--truth"):
+        diagnose_set(out, foreign, STUB, report=lambda line: None)
+    with pytest.raises(BlindError, match="there is no such truth"):
+        diagnose_set(out, tmp_path / "missing", STUB, report=lambda line: None)
+    with pytest.raises(BlindError, match=r"the truth of another set.*--truth"):
+        reveal(out, foreign)
+    assert not (out / "findings").exists() and not (out / "diagnosis.json").exists()
+
+
+def test_a_changed_recording_is_found_before_the_diagnosis(copy):
+    """Formerly it was found when the set was revealed, after hours of work."""
+    out, truth = copy
+    recording = next(p for p in cases(out)[0].rglob("*") if p.is_file())
+    recording.write_bytes(recording.read_bytes() + b" ")
+    with pytest.raises(BlindError, match="not the sealed content"):
+        diagnose_set(out, truth, STUB, report=lambda line: None)
+    assert not (out / "diagnosis.json").exists()
+
+
+def test_a_case_that_the_set_does_not_have_is_an_error(copy):
+    """Formerly it was stored as a case without an answer."""
+    out, truth = copy
+    with pytest.raises(BlindError, match=rf"there is no case 'T1'.*{cases(out)[0].name}"):
+        diagnose_set(out, truth, STUB, [cases(out)[0].name, "T1"], report=lambda line: None)
+
+
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
+def test_a_set_is_revealed_with_open_cases_on_request_alone(copy, capsys):
+    """A revealed set cannot be diagnosed. Formerly the open cases counted as those without an answer, unsaid."""
+    out, truth = copy
+    where = ["--out", str(out), "--truth", str(truth)]
+    diagnose_set(out, truth, STUB, [cases(out)[0].name], report=lambda line: None)
+    assert main(["blind", "reveal", *where]) == 2
+    assert "1 case not diagnosed yet. Go on with turnout blind diagnose" in capsys.readouterr().err
+    assert not (out / "revealed").exists()
+    assert main(["blind", "reveal", *where, "--incomplete"]) == 0
+    assert "1 case without a diagnosis" in capsys.readouterr().out
+    assert main(["blind", "reveal", *where]) == 0  # again: the same
+
+
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
+def test_the_kind_of_a_set_that_was_not_stated_is_an_error(copy, capsys):
+    """Formerly a fault of the program, and a diagnosis of single visits by the command of histories."""
+    out, truth = copy
+    where = ["--out", str(out)]
+    assert main(["blind", "diagnose", *where, "--truth", str(truth), "--histories"]) == 2
+    assert "this set has single campaigns, no histories" in capsys.readouterr().err
+    diagnose_set(out, truth, STUB, report=lambda line: None)
+    reveal(out, truth)
+    assert main(["blind", "score", *where, "--histories"]) == 2
+    assert "Leave --histories out" in capsys.readouterr().err
 
 
 def test_the_truth_must_not_be_inside_the_folder_of_the_tool(tmp_path):

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from turnout.cli.option_types import above_zero, at_least_one
 from turnout.cli.options import add_cores, add_former, add_use, check_output_files
+from turnout.counts import count_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -67,6 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_cores(diagnose, "processes, each with one case at a time (%(default)s)", default=1)
     add_former(diagnose, "--workers", "--cores", type=at_least_one)
     reveal = steps.add_parser("reveal", help="open the envelopes and verify every hash")
+    reveal.add_argument(
+        "--incomplete", action="store_true", help="although cases are not diagnosed: they count as cases without answer"
+    )
     score = steps.add_parser("score", help="print every figure with its interval")
     score.add_argument("--histories", action="store_true", help="the set has histories")
     score.add_argument("--names", help="JSON file {effect: [names of the tool that are right]} to add")
@@ -135,7 +139,10 @@ def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:
 
 def _diagnose(args: argparse.Namespace) -> None:
     from turnout_blind.diagnose import COMMAND, HISTORY_COMMAND, diagnose_set
+    from turnout_blind.seal import check_kind
 
+    if not args.tool:
+        check_kind(args.out, _truth(args), args.histories)
     command = args.tool or (HISTORY_COMMAND if args.histories else COMMAND)
     only = args.cases.split(",") if args.cases else None
     record = diagnose_set(
@@ -148,10 +155,18 @@ def _diagnose(args: argparse.Namespace) -> None:
 
 
 def _reveal(args: argparse.Namespace) -> None:
-    from turnout_blind.reveal import reveal
+    from pathlib import Path
 
+    from turnout_blind.reveal import reveal, undiagnosed_cases
+    from turnout_blind.seal import BlindError
+
+    left, is_begun = undiagnosed_cases(args.out), (Path(args.out) / "diagnosis.json").exists()
+    if left and is_begun and not (args.incomplete or (Path(args.out) / "revealed").exists()):
+        remedy = "Go on with turnout blind diagnose: a revealed set cannot be diagnosed. Or give --incomplete"
+        raise BlindError(args.out, "reveal", f"{count_of(len(left), 'case')} not diagnosed yet", remedy)
     truths = reveal(args.out, _truth(args))
-    print(f"{len(truths)} envelopes opened, every hash verified: {args.out}/revealed")
+    without = f", {count_of(len(left), 'case')} without a diagnosis" if left else ""
+    print(f"{len(truths)} envelopes opened, every hash verified{without}: {args.out}/revealed")
 
 
 def _score(args: argparse.Namespace) -> None:
@@ -161,9 +176,11 @@ def _score(args: argparse.Namespace) -> None:
     from turnout.files import write_text
     from turnout_blind.score.histories import history_text
     from turnout_blind.score.report import report_text
-    from turnout_blind.seal import BlindError
+    from turnout_blind.seal import BlindError, check_kind
 
     check_output_files(args, "--report", "--page")
+    for out in args.out:
+        check_kind(out, Path(out) / "revealed", args.histories)
     if args.page and (args.histories or len(args.out) > 1):
         raise BlindError(args.page, "--page", "a page shows one set of single visits", "Give one --out, no --histories")
     if args.histories:
