@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from turnout.constants import KMH, STANDARD_GRAVITY
+from turnout.unit_spellings import canonical_spelling, factor_and_unit, is_of_a_stretch, plain_unit
 
 IGNORED = "ignored"  # quantity of a channel that is in the file and is not read
 
@@ -17,21 +18,29 @@ UNITS = {
         "N": (1.0, 0.0),
         "mN": (1e-3, 0.0),
         "daN": (10.0, 0.0),
+        "hN": (100.0, 0.0),
         "kN": (1e3, 0.0),
         "MN": (1e6, 0.0),
+        "gf": (1e-3 * STANDARD_GRAVITY, 0.0),
         "kgf": (STANDARD_GRAVITY, 0.0),
+        "tf": (1e3 * STANDARD_GRAVITY, 0.0),
+        "dyn": (1e-5, 0.0),
         "lbf": (4.4482216152605, 0.0),
         "kip": (4448.2216152605, 0.0),
     },
     "acceleration": {
         "m/s²": (1.0, 0.0),
+        "nm/s²": (1e-9, 0.0),
+        "µm/s²": (1e-6, 0.0),
         "mm/s²": (1e-3, 0.0),
         "cm/s²": (1e-2, 0.0),
+        "dm/s²": (0.1, 0.0),
         "km/s²": (1e3, 0.0),
         "ft/s²": (0.3048, 0.0),
         "in/s²": (0.0254, 0.0),
         "g": (STANDARD_GRAVITY, 0.0),
         "mg": (1e-3 * STANDARD_GRAVITY, 0.0),
+        "µg": (1e-6 * STANDARD_GRAVITY, 0.0),
     },
     "velocity": {"m/s": (1.0, 0.0), "mm/s": (1e-3, 0.0), "km/h": (1 / KMH, 0.0)},
     "displacement": {"m": (1.0, 0.0), "mm": (1e-3, 0.0), "µm": (1e-6, 0.0)},
@@ -116,22 +125,18 @@ def parameter_unit(text: str) -> tuple[str, float] | None:
 
 
 SPELLINGS = {
-    "V": "Volt Volts volt volts v",
-    "mV": "Millivolt Millivolts millivolts",
-    "µV": "uV microvolts",
+    "V": "v",
+    "µV": "uV",
     "count": "counts Counts COUNT cts digit digits ADC LSB lsb",
-    "N": "Newton Newtons newton newtons",
-    "kN": "Kilonewton kilonewton",
-    "kgf": "kp",
-    "lbf": "lb_f lbs",
+    "kgf": "kp kg-f kg_f kgF KGF",
+    "tf": "t-f t_f tonf",
+    "gf": "g-f",
+    "lbf": "lb_f lb-f lb lbs LBF",
     "kip": "kips klbf",
-    "m/s²": "m/s^2 m/s**2 m/s2 m/s/s ms-2 ms^-2 ms⁻² m*s^-2 m*s-2 m·s⁻² m·s-2 m·s^-2 m.s-2 m.s^-2 m.s⁻² m/sec² "
-    "m/sec^2 m/sec2 MeterPerSecondSquared (m/s²) (m/s^2) (m/s2)",
-    "mm/s²": "mm/s^2 mm/s2",
-    "cm/s²": "cm/s^2 cm/s2 Gal gal",
-    "ft/s²": "ft/s^2 ft/s2",
-    "in/s²": "in/s^2 in/s2",
-    "g": "gn g_n G gravity g's G's",
+    "dyn": "dyne dynes",
+    "m/s²": "MeterPerSecondSquared",
+    "cm/s²": "Gal gal",
+    "g": "gn g_n g0 g_0 G gravity g's G's",
     "m/s": "MeterPerSecond MetersPerSecond",
     "km/h": "kph KilometerPerHour",
     "m": "meter Meter metre",
@@ -139,7 +144,6 @@ SPELLINGS = {
     "µm": "um micrometer Micrometer",
     "m/m": "strain -",
     "µm/m": "um/m µstrain ustrain microstrain ue µε",
-    "Pa": "Pascal Pascals pascal",
     "°C": "degC deg_C Celsius celsius DegreeCelsius C",
     "K": "Kelvin kelvin",
     "°F": "degF Fahrenheit",
@@ -153,11 +157,9 @@ SI = {
     "pressure": "Pa",
     "temperature": "°C",
 }
-_CANONICAL = {name: name for units in UNITS.values() for name in units}
-_CANONICAL |= {spelling: name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
-_CANONICAL |= {"deg C": "°C", "Deg C": "°C", "deg F": "°F", "Deg F": "°F"}
-_CANONICAL |= dict.fromkeys(("m s-2", "m s^-2", "m s⁻²", "m / s²", "m / s^2"), "m/s²")
-_NUMBER = re.compile(r"^([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.+)$")
+_CANONICAL = {plain_unit(name): name for units in UNITS.values() for name in units}
+_CANONICAL |= {plain_unit(spelling): name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
+_CANONICAL |= {"deg C": "°C", "Deg C": "°C", "deg F": "°F", "Deg F": "°F", "ug": "µg"}
 
 
 # Letters of units in Russian. Without г, the gram: the acceleration of gravity is written with a Latin letter.
@@ -195,6 +197,11 @@ class Conversion:
     offset: float = 0.0
 
 
+def _canonical_name(text: str) -> str | None:
+    """Name of a unit in ``UNITS``, without a factor; None if it is not known."""
+    return _CANONICAL.get(text) or _CANONICAL.get(plain_unit(canonical_spelling(text)))
+
+
 @lru_cache(maxsize=1024)
 def conversion(unit: str) -> Conversion:
     """Conversion of numbers in a unit to SI; a leading factor is the value of one step or of full scale.
@@ -223,12 +230,15 @@ def conversion(unit: str) -> Conversion:
     >>> round(conversion("°F").scale * 32 + conversion("°F").offset, 9)
     0.0
     """
-    text = unit.strip().strip("[]").replace("\u03bc", "µ").strip()
-    text = re.sub(r"/\(([^()/*·]+)\)$", r"/\1", text)  # "m/(s^2)"
-    factor = 1.0
-    if (match := _NUMBER.match(text)) and text not in _CANONICAL:
-        factor, text = float(match[1]), match[2].strip()
-    name = _CANONICAL.get(in_latin(text))
+    text = in_latin(plain_unit(unit))
+    factor, name = 1.0, _canonical_name(text)
+    if name is None:
+        factor, text = factor_and_unit(text)
+        name = _canonical_name(text)
+    if name is None and is_of_a_stretch(text):
+        raise ValueError(
+            f"the unit {unit!r} is not known: such values are taken over a stretch of time, and no samples"
+        )
     if name is None or not math.isfinite(factor) or factor == 0:
         alike = sorted({known for spelling, known in _CANONICAL.items() if spelling.lower() == text.lower()})
         hint = f" (did you mean {' or '.join(map(repr, alike))}?)" if alike else ""

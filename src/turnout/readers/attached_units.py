@@ -12,6 +12,7 @@ from turnout.readers.metadata_names import TIME_NAMES
 from turnout.readers.rate_units import rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS
 from turnout.readers.stated_units import SENSITIVITY_IN_NAME, known_unit
+from turnout.unit_spellings import BRACKETS_IN_ASCII, without_brackets
 from turnout.units import SI, in_latin
 
 TIME_WORDS = (*TIME_NAMES, "timestamp", "zeit", "zeitstempel", "tid", "temps", "horodatage", "tempo", "tiempo", "tijd")
@@ -50,17 +51,17 @@ def name_and_unit(cell: str) -> tuple[str, str]:
     (('v', 'm/s'), ('rail mV/(m/s²)', ''))
     """
     sensitivity = SENSITIVITY_IN_NAME.search(cell)
-    for match in reversed([*BRACKETS.finditer(cell)]):
+    for match in reversed([*BRACKETS.finditer(cell.translate(BRACKETS_IN_ASCII))]):
         if sensitivity and sensitivity.start() < match.start() < sensitivity.end():  # of "10 mV/(m/s²)"
             return cell, ""
-        unit = next(text for text in match.groups() if text is not None).strip()
+        unit = without_brackets(next(text for text in match.groups() if text is not None))
         if is_known(unit):
             before = cell[: match.start()]
             name = _bare_name(MARK_AT_END.sub("", before)) if match.end() == len(cell) else cell
             is_division = before.endswith("/")
             return (cell, "") if is_division and _ends_with_unit(name, but_symbols=True) else (name, unit)
-    match_at_end = NAME_WITH_UNIT.match(cell)
-    return (match_at_end[1], match_at_end[2]) if match_at_end else (cell, "")
+    match_at_end = NAME_WITH_UNIT.match(cell.translate(BRACKETS_IN_ASCII))
+    return (cell[: match_at_end.end(1)], match_at_end[2]) if match_at_end else (cell, "")
 
 
 def _bare_name(name: str) -> str:

@@ -13,6 +13,7 @@ from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
 from turnout.readers.stated_units import contradicting_unit, is_meaningless
 from turnout.records import RawChannel
+from turnout.unit_spellings import is_of_a_stretch
 from turnout.units import Conversion, conversion, to_si
 
 FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
@@ -191,8 +192,9 @@ def resolve_unit(file_unit: str, layout_unit: str | None) -> str:
     try:
         written = conversion(file_unit)
     except ValueError:
+        meaning = "the unit of values over a stretch of time" if is_of_a_stretch(file_unit) else "which is not known"
         raise ValueError(
-            f"the file says {file_unit!r}, which is not known, the layout {layout_unit!r} "
+            f"the file says {file_unit!r}, {meaning}, the layout {layout_unit!r} "
             f"('unit: {layout_unit}!' if the layout is right)"
         ) from None
     of_a_count = stated.dimension == "voltage" or layout_unit.lstrip(" [+-.")[:1].isdigit()

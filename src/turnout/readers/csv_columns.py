@@ -21,6 +21,7 @@ from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.texts import readings_together
 from turnout.readers.time_numbers import SINCE
 from turnout.readers.unit_names import is_unit_name
+from turnout.unit_spellings import BRACKETS_IN_ASCII, without_brackets
 from turnout.units import conversion, in_latin
 
 
@@ -171,8 +172,13 @@ def _are_units(cells: Sequence[str], share: float) -> bool:
 
 def _is_unit(cell: str) -> bool:
     """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
-    bare = cell.strip("[]() ")
-    if cell[0] in "[(" or bare.casefold() in MEANINGLESS_UNITS or bare.replace("\u03bc", "µ") in UNITS_OF_TIME_ALONE:
+    bare = without_brackets(cell)
+    if (
+        not bare
+        or cell[0].translate(BRACKETS_IN_ASCII) in "[("
+        or bare.casefold() in MEANINGLESS_UNITS
+        or bare.replace("\u03bc", "µ") in UNITS_OF_TIME_ALONE
+    ):
         return True
     try:
         return not bare[0].isdigit() and bool(conversion(bare))
@@ -255,7 +261,7 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         pairs_of_cells = zip(written, lines[unit_line])
         written = [lower if _is_name_below(upper, lower) else upper for upper, lower in pairs_of_cells]
     further = [cell for cell in whole_lines[name_line][count:] if cell and not COMMENT.match(cell)]
-    below = [""] * count if unit_line is None else [cell.strip("[]() ") for cell in lines[unit_line]]
+    below = [""] * count if unit_line is None else [without_brackets(cell) for cell in lines[unit_line]]
     below[0] = "" if is_unit_name(below[0]) else below[0]  # a label
     pairs = names_and_units_in(written)
     names = [name for name, _ in pairs]
@@ -337,4 +343,4 @@ def describes_columns(cells: Sequence[str], names: Sequence[str], units: Sequenc
     bool
         True for a line that states nothing beside them.
     """
-    return any(cells) and (is_line_of_names(cells, names) or [cell.strip("[]() ") for cell in cells] == list(units))
+    return any(cells) and (is_line_of_names(cells, names) or [*map(without_brackets, cells)] == list(units))

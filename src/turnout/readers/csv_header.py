@@ -35,6 +35,7 @@ from turnout.readers.metadata_names import (
 from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.scale_vocabulary import is_scale_name, scale_meaning, value_of_word
 from turnout.readers.source import CONDITIONS, COPY_AGAIN, HEAD_SIZE, Source
+from turnout.unit_spellings import without_brackets
 
 UNIT_SCALES = {"kHz": 1e3, "khz": 1e3, "MHz": 1e6, "ms": 1e-3, "µs": 1e-6, "\u03bcs": 1e-6, "us": 1e-6}
 TIMES_OF_START = frozenset((*START_NAMES, *START_DATE_NAMES))
@@ -241,7 +242,7 @@ def _without_values(
         words = [word for word, cell in zip(line, cells) if cell]
         if not is_of_values:
             yield line
-        elif 2 * sum(is_known(word.strip("[]() ")) for word in words) >= len(words):
+        elif 2 * sum(is_known(without_brackets(word)) for word in words) >= len(words):
             yield ["" if is_number(cell) else cell for cell in line]
 
 

@@ -34,6 +34,7 @@ from turnout.readers.scale_vocabulary import (
 )
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.stated_numbers import MAX_CHANNELS, finite_numbers, number_and_unit
+from turnout.unit_spellings import SUPERSCRIPTS
 from turnout.units import conversion
 
 ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well
@@ -305,8 +306,11 @@ def _is_inside(inner: str, outer: str) -> bool:
 
 
 AXIS = re.compile(r"(?<![^\W_])[xyzXYZ](?=\s?\d)")  # before the number of a sensor
-# A power of ten by which the numbers of a channel may be multiplied: "force x100", "rail*10", "rail ×0.1".
-FACTOR_IN_NAME = re.compile(r"(?:(?:^|[\s_(\[])[xX]|\s?[×*])\s?(10+|0[.,]0*1)(?=$|[\s_)\]])")
+# A power of ten by which the numbers of a channel may be multiplied: "force x100", "rail*10", "rail ×0.1", "10³ N".
+POWER = rf"10(?:(?:\^|\*\*)[+-]?\d+|[{SUPERSCRIPTS}]+)"
+FACTOR_IN_NAME = re.compile(
+    rf"(?:(?:(?:^|[\s_(\[])[xX]|\s?[×*])\s?(?:10+|0[.,]0*1|{POWER})|(?:^|[\s_(\[]){POWER})(?=$|[\s_)\]])"
+)
 
 
 def with_named_factors(record: RawRecord) -> RawRecord:
@@ -326,11 +330,9 @@ def with_named_factors(record: RawRecord) -> RawRecord:
         The same record if no name has a factor.
     """
     stems = [re.sub(r"\d+", "0", AXIS.sub("x", name)) for name in record.names]
-    factors = {
-        i: scale_problem(f"a factor in the name of the channel, {match[0].strip(' _([')!r}")
-        for i, name in enumerate(record.names)
-        if (match := FACTOR_IN_NAME.search(name)) and stems.count(stems[i]) == 1
-    }
+    matches = {i: FACTOR_IN_NAME.search(name) for i, name in enumerate(record.names) if stems.count(stems[i]) == 1}
+    texts = {i: match[0].strip(" _([") for i, match in matches.items() if match}
+    factors = {i: scale_problem(f"a factor in the name of the channel, {text!r}") for i, text in texts.items()}
     return replace(record, undecided={**factors, **record.undecided}) if factors else record
 
 

@@ -17,6 +17,7 @@ from turnout.readers.rate_units import RateUnit, rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.texts import readings_together
 from turnout.readers.unit_names import conditions_of_unit, is_unit_name
+from turnout.unit_spellings import BRACKETS_IN_ASCII, is_of_a_stretch, without_brackets
 from turnout.units import Conversion, conversion
 
 # Units of the same channel at another place of its measuring chain.
@@ -131,7 +132,7 @@ def same_unit(first: str, second: str) -> bool:
     >>> same_unit("m/s^2", "m/s²"), same_unit("g", "m/s²"), same_unit("0.3 mV", "mV")
     (True, False, True)
     """
-    a, b = (known_unit(re.sub(r"^[\d.eE+-]+ *(?=\D)", "", unit.strip())) for unit in (first, second))
+    a, b = (known_unit(re.sub(r"^[\d.eE+-]+ *(?=[^\W\d]|[°%])", "", unit.strip())) for unit in (first, second))
     return a is not None and b is not None and a.dimension == b.dimension and abs(a.scale / b.scale - 1.0) < 1e-9
 
 
@@ -201,7 +202,7 @@ def _unit_alone(entry: Entry) -> tuple[str, str] | None:
 def _name_and_unit(name: str, text: str) -> tuple[str, str] | None:
     if name == FREE_TEXT:
         name, _, text = text.replace("(", "[", 1).partition("[")
-    unit = text.strip("[]() ")
+    unit = without_brackets(text.strip("[] "))
     return (name, unit) if known_unit(unit) else None
 
 
@@ -261,8 +262,8 @@ def own_units(record: RawRecord, index: int, entries: Sequence[Entry]) -> tuple[
         else:
             possible.extend(texts)
     name, *all_names = (_without_sensitivity(of_channel) for of_channel in (name, *record.names))
-    in_brackets = [u for u in UNIT_IN_NAME.findall(name) if not re.match(r"[+-]?[\d.]", u)]
-    in_brackets = [u for u in in_brackets if known_unit(u) or LEVEL.match(u)]
+    in_brackets = [u for u in UNIT_IN_NAME.findall(name.translate(BRACKETS_IN_ASCII)) if not re.match(r"[+-]?[\d.]", u)]
+    in_brackets = [u for u in in_brackets if known_unit(u) or LEVEL.match(u) or is_of_a_stretch(u)]
     certain.extend(in_brackets)
     if not in_brackets:
         bare, *names = (UNIT_IN_NAME.sub("", of_channel).strip() for of_channel in (name, *all_names))

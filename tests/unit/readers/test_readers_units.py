@@ -105,8 +105,8 @@ def test_file_and_layout_must_agree_if_both_state_a_unit():
 
 def test_an_unknown_unit_of_the_file_is_an_error_unless_the_layout_overrides_it():
     with pytest.raises(ValueError) as caught:
-        resolve_unit("tf", "kN")
-    expected = "the file says 'tf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
+        resolve_unit("ozf", "kN")
+    expected = "the file says 'ozf', which is not known, the layout 'kN' ('unit: kN!' if the layout is right)"
     assert str(caught.value) == expected
     assert resolve_unit("tf", "kN!") == "kN"
 

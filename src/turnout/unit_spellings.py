@@ -1,0 +1,162 @@
+"""Spellings of units in one plain form: wide letters, powers, prefixes, brackets, multiples and peak values."""
+
+import re
+import unicodedata
+
+SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺"
+SUPERSCRIPT_RUN = re.compile(f"[{SUPERSCRIPTS}]+")
+SUPERSCRIPTS_IN_ASCII = str.maketrans(SUPERSCRIPTS, "0123456789-+")
+MARKS_IN_ASCII = str.maketrans("\u03bc∕⁄−–∙⋅•×", "µ//--···x")
+# Brackets of East Asian texts, and others, each as one character of ASCII.
+BRACKETS_IN_ASCII = str.maketrans("（）［］｛｝【】〔〕〖〗〈〉⟨⟩《》", "()[]{}[][][]<><><>")
+PAIRS_OF_BRACKETS = ("[]", "()", "{}", "<>")
+
+SECOND = "(?:s|sec|seconds?)"
+ACCELERATION = re.compile(
+    rf"(nm|µm|um|mm|cm|dm|m|met(?:er|re)s?|km|ft|in|inch(?:es)?)"
+    rf"(?: ?(?:/|per) ?\(?(?:{SECOND} ?(?:(?:\^|\*\*)? ?2| squared)|{SECOND} ?/ ?{SECOND})\)?"
+    rf"|[ *·.]?{SECOND} ?(?:\^|\*\*)? ?\(?-2\)?)"
+)
+LENGTHS = {"um": "µm", "inch": "in", "inches": "in"} | dict.fromkeys(("meter", "meters", "metre", "metres"), "m")
+PREFIX_APART = re.compile(r"(da|[munpµkM]) (?=(?:N|V|Pa)$)")
+WORD = re.compile(r"(|milli|mi[ck]ro|de[ck]a|kilo|mega)(newton|volt|pascal)s?")
+PREFIXES_OF_WORDS = {
+    "": "", "milli": "m", "micro": "µ", "mikro": "µ", "deca": "da", "deka": "da", "kilo": "k", "mega": "M",
+}  # fmt: skip
+SYMBOLS = {"newton": "N", "volt": "V", "pascal": "Pa"}
+PEAK = re.compile(r"(.*[^\W_]\)?|.*\d)[ _]?(?:0-)?\(?(?:0-)?(?:pk|peak)\)?")
+# The sign that a number multiplies, and a power of ten: "x10", "10^3", "x 10**-3".
+MULTIPLE = r"(?:[x*·] ?)?([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?:\^|\*\*)([+-]?\d{1,2}))?"
+LEADING_MULTIPLE = re.compile(rf"{MULTIPLE}[ x*·]*(.+)")
+TRAILING_POWER = re.compile(r"(.+?) ?[x*·] ?10(?:\^|\*\*)([+-]?\d{1,2})")
+# Values over a stretch of time, of which none is a sample: a mean square, a mean, a swing from peak to peak.
+OF_A_STRETCH = re.compile(
+    r"(?i).*(?:[ _(]|(?<=[a-z2]))(?:rms|eff|pp|p-p|pk[-/ ]?pk|p(?:ea)?k[- ](?:to[- ])?p(?:ea)?k|ptp|mean|avg)\)?"
+)
+
+
+def plain_unit(unit: str) -> str:
+    """A unit with letters, powers and brackets of ASCII, and without the brackets around it.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it is written.
+
+    Returns
+    -------
+    str
+        "µ" is the only letter beyond ASCII that a western unit keeps, beside "°".
+
+    Examples
+    --------
+    >>> plain_unit("［ｋＮ］"), plain_unit("(m/s²)"), plain_unit("10³ N"), plain_unit("㎨"), plain_unit("(m)/(s)")
+    ('kN', 'm/s^2', '10^3 N', 'm/s2', '(m)/(s)')
+    """
+    text = SUPERSCRIPT_RUN.sub(lambda run: f"^{run[0].translate(SUPERSCRIPTS_IN_ASCII)}", unit)
+    text = unicodedata.normalize("NFKC", text.translate(BRACKETS_IN_ASCII)).translate(MARKS_IN_ASCII)
+    return " ".join(without_brackets(text).strip("[]").split())
+
+
+def without_brackets(text: str) -> str:
+    """A text without the brackets of any kind around all of it.
+
+    Parameters
+    ----------
+    text : str
+        A unit, or a cell of a table.
+
+    Returns
+    -------
+    str
+        Without blanks at its ends.
+
+    Examples
+    --------
+    >>> without_brackets(" [[m/(s^2)]] "), without_brackets("（g）"), without_brackets("(m)/(s)")
+    ('m/(s^2)', 'g', '(m)/(s)')
+    """
+    text = text.strip()
+    while len(text) > 1 and (pair := text[0].translate(BRACKETS_IN_ASCII) + text[-1].translate(BRACKETS_IN_ASCII)) in (
+        PAIRS_OF_BRACKETS
+    ):
+        plain = text.translate(BRACKETS_IN_ASCII)
+        depths = [plain[:k].count(pair[0]) - plain[:k].count(pair[1]) for k in range(1, len(plain))]
+        if min(depths) < 1:
+            break
+        text = text[1:-1].strip()
+    return text
+
+
+def canonical_spelling(text: str) -> str:
+    """The spelling of a unit that tables have, by its form: "mm s^-2" is "mm/s²", "k N" is "kN", "g pk" is "g".
+
+    A sample in units of a peak value is an instantaneous value, as any other.
+
+    Parameters
+    ----------
+    text : str
+        Unit in the form of ``plain_unit``, without a factor.
+
+    Returns
+    -------
+    str
+        Unchanged for any other form.
+
+    Examples
+    --------
+    >>> [canonical_spelling(t) for t in ("mm s^-2", "um/s**2", "k N", "Kilonewtons", "g pk", "m/(s^2)", "ms2", "kg")]
+    ['mm/s²', 'µm/s²', 'kN', 'kN', 'g', 'm/s²', 'ms2', 'kg']
+    """
+    if (peak := PEAK.fullmatch(text)) and not is_of_a_stretch(text):
+        text = plain_unit(peak[1])
+    if match := ACCELERATION.fullmatch(text):
+        return f"{LENGTHS.get(match[1], match[1])}/s²"
+    if match := WORD.fullmatch(text.casefold()):
+        return PREFIXES_OF_WORDS[match[1]] + SYMBOLS[match[2]]
+    return PREFIX_APART.sub(r"\1", text)
+
+
+def is_of_a_stretch(unit: str) -> bool:
+    """Whether a unit says that its numbers are no samples: root mean squares, means, or swings from peak to peak.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it is written.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_of_a_stretch(unit) for unit in ("g rms", "gRMS", "m/s² (pk-pk)", "mVpp", "g pk", "g", "kp")]
+    [True, True, True, True, False, False, False]
+    """
+    return OF_A_STRETCH.fullmatch(plain_unit(unit)) is not None
+
+
+def factor_and_unit(text: str) -> tuple[float, str]:
+    """Factor of a unit and the unit without it.
+
+    Parameters
+    ----------
+    text : str
+        Unit in the form of ``plain_unit``.
+
+    Returns
+    -------
+    tuple of (float, str)
+        1 and the text itself without a factor.
+
+    Examples
+    --------
+    >>> factor_and_unit("0.5 mV"), factor_and_unit("x10 N"), factor_and_unit("10^3 N"), factor_and_unit("N·10^3")
+    ((0.5, 'mV'), (10.0, 'N'), (1000.0, 'N'), (1000.0, 'N'))
+    """
+    if match := LEADING_MULTIPLE.fullmatch(text):
+        return float(match[1]) ** int(match[2] or 1), match[3].strip()
+    if match := TRAILING_POWER.fullmatch(text):
+        return 10.0 ** int(match[2]), match[1].strip()
+    return 1.0, text
