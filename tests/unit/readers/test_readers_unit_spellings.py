@@ -58,7 +58,9 @@ def test_values_over_a_stretch_of_time_are_no_samples(unit, channels, tmp_path):
     assert error.reason == "unit_unknown" and "over a stretch of time" in error.problem
 
 
-@pytest.mark.parametrize("name", [f"rail [{unit}]" for unit in AVERAGED] + ["rail（g）", "rail【mg】", "rail [ｍｇ]"])
+@pytest.mark.parametrize(
+    "name", [f"rail [{unit}]" for unit in AVERAGED if "(" not in unit] + ["rail（g）", "rail【mg】", "rail [ｍｇ]"]
+)
 def test_brackets_of_any_kind_in_a_name_are_compared_with_the_layout(name, tmp_path):
     np.savez(tmp_path / "a.npz", **{"force": FORCE, name: RAIL})
     channels = IN_SI[0], RawChannel("rail", name, "acceleration", "m/s²")
