@@ -39,21 +39,29 @@ from turnout.readers.csv_cells import (
     BREAK_IN_CELL,
     SEPARATORS,
     cells_of,
-    decode_line,
     first_cells,
     is_row,
+    is_text,
     with_whole_cells,
 )
 from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
-from turnout.readers.csv_rows import columns_in_memory, lazy_columns, line_number
+from turnout.readers.csv_outer_rows import outer_row_remarks
+from turnout.readers.csv_rows import columns_in_memory, lazy_columns
+from turnout.readers.csv_words import entries_of_words
 from turnout.readers.entries import Entry
 from turnout.readers.label_lines import has_labels, with_joined_labels
 from turnout.readers.lazy import Column, LazyColumn
 from turnout.readers.lost_entries import control_character_errors
 from turnout.readers.metadata_names import RECORD_COUNT_NAMES, SAMPLE_COUNT_NAMES, START_NAMES
 from turnout.readers.number_notations import has_other_notation, with_plain_numbers
-from turnout.readers.record_columns import may_number_records, missing_record, record_column, spans_of_records
+from turnout.readers.record_columns import (
+    may_number_records,
+    missing_record,
+    numbers_of_texts,
+    record_column,
+    spans_of_records,
+)
 from turnout.readers.repeated_heads import check_separate, tables_of
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_or_clock_in_cells
@@ -137,7 +145,7 @@ def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: So
         data = data[:end]
         data = data[:offset] + _with_single_blanks(data[offset:])
     is_in_memory = separator == BLANK or any(map(may_number_records, names))
-    is_in_memory = is_in_memory or any(map(is_clock_or_date, first_cells(data, offset, separator)))
+    is_in_memory = is_in_memory or any(map(is_text, first_cells(data, offset, separator)))
     time = time_column(names, units)
     if lazy and not is_in_memory:
         columns, footer = lazy_columns(source, data, offset, end, separator, names, time)
@@ -145,7 +153,7 @@ def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: So
         columns, footer = columns_in_memory(source, data[:end], offset, separator, names)
     remarks: tuple[ReadError, ...] = ()
     if time is None:  # else such a row has no time that fits
-        remarks = tuple(_outer_row_remarks(data, head, min(end, len(data)), source))
+        remarks = tuple(outer_row_remarks(data, head, min(end, len(data)), source))
     head = head._replace(entries=(*head.entries, *footer), units=units)
     remarks += control_character_errors(data[:offset], source)
     facts = Metadata(head.notes, source)
@@ -153,65 +161,6 @@ def _read_table(data: bytes | mmap, end: int, lazy: bool, head: Head, source: So
     marks = ambiguous_marks(columns, data, offset, separator)
     records = tuple(_records(columns, head, time, facts, source, first, marks, n_table))
     return RawFile(records, facts.count(RECORD_COUNT_NAMES), remarks)
-
-
-N_COMPARED = 20, 100  # fewest and most rows with which the first or the last one is compared
-N_DESCRIBING = 5  # rows at the beginning or the end that may describe the columns, as a mean and a deviation do
-DECIMALS = re.compile(r"[+-]?\d*(?:[.,](\d*))?([eE][+-]?\d+)?")
-ZERO = re.compile(r"[+-]?0*[.,]?0*(?:[eE][+-]?\d+)?")
-ROW_REMEDY = "Delete this row if it is no sample; write what it states into a line above, such as 'rate: 20000'"
-
-
-def _outer_row_remarks(data: bytes | mmap, head: Head, end: int, source: Source) -> Iterator[ReadError]:
-    """Remark on the first or the last row if it is written otherwise than the others: it may describe the columns.
-
-    In each column its number has other decimals than all others. A row of zeros is a sample.
-
-    Raises
-    ------
-    ReadError
-        If none of its numbers is 0, at which computed signals begin.
-    """
-    position = head.offset
-    top: list[bytes] = []
-    while len(top) <= N_COMPARED[1] and 0 <= position < end:
-        start, position = position, data.find(b"\n", position, end) + 1 or end
-        top.append(data[start:position])
-    size = (N_COMPARED[1] + 2) * max(map(len, top), default=0)
-    bottom = data[max(head.offset, end - size) : end].splitlines()[:0:-1][: N_COMPARED[1] + 1]
-    for lines, position in ((top, head.offset), (bottom, end - 1)):
-        rows = [cells_of(decode_line(line), head.separator) for line in lines]
-        columns = [column for column in zip(*rows) if column[0]]
-        numbers = [column[0][:MAX_SIZE] for column in columns]
-        if len(rows) <= N_COMPARED[0] or not columns or all(map(ZERO.fullmatch, numbers)):
-            continue
-        if all(_is_written_otherwise(column[0], column[N_DESCRIBING:]) for column in columns):
-            where = f"line {line_number(data, position) + 1}"
-            listed = ", ".join(map(repr, numbers[:MAX_LISTED]))
-            problem = f"its numbers have other decimals than those of the other rows ({listed}): it may be no sample"
-            if not any(map(ZERO.fullmatch, numbers)):
-                raise source.error(where, problem, ROW_REMEDY, reason="wrong_length")
-            yield source.error(where, problem, ROW_REMEDY, reason="entry_unknown")
-
-
-MAX_SIZE = 20  # characters of a cell that a message quotes
-MAX_LISTED = 4  # cells that a message quotes
-
-
-def _is_written_otherwise(cell: str, cells: Sequence[str]) -> bool:
-    """Whether a number has other decimals than all others, which have as many each; or it is whole and none of them."""
-    shapes = [(bool(m[2]), len(m[1] or "")) for c in (cell, *cells) if (m := DECIMALS.fullmatch(c))]
-    if len(shapes) <= len(cells):  # one of them is no number
-        return False
-    is_uniform = len(set(shapes[1:])) == 1
-    return (
-        shapes[0] != shapes[1]
-        if is_uniform
-        else shapes[0] == (False, 0) and min(n for _, n in shapes[1:]) >= MIN_DECIMALS
-    )
-
-
-MIN_DECIMALS = 2  # of numbers printed to as many digits as they need: by chance 1 in 100 is whole
 
 
 def _with_single_blanks(rows: bytes) -> bytes:
@@ -322,6 +271,8 @@ def _records(
         if time is None or _is_empty(columns[time])
         else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     )
+    texts = {names[i] or str(i): column for i, column in enumerate(columns) if column.dtype.kind == "O"}
+    words = {name: column for name, column in texts.items() if not is_clock_or_date(column[0] or "")}
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
     n = len(spans)
@@ -365,7 +316,11 @@ def _records(
             time_label="" if time is None else _label(names, units, time),
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
-            entries=entries,
+            entries=(
+                *entries,
+                *(entry for name, column in words.items() for entry in entries_of_words(name, column[a:b])),
+            ),
+            counters={name: numbers_of_texts(column[a:b]) for name, column in words.items()},
         )
 
 

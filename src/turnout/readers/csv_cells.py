@@ -210,6 +210,43 @@ def is_row(cells: Sequence[str]) -> bool:
     return any(is_of_numbers) and all(map(is_clock_or_date, filled))
 
 
+def is_text(cell: str) -> bool:
+    """Whether a cell holds a text: a word, a date or a time of day.
+
+    Parameters
+    ----------
+    cell : str
+        Text of the cell, without blanks around it.
+
+    Returns
+    -------
+    bool
+        False for a number, an empty cell and the mark of a missing number.
+
+    Examples
+    --------
+    >>> [is_text(cell) for cell in ("LLHL", "10:00:01", "-1,5", "", "NaN", "1.234,5")]
+    [True, True, False, False, False, False]
+    """
+    return is_clock_or_date(cell) or is_word(cell)
+
+
+def is_word(cell: str) -> bool:
+    """Whether a cell holds a text that is neither a date nor a time of day.
+
+    Parameters
+    ----------
+    cell : str
+        Text of the cell, without blanks around it.
+
+    Returns
+    -------
+    bool
+    """
+    is_of_numbers = cell in MISSING_VALUES or is_number(cell) or is_unreadable_number(cell)
+    return not is_of_numbers and not is_clock_or_date(cell)
+
+
 @contextmanager
 def cell_errors(source: Source, line: int, names: Sequence[str]) -> Iterator[None]:
     """Context that converts pyarrow's error about a cell to a ReadError with its line and column.

@@ -14,7 +14,7 @@ from turnout.readers.attached_units import (
     unit_behind_mark,
 )
 from turnout.readers.clock_texts import is_clock_or_date
-from turnout.readers.csv_cells import is_number
+from turnout.readers.csv_cells import is_number, is_word
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
@@ -255,7 +255,8 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         names = [str(i) for i in range(count)]
         names = [*names[:-1], ""] if open_end and count > 1 else names
         return Columns(names, [""] * count, [], [(name,) for name in names], {})
-    name_line, unit_line = names_among(lines)
+    of_words = [is_word(cell) for cell in cells]  # what stands above a column of words is no unit of a sensor
+    name_line, unit_line = names_among([[b if not a else "" for a, b in zip(of_words, line)] for line in lines])
     written = _in_known_encoding(lines[name_line])
     if unit_line is not None:  # it may hold a name with its unit below an empty cell or the label of the line of names
         pairs_of_cells = zip(written, lines[unit_line])

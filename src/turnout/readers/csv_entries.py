@@ -108,6 +108,8 @@ def entries_of_lines(
                     yield from entries_of_lines([cell], separator, names, first_line + i)
             continue
         pairs = [(a, b) for a, b in pairwise(cells) if a and b and not is_number(a)]
+        if len(cells) > 2:  # "CH1;force;DC;10V" has a coupling and a range
+            pairs = [(a, b) for a, b in pairs if a not in COUPLINGS or is_number(b)]
         for name, second, third in zip(cells, cells[1:], cells[2:]):  # "Abtastrate;25,6;kHz", "Abtastrate;kHz;25,6"
             if name and is_number(second) and rate_unit(third):
                 pairs = [(name, f"{second} {third}"), *(pair for pair in pairs if pair != (name, second))]
@@ -193,6 +195,7 @@ def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
     )
 
 
+COUPLINGS = ("DC", "AC")
 NO_VALUE = re.compile(r"[-–—]*|n\.?/?a\.?|none|keine?", re.IGNORECASE)  # a cell of a channel without one
 DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(?=\d)")
 

@@ -22,6 +22,7 @@ from turnout.readers.csv_cells import (
 )
 from turnout.readers.csv_columns import are_names, describes_columns, names_and_units
 from turnout.readers.csv_entries import HEAD_LINE, entries_of_lines, with_unit_in_brackets
+from turnout.readers.csv_words import is_row_with_words
 from turnout.readers.entries import Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
 from turnout.readers.metadata_names import (
@@ -100,7 +101,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         cells = cells_of(line, separator)
         if not is_row(cells) and _are_rows_of_words(data, position):
             separator, cells = BLANK, cells_of(line, BLANK)
-        if is_row(cells):
+        if is_row(cells) or is_row_with_words(data, position, separator):
             return _complete_head(notes, text_lines, head_lines, cells, separator, position, source)
         head_lines.append(line)
         note = _note_of(line, separator, len(cells))

@@ -10,18 +10,21 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from turnout.readers.clock_texts import is_clock_or_date, with_dates, with_durations
+from turnout.readers.clock_texts import with_dates, with_durations
 from turnout.readers.csv_blank_rows import with_empty_lines, without_blank_rows
 from turnout.readers.csv_cells import (
+    INVALID_VALUE,
     MISSING_VALUES,
     cell_errors,
     cells_of,
     check_thousands,
     decode_line,
     first_cells,
+    is_text,
 )
 from turnout.readers.csv_entries import entries_of_lines
 from turnout.readers.csv_row_reader import N_SUMMARY_ROWS, RowReader
+from turnout.readers.csv_words import are_words
 from turnout.readers.entries import Entry
 from turnout.readers.lazy import Column
 from turnout.readers.source import Source
@@ -62,16 +65,35 @@ def columns_in_memory(
     rows: bytes | memoryview = memoryview(data)[offset:]
     with source.parsed_by("pyarrow", f"the numbers after line {line}"), cell_errors(source, line, names):
         try:
-            table = csv.read_csv(io.BytesIO(rows), **options)
+            table = _read_table(rows, options)
         except pa.ArrowInvalid:
             end = _start_of_footer(data, offset, len(data), separator)
             rows = with_empty_lines(data[offset:end])
-            table = csv.read_csv(io.BytesIO(rows), **options)
+            table = _read_table(rows, options)
     if table.column(0).null_count:
         table = without_blank_rows(table, bytes(rows), line + 1, names, source)
     columns = _columns_of(table, source, data, offset, separator, names)
     _check_summary(columns, line + 1, source)
     return columns, _footer_entries(data, end, len(data), separator, names)
+
+
+def _read_table(rows: bytes | memoryview, options: dict[str, Any]) -> pa.Table:
+    """The cells of rows. A column of marks that are no numbers, empty above the first of them, is one of texts."""
+    converting = options["convert_options"]
+    while True:
+        try:
+            return csv.read_csv(io.BytesIO(rows), **options)
+        except pa.ArrowInvalid as error:
+            match = INVALID_VALUE.search(str(error))
+            types = {**converting.column_types, match[1]: pa.string()} if match else converting.column_types
+            if match is None or types == converting.column_types:
+                raise
+            of_column = csv.ConvertOptions(column_types=types, include_columns=[match[1]], null_values=["", " "])
+            of_column.strings_can_be_null = True
+            column = csv.read_csv(io.BytesIO(rows), **{**options, "convert_options": of_column}).column(0)
+            if not are_words(column.to_numpy(zero_copy_only=False)):
+                raise
+            converting.column_types = types
 
 
 def _footer_entries(
@@ -231,17 +253,19 @@ def _options(data: bytes | mmap, offset: int, separator: str, width: int) -> dic
     if separator == ",":
         first_rows = data[offset : offset + SIZE_OF_FIRST_ROWS]
         has_decimal_comma = QUOTED_DECIMAL_COMMA.search(first_rows) is not None and b"." not in first_rows
-    is_text = [is_clock_or_date(cell) for cell in first_cells(data, offset, separator)]
-    if any(is_text):  # dates and times of day have marks of their own
+    are_texts = [is_text(cell) for cell in first_cells(data, offset, separator)]
+    if any(are_texts):  # dates and times of day have marks of their own
         end = data.find(b"\n", offset + SIZE_OF_FIRST_ROWS)
         rows = decode_line(data[offset : end if end >= 0 else len(data)]).splitlines()
         numbers = [
-            cell for row in rows for cell, is_of_text in zip(cells_of(row, separator), is_text) if not is_of_text
+            cell for row in rows for cell, is_of_text in zip(cells_of(row, separator), are_texts) if not is_of_text
         ]
         has_decimal_comma = separator != "," and any("," in cell for cell in numbers)
     decimal_mark = "," if has_decimal_comma else "."
     converting = csv.ConvertOptions(
-        column_types={str(i): pa.string() if i < len(is_text) and is_text[i] else pa.float64() for i in range(width)},
+        column_types={
+            str(i): pa.string() if i < len(are_texts) and are_texts[i] else pa.float64() for i in range(width)
+        },
         decimal_point=decimal_mark,
         null_values=list(MISSING_VALUES),
         strings_can_be_null=True,

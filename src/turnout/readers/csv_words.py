@@ -1,0 +1,91 @@
+"""Columns of words beside the numbers of a text file: alarms, digital inputs, states and marks of a logger."""
+
+from collections.abc import Sequence
+from mmap import mmap
+
+import numpy as np
+
+from turnout.readers.csv_cells import cells_of, decode_line, is_number, is_word
+from turnout.readers.entries import Entry
+
+N_ROWS = 32  # rows in which the same columns hold words: so many are no lines of a head
+MAX_WORDS = 8  # different words of a column of states; names of channels in a table of the head are more
+OVERLOADS = frozenset("over ovr ovl ovfl ol clip sat".split())  # abbreviations of an overload in a column of states
+MAX_SIZE = 20  # characters of a word
+
+
+def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool:
+    """Whether rows of samples begin at a line, of which each has words in the same columns.
+
+    Parameters
+    ----------
+    data : bytes or mmap
+        Bytes of the file.
+    position : int
+        First byte of the line.
+    separator : str
+        Separator of the cells.
+
+    Returns
+    -------
+    bool
+        False for fewer than 32 rows, and where a column has more than eight words.
+    """
+    words: dict[int, set[str]] = {}
+    width = 0
+    for n_row in range(N_ROWS):
+        end = data.find(b"\n", position)
+        if end < 0:
+            return False
+        cells = cells_of(decode_line(data[position:end]), separator)
+        position = end + 1
+        are_words = [is_word(cell) for cell in cells]
+        if n_row == 0:
+            width, words = len(cells), {i: set() for i, is_word in enumerate(are_words) if is_word}
+            has_number = any(map(is_number, cells))
+            if not words or not has_number:
+                return False
+        if len(cells) != width or any(is_word and i not in words for i, is_word in enumerate(are_words)):
+            return False
+        for i, of_column in words.items():
+            of_column.add(cells[i])
+            is_of_words = not cells[i] or are_words[i]
+            if not is_of_words or len(of_column) > MAX_WORDS or len(cells[i]) > MAX_SIZE:
+                return False
+    return True
+
+
+def are_words(column: np.ndarray) -> bool:
+    """Whether a column that was read as text has a word and no number.
+
+    Parameters
+    ----------
+    column : (n,) array of object
+        Its cells, None where one is empty.
+
+    Returns
+    -------
+    bool
+    """
+    words = {cell for cell in column.tolist() if cell is not None}
+    return bool(words) and not any(is_number(word.strip()) for word in words)
+
+
+def entries_of_words(name: str, column: np.ndarray) -> Sequence[Entry]:
+    """Entries of the words of a column, by which a logger may say that a channel left its range.
+
+    Parameters
+    ----------
+    name : str
+        Name of the column.
+    column : (n,) array of object
+        Its cells, None where one is empty.
+
+    Returns
+    -------
+    sequence of Entry
+        One for each of its first words.
+    """
+    words = dict.fromkeys(cell.strip() for cell in column.tolist() if cell is not None)
+    texts = [f"overload: {word}" if word.casefold() in OVERLOADS else word for word in words]
+    return [Entry(f"column {name!r}", name, text) for text in texts[:MAX_WORDS]]

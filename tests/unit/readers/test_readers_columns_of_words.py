@@ -1,0 +1,77 @@
+"""Columns of words beside the samples: alarms and digital inputs of loggers, states, marks at single samples."""
+
+import numpy as np
+import pytest
+
+from turnout.errors import ReadError
+from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
+
+CHANNELS = (RawChannel("force", "force", "force"), RawChannel("rail", "rail", "acceleration"))
+N = 400
+FORCE, RAIL = np.random.default_rng(5).normal(size=(2, N)).round(4)
+
+
+def outcome(tmp_path, words, head="force [N];rail [m/s²];State", order=(0, 1, 2), mark=".", kind="passage", n=N):
+    cells = [[f"{x:.4f}" for x in FORCE], [f"{x:.4f}" for x in RAIL], words]
+    rows = [";".join(cells[i][k] for i in order) for k in range(n)]
+    rows = [row.replace(".", ",") for row in rows] if mark == "," else rows
+    names = [head.split(";")[i] for i in order]
+    (tmp_path / "a.csv").write_text("\n".join([";".join(names), *rows, ""]), "utf-8")
+    try:
+        result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=5000.0, kind=kind))
+    except ReadError as error:
+        return [], (error,)
+    return [recording.samples for recording in result.recordings], result.errors
+
+
+WORDS = {
+    "alarms": ["LLLL"] * N, "states": ["OK"] * N, "true and false": ["FALSE", "TRUE"] * (N // 2), "hex": ["0x0F"] * N,
+    "digital input": ["Off"] * 150 + ["On"] * 250, "a mark": [""] * 200 + ["*"] + [""] * 199,
+    "an event": [""] * 40 + ["Event 1"] + [""] * 359, "first row": ["Start"] + [""] * (N - 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mark", [".", ","])
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1), (0, 2, 1)])
+@pytest.mark.parametrize("kind", WORDS)
+def test_a_column_of_words_is_no_channel(kind, order, mark, tmp_path):
+    recordings, errors = outcome(tmp_path, WORDS[kind], order=order, mark=mark)
+    np.testing.assert_array_equal(recordings, [[FORCE, RAIL]])
+    assert not errors
+
+
+@pytest.mark.parametrize("word", ["OVR", "Over", "CLIP", "Overload", "Overflow CH1", "OL"])
+def test_an_overload_in_a_column_of_words_is_reported(word, tmp_path):
+    _, errors = outcome(tmp_path, ["OK"] * 200 + [word] * 3 + ["OK"] * (N - 203), kind="hammer")
+    assert any("overload" in str(error).lower() or word in str(error) for error in errors)
+
+
+def test_words_that_change_in_blocks_may_number_records(tmp_path):
+    _, errors = outcome(tmp_path, ["first"] * 200 + ["second"] * 200, kind="hammer")
+    assert [error.reason for error in errors] in (["entry_unknown"], ["wrong_length"])
+
+
+def test_a_word_in_a_column_of_numbers_is_an_error(tmp_path):
+    cells = [f"{x:.4f}" for x in RAIL]
+    cells[200] = "OVER"
+    recordings, errors = outcome(tmp_path, cells)
+    assert recordings == [] and "'OVER' is no number" in str(errors[0])
+
+
+def test_a_few_rows_with_words_are_a_table_of_the_head(tmp_path):
+    lines = [f"CH{k};{k}.5;mV" for k in range(1, 12)]
+    rows = [f"{f};{a}" for f, a in zip(FORCE, RAIL)]
+    (tmp_path / "a.csv").write_text("\n".join([*lines, "force [N];rail [m/s²]", *rows, ""]), "utf-8")
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=5000.0, kind="passage"))
+    np.testing.assert_array_equal([r.samples for r in result.recordings], [[FORCE, RAIL]])
+
+
+def test_the_units_are_those_above_the_numbers(tmp_path):
+    head = '"Vendor","Logger"\n"CH1","force","DC","10V"\n"Number","force","rail","Alarm1","AlarmOut"\n'
+    units = '"NO.","N","m/s2","A1234567890","A1234"\n'
+    rows = "".join(f"{k},{f:+.4f},{a:+.4f},LLLLLLLLLL,LLLL\n" for k, (f, a) in enumerate(zip(FORCE, RAIL), 1))
+    (tmp_path / "a.csv").write_text(head + units + rows)
+    result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=5000.0))
+    np.testing.assert_array_equal([r.samples for r in result.recordings], [[FORCE, RAIL]])
+    assert not result.errors
