@@ -29,9 +29,11 @@ def with_records_of_channels(variables: Mapping[str, Any]) -> Mapping[str, Any]:
     """
     blocks = matrices(variables)
     shapes = {block.shape for block in blocks.values()}
-    if len(blocks) < 2 or len(shapes) > 1 or vectors(variables):
+    if len(blocks) < 2 or len(shapes) > 1:
         return variables
     shape = shapes.pop()
+    if any(vector.size != min(shape) for vector in vectors(variables).values()):  # others have a number for each record
+        return variables
     if len(shape) != 2 or min(shape) < 2 or shape[0] == shape[1] or not _are_channels(blocks, variables):
         return variables
     rows = {name: list(block if shape[0] < shape[1] else block.T) for name, block in blocks.items()}

@@ -20,7 +20,7 @@ from turnout.readers.source import MEANINGLESS_UNITS, Source
 from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.texts import readings_together
 from turnout.readers.time_numbers import SINCE
-from turnout.readers.unit_names import is_unit_name
+from turnout.readers.unit_names import is_unit_name, is_unit_of_other
 from turnout.unit_spellings import BRACKETS_IN_ASCII, without_brackets
 from turnout.units import conversion, in_latin
 
@@ -141,6 +141,8 @@ def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     """
     last = len(lines) - 1
     for i in range(last, -1, -1):
+        if is_unit_of_other(lines[i][0]):  # of the time: "HUnit;s;s"
+            continue
         is_labelled = is_unit_name(lines[i][0]) and any(lines[i][1:]) and _are_units(lines[i][1:], 1.0)
         names = _names_of_units(lines, i, is_labelled)
         share = 0.5 if i and (i == last or are_names(lines[i - 1])) else 1.0
@@ -156,7 +158,8 @@ def _names_of_units(lines: Sequence[Sequence[str]], i: int, is_labelled: bool) -
     if named and (is_labelled or not i or not are_names(lines[i - 1])):
         return named[-1]
     if not is_labelled:
-        return i - 1 if i else next((k for k in below if not _begins_with_digit(lines[k])), None)
+        above = [k for k in reversed(range(i)) if not _are_units(lines[k], 1.0)]  # a second line of units has no names
+        return (above or [i - 1])[0] if i else next((k for k in below if not _begins_with_digit(lines[k])), None)
     return next((k for k in (*reversed(range(i)), *below) if not _begins_with_digit(lines[k])), None)
 
 
@@ -273,6 +276,12 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         if (unit := _contradicting_unit(cell, other))
     }
     others = [line for i, line in enumerate(lines) if i not in (name_line, unit_line) and not any(map(is_number, line))]
+    for line in (line for line in others if len(line) > 1 and all(is_known(without_brackets(cell)) for cell in line)):
+        pairs_of_units = enumerate(zip(below, map(without_brackets, line)))
+        problems = {
+            i: f"its lines of units say {b!r} and {a!r}" for i, (a, b) in pairs_of_units if _are_different(b, a)
+        }
+        conflicts = problems | conflicts
     return Columns(names, units, further, [*zip(written, *others)], conflicts)
 
 
@@ -298,13 +307,18 @@ def _contradicting_unit(cell: str, unit: str) -> str:
     in_brackets = name_and_unit(cell)[1]
     attached = unit_behind_mark(cell)
     stated = in_brackets if is_known(in_brackets) else attached[1] if attached else ""
-    if not stated or not is_known(unit):
-        return ""
     first, second = known_unit(stated), known_unit(unit)
-    if first is None or second is None:  # one of them is of time
-        return stated if rate_unit(stated) != rate_unit(unit) else ""
-    is_side = stated != in_brackets and first.dimension != second.dimension
-    return "" if is_side or same_unit(stated, unit) else stated
+    is_side = stated != in_brackets and first and second and first.dimension != second.dimension
+    return "" if is_side or not _are_different(stated, unit) else stated
+
+
+def _are_different(stated: str, unit: str) -> bool:
+    """Whether two units are known, of samples or of time, and are not the same."""
+    if not (is_known(stated) and is_known(unit)):
+        return False
+    if known_unit(stated) is None or known_unit(unit) is None:  # one of them is of time
+        return rate_unit(stated) != rate_unit(unit)
+    return not same_unit(stated, unit)
 
 
 def is_line_of_names(cells: Sequence[str], names: Sequence[str]) -> bool:

@@ -19,6 +19,7 @@ from turnout.readers.entries import (
 )
 from turnout.readers.entry_owners import container_of
 from turnout.readers.exponential_windows import is_window_name
+from turnout.readers.measured_entries import is_statistic_name
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.metadata_subjects import STRONG, subject_of
 from turnout.readers.overload_flags import is_of_overload
@@ -27,6 +28,7 @@ from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.scale_vocabulary import is_of_drawing, is_scale_name, plain_word
 from turnout.readers.source import CONDITIONS
 from turnout.readers.split_starts import CLOCK_ALONE, may_state_start
+from turnout.readers.stated_counts import PROMISING_NAMES
 from turnout.readers.stated_quantities import is_quantity_name
 from turnout.readers.stated_sensitivities import SENSITIVITY, is_sensitivity_name
 from turnout.readers.stated_units import known_unit
@@ -97,6 +99,9 @@ def entries_of_lines(
         if (named := LINE_OF_PAIRS.match(text)) and (several := paired_statements(named[1], named[2].strip(separator))):
             yield from (Entry(place, *pair) for pair in several)
             continue
+        if labelled := _labelled_values(cells):
+            yield from (Entry(place, *pair) for pair in labelled)
+            continue
         filled = cells if cells[0] else cells[1:]
         statements = [HEAD_LINE.match(cell) for cell in filled if re.search("[:=]", cell)]
         if len(matches := [match for match in statements if match]) == len(filled) > 1:
@@ -123,7 +128,7 @@ def entries_of_lines(
             yield Entry(place, match[1], f"{match[3]} {filled[1]}")  # "fs: 20;kHz"
             continue
         if len([cell for cell in cells if cell]) > 2 and i + 1 < len(table) and len(table[i + 1]) == len(cells):
-            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and is_number(b)]
+            pairs += [(a, b) for a, b in zip(cells, table[i + 1]) if a and not is_number(a) and is_number(b)]
         is_drawn = len(cells) == 2 and is_of_drawing(cells[0])  # "Plan;scale 1:500" is about the plan as a whole
         if len(cells) == 1 and (dated := _dated_line(text)):
             pairs.append(dated)
@@ -184,6 +189,23 @@ def _dated_line(text: str) -> tuple[str, str] | None:
     return None
 
 
+LABELLED_VALUE = re.compile(r"([^\W\d][\w ]*?):\s*([^:\s][^:]*)")
+
+
+def _labelled_values(cells: Sequence[str]) -> list[tuple[str, str]]:
+    """Names and values of a line of which each value has a label of its own, "Vertical Scale,CH1:0.5,CH2:0.1".
+
+    A rate and a number of samples are those of all channels: "Sample Interval,Analog:5E-05". Empty for other lines.
+    """
+    matches = [LABELLED_VALUE.fullmatch(cell) for cell in cells[1:] if cell]
+    name = cells[0]
+    if not name or not matches or re.search("[:=]", name) or not all(matches):
+        return []
+    pairs = [(match[1], match[2].strip()) for match in matches if match]
+    is_of_all = is_rate_name(name) or "_".join(words_of(name)) in PROMISING_NAMES
+    return [(name if is_of_all else f"{name} {label}", value) for label, value in pairs]
+
+
 def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
     """Whether a line has texts of columns behind a word for such texts, as "Sensor;hammer;accelerometer".
 
@@ -218,5 +240,5 @@ def _has_value_for_each(cells: Sequence[str], names: Sequence[str]) -> bool:
         re.match(r"[+-]?[.,]?\d", text) is not None for text in cells[1:] if not NO_VALUE.fullmatch(text)
     }
     is_unit = any(map(UNIT_WORD.fullmatch, words_of(cells[0]))) and SENSITIVITY.search(plain_word(cells[0])) is not None
-    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0]) or is_unit
+    is_scale = is_sensitivity_name(cells[0]) or is_scale_name(cells[0]) or is_unit or is_statistic_name(cells[0])
     return len(cells) - 1 in (len(names), len(names) - 1) and is_scale and len(begin_with_number) == 1

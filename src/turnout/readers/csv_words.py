@@ -17,6 +17,8 @@ MAX_SIZE = 20  # characters of a word
 def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool:
     """Whether rows of samples begin at a line, of which each has words in the same columns.
 
+    A word that only some of the rows have is a label: "Minimum;-3.5;-61.7" above the samples.
+
     Parameters
     ----------
     data : bytes or mmap
@@ -49,8 +51,7 @@ def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool
             return False
         for i, of_column in words.items():
             of_column.add(cells[i])
-            is_of_words = not cells[i] or are_words[i]
-            if not is_of_words or len(of_column) > MAX_WORDS or len(cells[i]) > MAX_SIZE:
+            if not are_words[i] or len(of_column) > MAX_WORDS or len(cells[i]) > MAX_SIZE:
                 return False
     return True
 

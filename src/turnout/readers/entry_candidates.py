@@ -81,7 +81,7 @@ BESIDE_DURATION = frozenset("total time length of the s sec second seconds min".
 RATIO = re.compile(r"(\d+)\s?:\s?(\d+)")
 # How numbers become others: "x100", "10fach", "2.5*x", "1 V = 10 g", "0.3 mV/bit", "Q1.15".
 CONVERSION = re.compile(
-    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?:(?!1(?![\d.,]))\d|[-\u2212]\s?1(?![\d.,]|\s?[cmk]?m\b))|(?<![\d.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)]|\s?[+-]\s?\d)|-?fach|-?fold)"
+    r"(?:^|(?<=[\s=,;(]))[x×*]\s?(?:(?!1(?![\d.,]))\d|[-\u2212]\s?1(?![\d.,]|\s?[cmk]?m\b))|(?<![\w.,])(?!1\s?[x×])\d[\d.,]*\s?(?:[x×](?=$|[\s,;)]|\s?[+-]\s?\d)|-?fach|-?fold)"
     r"|\b(?:gain|factor|faktor|facteur|fattore|scale)s?\b[^\d;,]{0,8}(?!1(?![\d.,]))\d|\b(?:re)?scaled\b[^\d;,]{0,8}\d"
     r"|\bslope\b[^;]{1,20}\b(?:intercept|offset)\b|\b(?:times|fois|mal|gange)\b|\b[abm]\s?=\s?[+-]?[\d.]+|\d\s?[*·⋅]|[*·⋅]\s?\d|\b(?:raw|value|counts?|x|lsb|adc)\s?[/*]\s?\d|\by\s?="
     rf"|\d\s?{LETTER}+\s?=\s?[+-]?[\d.,]+\s?{LETTER}+"
@@ -121,8 +121,8 @@ CONVERTED = re.compile(
 AFFIRMED = frozenset("yes true ja oui si on 1".split())
 # Names that a format defines: start of the abscissa, state of the scaling, versions, numbers of dimensions.
 STANDARD_NAMES = frozenset(
-    ("x0", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major", "minor", "writerversion",
-     "readerversion", "netcdf4dimid", "netcdf4coordinates", "nidatatype", "nichannellength")
+    ("x0", "tstart", "xstart", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major", "minor",
+     "writerversion", "readerversion", "netcdf4dimid", "netcdf4coordinates", "nidatatype", "nichannellength")
 )  # fmt: skip
 NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set"))
 DATED = re.compile(r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{2}:\d{2}(?::\d{2})?|\d{1,2}[-. ][A-Za-z]{3}[-. ]\d{2,4}")

@@ -13,6 +13,7 @@ from turnout.readers.entries import Entry, UnreadObject
 from turnout.readers.entry_candidates import DURATION, RATE, SCALE, UNIT, Candidate
 from turnout.readers.entry_owners import named_channels
 from turnout.readers.exponential_windows import WINDOW_PROBLEM, WINDOW_REMEDY, window_entries
+from turnout.readers.measured_entries import is_statistic, screen_names
 from turnout.readers.metadata_names import START_NAMES
 from turnout.readers.overload_flags import overload_entries
 from turnout.readers.rate_statements import PLAIN_TYPES
@@ -89,6 +90,7 @@ class EntryCheck:
             The same record if there are none.
         """
         screen = {e.name.strip().casefold() for e in record.entries if is_time_per_division(e.name, e.value)}
+        screen |= screen_names(record)
         if not self.checked and not screen:
             return record
         undecided = {i: without_checked_signs(text, self.checked) for i, text in record.undecided.items()}
@@ -140,7 +142,12 @@ class EntryCheck:
         if self._key != key:
             self._key, self._seen = key, set()
         new_entries = [
-            e for e in record.entries if not e.is_defined and self._is_new(e) and not _is_start(e, record.started_at)
+            e
+            for e in record.entries
+            if not e.is_defined
+            and self._is_new(e)
+            and not _is_start(e, record.started_at)
+            and not is_statistic(e, record)
         ]
         if not new_entries:
             self._last = record.entries, key

@@ -40,6 +40,7 @@ from turnout.readers.stated_zones import with_zone_of_layout
 from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements
 from turnout.readers.unread_starts import is_of_other_day
+from turnout.readers.unused_copies import unused_copy_errors
 from turnout.records import LongRecording, RawDescription, Recording
 
 REMARKS = ("rate_ambiguous", "entry_unknown")  # once for all records of a file
@@ -262,7 +263,8 @@ class _Conversion:
         samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
         from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
         statistics = from_record(block_reader, n_sample) if is_long else from_samples(samples)
-        faults = faults_by_channel(record, channel_maps, statistics, n_sample, where, source)
+        faults = unused_copy_errors(record, channel_maps, description.channels, where, source)
+        faults |= faults_by_channel(record, channel_maps, statistics, n_sample, where, source)
         usable = [i for i in range(len(channel_maps)) if i not in faults]
         if fault := decisive_fault(description, channel_maps, faults):
             raise fault

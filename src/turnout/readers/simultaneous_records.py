@@ -1,6 +1,6 @@
 """Records of a file that are parts of one recording, as where one group holds the left and another the right rail."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -43,11 +43,14 @@ def simultaneous_errors(recordings: Sequence[Recording | LongRecording], source:
     """
     errors: dict[int, ReadError] = {}
     in_memory = {r.record: r for r in recordings if isinstance(r, Recording)}
+    copies = _factors_of_copies(list(in_memory.values()))
+    n_channels = {k: len(r.channels) for k, r in in_memory.items()}
+    whole_copies = {pair for pair, factors in copies.items() if _are_whole(factors, n_channels[pair[1]])}
     for first, second, row, is_whole in shared_channels([(k, list(r.samples)) for k, r in in_memory.items()]):
-        if not (is_whole and in_memory[first].kind == "hammer"):
+        if not (is_whole and in_memory[first].kind == "hammer") and (first, second) not in whole_copies:
             name = in_memory[first].channels[row].name
             add_shared(errors, (first, second), "" if is_whole else name, source)
-    _add_copies(errors, list(in_memory.values()), source)
+    _add_copies(errors, copies, whole_copies, source)
     for earlier, later in pairwise(recordings):
         if problem := _overlap(earlier, later):
             numbers = earlier.record, later.record
@@ -101,18 +104,27 @@ def add_shared(errors: dict[int, ReadError], records: tuple[int, int], name: str
         errors.setdefault(record, _error(record, partner, problem, "duplicate", source))
 
 
-def _add_copies(errors: dict[int, ReadError], recordings: Sequence[Recording], source: Source) -> None:
+def _are_whole(factors: Mapping[str, float], n_channel: int) -> bool:
+    """Whether all channels of a copy are the same in SI units, but for the rounding."""
+    return len(factors) == n_channel and all(abs(factor - 1.0) <= MAX_ROUNDING for factor in factors.values())
+
+
+def _add_copies(
+    errors: dict[int, ReadError],
+    copies: Mapping[tuple[int, int], Mapping[str, float]],
+    whole_copies: Collection[tuple[int, int]],
+    source: Source,
+) -> None:
     """Add the errors of records that are copies of another in other units.
 
     The later one alone has an error if both are the same in SI units, else nothing says which is right.
     """
-    for (first, second), factors in _factors_of_copies(recordings).items():
-        name, factor = max(factors.items(), key=lambda item: abs(item[1] - 1.0))
-        n_channel = next(len(r.channels) for r in recordings if r.record == second)
-        if len(factors) == n_channel and abs(factor - 1.0) <= MAX_ROUNDING:
+    for (first, second), factors in copies.items():
+        if (first, second) in whole_copies:
             problem = "its samples are those of {other}, written in other units or with other digits"
             errors.setdefault(second, _error(second, first, problem, "duplicate", source, ONE_UNIT_REMEDY))
             continue
+        name, factor = max(factors.items(), key=lambda item: abs(item[1] - 1.0))
         for record, partner, ratio in ((first, second, 1.0 / factor), (second, first, factor)):
             problem = f"its channel {name!r} is that of {{other}} times {ratio:.4g}: one is a copy in other units"
             errors.setdefault(record, _error(record, partner, problem, "duplicate", source, ONE_UNIT_REMEDY))

@@ -20,6 +20,7 @@ COUNT_WORDS = frozenset("n nr no nb num number count counts length index anzahl"
 OTHER_WORDS = frozenset("of in the last total".split())
 FIRST_FREE = (frozenset(("write", "index")), frozenset(("write", "pointer")), frozenset(("nvalid",)))
 COUNT_NAMES = frozenset(("n_samples", *SAMPLE_COUNT_NAMES))
+PROMISING_NAMES = COUNT_NAMES | {"record_length"}  # a small whole number may be seconds
 
 
 def missing_samples(record: RawRecord, n_sample: int) -> str:
@@ -38,7 +39,7 @@ def missing_samples(record: RawRecord, n_sample: int) -> str:
         The problem, for a message; "" if the file has no fewer samples than it states.
     """
     for entry in record.entries:
-        if "_".join(words_of(entry.name)) in COUNT_NAMES and (promised := _whole_number(entry.value)) > n_sample:
+        if "_".join(words_of(entry.name)) in PROMISING_NAMES and (promised := _whole_number(entry.value)) > n_sample:
             return f"the file ends after {n_sample} of the {promised} samples that {entry.place} states"
     return ""
 

@@ -13,7 +13,7 @@ UNIT_WORD = re.compile(
 )
 # Units of other things than the samples of a channel.
 OTHER_UNITS = re.compile(
-    r"time|zeit|temps|tempo|tid|x$|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain|type$|damp"
+    r"time|zeit|temps|tempo|tid|x$|^h$|horiz|rate|freq|sensitiv|empfind|sensib|speed|length|range|limit|gain|type$|damp"
 )
 
 

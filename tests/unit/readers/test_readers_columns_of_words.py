@@ -28,7 +28,7 @@ def outcome(tmp_path, words, head="force [N];rail [m/s²];State", order=(0, 1, 2
 WORDS = {
     "alarms": ["LLLL"] * N, "states": ["OK"] * N, "true and false": ["FALSE", "TRUE"] * (N // 2), "hex": ["0x0F"] * N,
     "digital input": ["Off"] * 150 + ["On"] * 250, "a mark": [""] * 200 + ["*"] + [""] * 199,
-    "an event": [""] * 40 + ["Event 1"] + [""] * 359, "first row": ["Start"] + [""] * (N - 1),
+    "an event": [""] * 40 + ["Event 1"] + [""] * 359,
 }  # fmt: skip
 
 

@@ -96,3 +96,31 @@ def test_computed_channels_of_one_shape_with_silence_before_the_impact_are_no_co
 def test_coarse_channels_that_change_at_different_samples_are_no_copies():
     steps = np.repeat(RNG.normal(size=(2, 400)), 2, axis=1)
     assert list(scaled_copies([steps[0], np.roll(steps[1], 1)])) == []
+
+
+CODES = "force raw [count];rail raw [count];force [V];rail [V]\n", FORCE / 1e-3, RAIL / 1e-3, FORCE, RAIL
+VOLTS = {"sensitivity": 1.0, "sensitivity_unit": "V/N"}, {"sensitivity": 1.0, "sensitivity_unit": "V/(m/s²)"}
+
+
+@pytest.mark.parametrize(
+    ("sources", "unit", "reason"),
+    [((2, 3), None, ""), ((0, 1), "1 mV", ""), ((0, 1), "V", "scale_unknown"), ((0, 1), "0.5 mV", "scale_unknown"),
+     ((0, 1), "V!", "")],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", ["hammer", "passage"])
+def test_codes_beside_volts_are_compared_with_them(sources, unit, reason, kind, tmp_path):
+    head, *columns = CODES
+    text = "".join("{:.0f};{:.0f};{:.4f};{:.4f}\n".format(*row) for row in zip(*columns))
+    (tmp_path / "a.csv").write_text(head + text)
+    quantities = ("force", "acceleration")
+    channels = [RawChannel(n, i, q, unit, **s) for n, i, q, s in zip(("force", "rail"), sources, quantities, VOLTS)]
+    channels += [RawChannel(f"other {i}", i, "ignored") for i in {0, 1, 2, 3} - set(sources)]
+    result = read("a.csv", tmp_path, RawDescription(tuple(channels), rate=5000.0, kind=kind))
+    assert {error.reason for error in result.errors} == ({reason} if reason else set())
+    assert len(result.recordings) == (not reason)
+
+
+def test_a_force_in_other_units_beside_the_same_response_is_one_record(tmp_path):
+    daN, kgf = (FORCE / 10, "daN", RAIL, "m/s²"), ((FORCE / GRAVITY).round(6), "kgf", RAIL, "m/s²")
+    write_tdms(tmp_path, daN, kgf)
+    assert reasons(tmp_path, "a.tdms") == ([0], [("duplicate", 1)])

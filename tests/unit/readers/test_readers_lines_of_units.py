@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from turnout.errors import ReadError
 from turnout.readers import read
 from turnout.records import RawChannel, RawDescription
 
@@ -36,6 +37,9 @@ def read_table(tmp_path, head, separator, begin="{t:.5f};", channels=IN_FILE_UNI
         ("Name;Force;Rail\nUnit;kN;g\nTime;Force;Rail\n", "{t:.5f};"),
         ("Name:;Force;Rail\nUnit:;kN;g\n", ""),
         ("Name;Force;Rail\nUnit;kN;g\ndx;5E-5;5E-5\n", ""),
+        ("s;kN;g\nTime;CH1;CH2\nTime;Force;Rail\n", "{t:.5f};"),
+        ("s;kN;g\nTime;Force;Rail\ns;kN;g\n", "{t:.5f};"),
+        ("s;kN;g\nTime;CH1;CH2\nTime;Force;Rail\ns;kN;g\n", "{t:.5f};"),
     ],
 )
 def test_units_above_the_names_or_behind_a_label_are_those_of_the_columns(head, begin, separator, tmp_path):
@@ -68,3 +72,17 @@ def test_a_comma_between_the_scales_of_two_channels_is_no_decimal_mark(line, val
     result = read_table(tmp_path, head, separator, channels=IN_VOLTS)
     assert len(result.recordings) == is_neutral
     assert {error.reason for error in result.errors} == (set() if is_neutral else {"scale_unknown"})
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "s;N;m/s²\nTime;Force;Rail\ns;kN;g\n", "Time;Force;Rail\ns;V;V\ns;kN;g\n",
+        "ms;kN;g\nTime;Force;Rail\ns;kN;g\n", "Time [s];Force [N];Rail [m/s²]\ns;kN;g\n",
+    ],
+)  # fmt: skip
+def test_two_lines_of_units_that_differ_are_an_error(head, tmp_path):
+    with pytest.raises(ReadError) as caught:
+        result = read_table(tmp_path, head, ";")
+        raise result.errors[0]
+    assert caught.value.reason in ("unit_unknown", "scale_unknown")

@@ -105,3 +105,57 @@ def test_the_names_are_those_above_the_values(kind, tmp_path):
     scope_file(tmp_path, kind, ",")
     names = [name for name, _ in names_and_units("a.csv", tmp_path)]
     assert names in (["CH1", "CH2"], ["X", "CH1", "CH2"])  # a time in seconds is no channel
+
+
+def scope_text(tmp_path, head, values=NOISE, row="{a},{b}", rate=TRUE, channels=None):
+    rows = [row.format(i=i, t=i / TRUE, a=a, b=b) for i, (a, b) in enumerate(values.T)]
+    (tmp_path / "a.csv").write_text("\n".join([*head, *rows, ""]))
+    return read("a.csv", tmp_path, RawDescription(channels or VOLTS, rate=rate))
+
+
+SCREEN = ("Vertical Scale,CH1:0.5,CH2:0.5", "Vertical Offset,CH1:0.00000,CH2:0.00000", "Horizontal Scale,0.001")
+MODEL = ("Model Number,SDS2354X Plus", "Serial Number,SDS2PEDC6R0001", "Software Version,1.3.9R12")
+LABELLED = ("Record Length,Analog:{n}", "Sample Interval,Analog:{step}", "Vertical Units,CH1:V,CH2:V", *SCREEN, *MODEL)
+PLAIN = ("Record Length,{n}", "Sample Interval,{step}", "Vertical Units,V,V", "Vertical Scale,0.5,0.5",
+         "Horizontal Scale,0.001", *MODEL)  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", [LABELLED, PLAIN])
+@pytest.mark.parametrize(("n", "step", "reason"), [(128, 3.90625e-05, ""), (128, 5e-5, "wrong_rate"),
+                                                   (280, 3.90625e-05, "truncated")])  # fmt: skip
+def test_values_with_labels_and_divisions_of_a_screen(lines, n, step, reason, tmp_path):
+    head = [line.format(n=n, step=f"{step:.8g}") for line in (*lines, "X,CH1,CH2", "s,V,V")]
+    result = scope_text(tmp_path, head, row="{t:.8f},{a},{b}")
+    assert [error.reason for error in result.errors] == ([reason] if reason else [])
+    if not reason:
+        np.testing.assert_allclose([r.samples for r in result.recordings], [NOISE])
+
+
+@pytest.mark.parametrize("head", [["Vertical Scale,2E-4,2E-4", "CH1,CH2"], [*SCREEN, "CH1,CH2"]])
+def test_samples_that_do_not_fit_on_the_screen_are_reported(head, tmp_path):
+    result = scope_text(tmp_path, head, np.rint(NOISE * 5000))
+    assert [error.reason for error in result.errors] == ["entry_unknown"]
+
+
+@pytest.mark.parametrize("line", ["Tstart,-0.1", "Tstart;-0.1", "XStart:-1.0E-01"])
+def test_the_first_time_of_the_axis_is_no_scale(line, tmp_path):
+    result = head_file(tmp_path, line)
+    assert (len(result.recordings), result.errors) == (1, ())
+
+
+def test_the_unit_of_the_horizontal_axis_is_none_of_the_channels(tmp_path):
+    head = [
+        '"TraceName","CH1","CH2"',
+        '"VUnit","V","V"',
+        '"HResolution",3.90625E-05,3.90625E-05',
+        '"HUnit","s","s"',
+        "",
+    ]
+    result = scope_text(tmp_path, head, row=",{a},{b}")
+    np.testing.assert_allclose([r.samples for r in result.recordings], [NOISE])
+    assert names_and_units("a.csv", tmp_path)[-2:] == (("CH1", "V"), ("CH2", "V"))
+
+
+def test_a_coupling_beside_a_range_is_no_offset(tmp_path):
+    result = scope_text(tmp_path, ["CH1,hammer,DC,10V", "CH2,head,AC,5V", "CH1,CH2"])
+    assert (len(result.recordings), result.errors) == (1, ())

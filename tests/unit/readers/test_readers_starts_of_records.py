@@ -58,3 +58,25 @@ def test_several_starts_of_a_single_record_are_reported(tmp_path):
         file.attrs.update(start_times=[str(time) for time in STARTS[:3]], fs=5000.0)
     result = read("a.h5", tmp_path, RawDescription(CHANNELS, rate=5000.0))
     assert [error.reason for error in result.errors] == ["start_unknown"] and len(result.recordings) == 1
+
+
+def datenum(time):
+    return time.toordinal() + 366 + (time - datetime(time.year, time.month, time.day)).total_seconds() / 86400
+
+
+@pytest.mark.parametrize("name", ["start", "t0", "start_times", "started_at", "Start time"])
+@pytest.mark.parametrize("form", [datenum, seconds_since_1970])
+@pytest.mark.parametrize("is_column", [True, False])
+def test_a_vector_of_numbers_beside_matrices_lists_the_starts(is_column, form, name, tmp_path):
+    force, rail = SAMPLES[:4].transpose(1, 0, 2)
+    starts = np.array([form(time) for time in STARTS[:4]])
+    if " " in name:
+        np.savez(tmp_path / "a.npz", force=force, rail=rail, fs=5000.0, **{name: starts})
+    else:
+        starts = starts[:, None] if is_column else starts[None]
+        scipy.io.savemat(tmp_path / "a.mat", {"force": force, "rail": rail, "fs": 5000.0, name: starts})
+    (path,) = tmp_path.iterdir()
+    result = read(path.name, tmp_path, RawDescription(CHANNELS, rate=5000.0))
+    np.testing.assert_array_equal([recording.samples for recording in result.recordings], SAMPLES[:4])
+    offsets = [(r.started_at - time).total_seconds() for r, time in zip(result.recordings, STARTS)]
+    assert max(map(abs, offsets)) < 1e-3 and not result.errors
