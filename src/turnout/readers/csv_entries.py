@@ -189,7 +189,7 @@ def _dated_line(text: str) -> tuple[str, str] | None:
     return None
 
 
-LABELLED_VALUE = re.compile(r"([^\W\d][\w ]*?):\s*([^:\s][^:]*)")
+LABELLED_VALUE = re.compile(r"([^\W\d]\w*):\s*([^:\s][^:]*)")
 
 
 def _labelled_values(cells: Sequence[str]) -> list[tuple[str, str]]:

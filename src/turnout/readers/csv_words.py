@@ -1,5 +1,6 @@
 """Columns of words beside the numbers of a text file: alarms, digital inputs, states and marks of a logger."""
 
+import re
 from collections.abc import Sequence
 from mmap import mmap
 
@@ -7,17 +8,20 @@ import numpy as np
 
 from turnout.readers.csv_cells import cells_of, decode_line, is_number, is_word
 from turnout.readers.entries import Entry
+from turnout.readers.overload_flags import is_of_overload
 
 N_ROWS = 32  # rows in which the same columns hold words: so many are no lines of a head
 MAX_WORDS = 8  # different words of a column of states; names of channels in a table of the head are more
 OVERLOADS = frozenset("over ovr ovl ovfl ol clip sat".split())  # abbreviations of an overload in a column of states
+# Words that say yes or no of each sample: numbers say it without doubt.
+FLAGS = frozenset("true false yes no on off ja nein oui non valid invalid bad error".split())
 MAX_SIZE = 20  # characters of a word
 
 
 def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool:
     """Whether rows of samples begin at a line, of which each has words in the same columns.
 
-    A word that only some of the rows have is a label: "Minimum;-3.5;-61.7" above the samples.
+    A word that only some of the rows have is a label: "Minimum;-3.5;-61.7" above the samples. Flags are no such words.
 
     Parameters
     ----------
@@ -42,6 +46,8 @@ def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool
         cells = cells_of(decode_line(data[position:end]), separator)
         position = end + 1
         are_words = [is_word(cell) for cell in cells]
+        if any(is_word and not _is_state(cell) for is_word, cell in zip(are_words, cells)):
+            return False
         if n_row == 0:
             width, words = len(cells), {i: set() for i, is_word in enumerate(are_words) if is_word}
             has_number = any(map(is_number, cells))
@@ -51,13 +57,20 @@ def is_row_with_words(data: bytes | mmap, position: int, separator: str) -> bool
             return False
         for i, of_column in words.items():
             of_column.add(cells[i])
-            if not are_words[i] or len(of_column) > MAX_WORDS or len(cells[i]) > MAX_SIZE:
+            if not are_words[i] or len(of_column) > MAX_WORDS:
                 return False
     return True
 
 
+def _is_state(word: str) -> bool:
+    """Whether a word may be a state or a mark beside a sample: no flag, no overload, and no number with other marks."""
+    plain = word.casefold()
+    is_flag = plain in FLAGS or plain in OVERLOADS or is_of_overload(word)
+    return len(word) <= MAX_SIZE and not is_flag and re.match(r"[+-]?[.,]?\d", word) is None
+
+
 def are_words(column: np.ndarray) -> bool:
-    """Whether a column that was read as text has a word and no number.
+    """Whether a column that was read as text has states or marks, and no number, flag or overload.
 
     Parameters
     ----------
@@ -68,8 +81,8 @@ def are_words(column: np.ndarray) -> bool:
     -------
     bool
     """
-    words = {cell for cell in column.tolist() if cell is not None}
-    return bool(words) and not any(is_number(word.strip()) for word in words)
+    words = {cell.strip() for cell in column.tolist() if cell is not None}
+    return bool(words) and all(is_word(word) and _is_state(word) for word in words)
 
 
 def entries_of_words(name: str, column: np.ndarray) -> Sequence[Entry]:

@@ -17,7 +17,7 @@ from turnout.readers.rate_units import RateUnit, rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.texts import readings_together
 from turnout.readers.unit_names import conditions_of_unit, is_unit_name
-from turnout.unit_spellings import BRACKETS_IN_ASCII, is_of_a_stretch, without_brackets
+from turnout.unit_spellings import BRACKETS_IN_ASCII, is_of_a_stretch
 from turnout.units import Conversion, conversion
 
 # Units of the same channel at another place of its measuring chain.
@@ -202,7 +202,7 @@ def _unit_alone(entry: Entry) -> tuple[str, str] | None:
 def _name_and_unit(name: str, text: str) -> tuple[str, str] | None:
     if name == FREE_TEXT:
         name, _, text = text.replace("(", "[", 1).partition("[")
-    unit = without_brackets(text.strip("[] "))
+    unit = text.strip("[]() ")
     return (name, unit) if known_unit(unit) else None
 
 

@@ -24,8 +24,8 @@ def unused_copy_errors(
 ) -> dict[int, ReadError]:
     """Errors by index of the channels of which the file has other values in another column.
 
-    Both columns are one signal, and the unit of the unused one with the sensitivity of the layout gives other values in
-    SI than the channel has.
+    Both columns are one signal, at two places of its measuring chain: counts and volts, or volts and N. The unit of the
+    unused one, with the sensitivity of the layout, gives other values in SI than the channel has.
 
     Parameters
     ----------
@@ -58,6 +58,9 @@ def unused_copy_errors(
             continue
         mapping, other = mappings[first], others[second - len(mappings)]
         channel, unit = of_layout[mapping.channel.name], record.units[other]
+        in_use = known_unit(record.units[mapping.index]) or known_unit((channel.unit or "").rstrip("!"))
+        if in_use is None or in_use.dimension == getattr(known_unit(unit), "dimension", ""):
+            continue
         try:
             scale = to_si(channel.quantity, unit, channel.sensitivity, channel.sensitivity_unit).scale
         except ValueError:

@@ -26,8 +26,8 @@ def outcome(tmp_path, words, head="force [N];rail [m/s²];State", order=(0, 1, 2
 
 
 WORDS = {
-    "alarms": ["LLLL"] * N, "states": ["OK"] * N, "true and false": ["FALSE", "TRUE"] * (N // 2), "hex": ["0x0F"] * N,
-    "digital input": ["Off"] * 150 + ["On"] * 250, "a mark": [""] * 200 + ["*"] + [""] * 199,
+    "alarms": ["LLLL"] * N, "states": ["OK"] * N, "directions": ["N", "S"] * (N // 2),
+    "digital input": ["Low"] * 150 + ["High"] * 250, "a mark": [""] * 200 + ["*"] + [""] * 199,
     "an event": [""] * 40 + ["Event 1"] + [""] * 359,
 }  # fmt: skip
 
@@ -45,6 +45,15 @@ def test_a_column_of_words_is_no_channel(kind, order, mark, tmp_path):
 def test_an_overload_in_a_column_of_words_is_reported(word, tmp_path):
     _, errors = outcome(tmp_path, ["OK"] * 200 + [word] * 3 + ["OK"] * (N - 203), kind="hammer")
     assert any("overload" in str(error).lower() or word in str(error) for error in errors)
+
+
+@pytest.mark.parametrize(
+    "words", [["TRUE"] * N, ["off", "ON"] * (N // 2), ["Overload"] * N, ["invalid"] * N, ["0x0F"] * N]
+)
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
+def test_flags_are_to_be_exported_as_numbers(words, order, tmp_path):
+    recordings, errors = outcome(tmp_path, words, order=order)
+    assert recordings == [] and repr(words[-1]) in str(errors[0])
 
 
 def test_words_that_change_in_blocks_may_number_records(tmp_path):

@@ -22,7 +22,8 @@ ACCELERATIONS = {
     "µm/s²": 1e-6, "μm/s^2": 1e-6, "um/s2": 1e-6, "mm/s2": 1e-3, "mm·s⁻²": 1e-3, "mm s^-2": 1e-3, "mm/s**2": 1e-3,
     "cm s-2": 1e-2, "dm/s²": 0.1, "km/s2": 1e3, "nm/s²": 1e-9, "inch/s²": 0.0254, "ft/sec²": 0.3048, "m / s2": 1.0,
     "m per s²": 1.0, "meters per second squared": 1.0, "ｍ／ｓ²": 1.0, "㎨": 1.0, "gn": G, "g_n": G, "g0": G,
-    "µg": 1e-6 * G,    "g pk": G, "g peak": G, "gpk": G, "g (0-pk)": G, "m/s² pk": 1.0, "10^-2 m/s²": 1e-2, "（g）": G, "【m/s²】": 1.0,
+    "µg": 1e-6 * G, "g pk": G, "g peak": G, "gpk": G, "g (0-pk)": G, "m/s² pk": 1.0, "10^-2 m/s²": 1e-2,
+    "（g）": G, "【m/s²】": 1.0,
 }  # fmt: skip
 
 
