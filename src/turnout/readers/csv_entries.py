@@ -17,7 +17,7 @@ from turnout.readers.entries import (
     entries_of_text,
     paired_statements,
 )
-from turnout.readers.entry_owners import container_of
+from turnout.readers.entry_owners import CHANNEL, container_of
 from turnout.readers.exponential_windows import is_window_name
 from turnout.readers.measured_entries import is_statistic_name
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
@@ -99,7 +99,7 @@ def entries_of_lines(
         if (named := LINE_OF_PAIRS.match(text)) and (several := paired_statements(named[1], named[2].strip(separator))):
             yield from (Entry(place, *pair) for pair in several)
             continue
-        if labelled := _labelled_values(cells):
+        if labelled := _labelled_values(cells, names):
             yield from (Entry(place, *pair) for pair in labelled)
             continue
         filled = cells if cells[0] else cells[1:]
@@ -192,8 +192,8 @@ def _dated_line(text: str) -> tuple[str, str] | None:
 LABELLED_VALUE = re.compile(r"([^\W\d]\w*):\s*([^:\s][^:]*)")
 
 
-def _labelled_values(cells: Sequence[str]) -> list[tuple[str, str]]:
-    """Names and values of a line of which each value has a label of its own, "Vertical Scale,CH1:0.5,CH2:0.1".
+def _labelled_values(cells: Sequence[str], names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names and values of a line of which each value has the label of a channel, "Vertical Scale,CH1:0.5,CH2:0.1".
 
     A rate and a number of samples are those of all channels: "Sample Interval,Analog:5E-05". Empty for other lines.
     """
@@ -203,6 +203,8 @@ def _labelled_values(cells: Sequence[str]) -> list[tuple[str, str]]:
         return []
     pairs = [(match[1], match[2].strip()) for match in matches if match]
     is_of_all = is_rate_name(name) or "_".join(words_of(name)) in PROMISING_NAMES
+    if not is_of_all and not all(CHANNEL.fullmatch(label) or label in names for label, _ in pairs):
+        return []
     return [(name if is_of_all else f"{name} {label}", value) for label, value in pairs]
 
 

@@ -101,7 +101,10 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         cells = cells_of(line, separator)
         if not is_row(cells) and _are_rows_of_words(data, position):
             separator, cells = BLANK, cells_of(line, BLANK)
-        if is_row(cells) or is_row_with_words(data, position, separator):
+        of_words = [] if is_row(cells) else [s for s in (separator, BLANK) if is_row_with_words(data, position, s)]
+        if of_words:
+            separator, cells = of_words[0], cells_of(line, of_words[0])
+        if of_words or is_row(cells):
             return _complete_head(notes, text_lines, head_lines, cells, separator, position, source)
         head_lines.append(line)
         note = _note_of(line, separator, len(cells))
