@@ -103,12 +103,15 @@ def channel_mappings(
         and not _needs_no_name(record, i)
     ]:
         names = _name_list([record.names[i] or str(i) for i in unknown])
-        raise source.error(
-            where,
-            f"the file has {'channel' if len(unknown) == 1 else 'channels'} {names}, which the layout does not name",
-            f"Add it to the layout, with 'quantity: {IGNORED}' if it is not wanted",
-            reason="channel_unknown",
+        problem = (
+            f"the file has {'channel' if len(unknown) == 1 else 'channels'} {names}, which the layout does not name"
         )
+        remedy = f"Add it to the layout, with 'quantity: {IGNORED}' if it is not wanted"
+        used = [c for i, c in zip(indices, channels) if c.quantity != IGNORED and _is_axis_by_form(record, i)]
+        if used:
+            problem += f", and its channel {used[0].source!r} rises in equal steps: it is a time or counts the samples"
+            remedy = f"Count this channel in the layout: 'source' of {used[0].name!r} is another one"
+        raise source.error(where, problem, remedy, reason="channel_unknown")
     if problem := exchanged_channels(record, indices, channels):
         raise source.error(where, problem, EXCHANGED_REMEDY, reason="unit_unknown")
     return tuple(
@@ -203,11 +206,15 @@ def index_of(
 
 def _needs_no_name(record: RawRecord, i: int) -> bool:
     """Whether the form of a column shows that it is no channel: no number in it, a count, or an even rise."""
-    column, unit = record.samples[i], record.units[i]
+    column = record.samples[i]
     is_empty = isinstance(column, np.ndarray) and column.dtype.kind == "f" and bool(np.isnan(column).all())
-    if is_empty or column.dtype.kind not in "fiu" or is_unit_of_no_time(unit):
-        return is_empty
-    return counts_samples(column) or rises_evenly(column[:HEAD_SIZE])
+    return is_empty or (not is_unit_of_no_time(record.units[i]) and _is_axis_by_form(record, i))
+
+
+def _is_axis_by_form(record: RawRecord, i: int) -> bool:
+    """Whether a column counts the samples or rises evenly."""
+    column = record.samples[i]
+    return column.dtype.kind in "fiu" and (counts_samples(column) or rises_evenly(column[:HEAD_SIZE]))
 
 
 def _key_of_name(name: str) -> str:

@@ -34,7 +34,36 @@ def is_count_or_time(column: Column) -> bool:
     if n_sample < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
         return False
     step = float(column[1:2][0]) - float(column[:1][0])
-    return step > 0.0 and all(is_on_line(column[k : k + HEAD_SIZE]) for k in (0, max(0, n_sample - HEAD_SIZE)))
+    return step > 0.0 and all(is_on_line(end) for end in _ends(column))
+
+
+def _ends(column: Column) -> list[np.ndarray]:
+    """The first and the last samples of a column."""
+    return [np.asarray(column[k : k + HEAD_SIZE], dtype=float) for k in (0, max(0, len(column) - HEAD_SIZE))]
+
+
+def rises_in_steps(column: Column) -> bool:
+    """Whether a column rises at both ends and falls at neither, as a clock whose step is longer than the samples'.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        Samples of a channel as they are in the file.
+
+    Returns
+    -------
+    bool
+        False for fewer than 64 samples, and for fewer than 8 rises at one end.
+
+    Examples
+    --------
+    >>> rises_in_steps(np.arange(1000) // 20), rises_in_steps(np.minimum(np.arange(1000), 5))
+    (True, False)
+    """
+    if len(column) < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
+        return False
+    steps = [np.diff(end) for end in _ends(column)]
+    return all(bool((s >= 0).all()) and np.count_nonzero(s) >= MIN_AXIS_SIZE for s in steps)
 
 
 def counts_in_disorder(column: Column) -> bool:

@@ -140,13 +140,15 @@ def names_among(lines: Sequence[Sequence[str]]) -> tuple[int, int | None]:
     ((1, 0), (1, 0))
     """
     last = len(lines) - 1
-    for i in range(last, -1, -1):
+    labelled = [
+        i for i, line in enumerate(lines) if is_unit_name(line[0]) and any(line[1:]) and _are_units(line[1:], 1.0)
+    ]
+    for i in (*reversed(labelled), *(i for i in range(last, -1, -1) if i not in labelled)):
         if is_unit_of_other(lines[i][0]):  # of the time: "HUnit;s;s"
             continue
-        is_labelled = is_unit_name(lines[i][0]) and any(lines[i][1:]) and _are_units(lines[i][1:], 1.0)
-        names = _names_of_units(lines, i, is_labelled)
+        names = _names_of_units(lines, i, i in labelled)
         share = 0.5 if i and (i == last or are_names(lines[i - 1])) else 1.0
-        if names is not None and (is_labelled or _are_units(lines[i], share)):
+        if names is not None and (i in labelled or _are_units(lines[i], share)):
             return names, i
     return next((i for i in range(last, -1, -1) if are_names(lines[i])), last), None
 

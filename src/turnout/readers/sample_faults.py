@@ -7,7 +7,7 @@ import numpy as np
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER, ChannelStatistics, channel_error
 from turnout.readers.channel_maps import ChannelMapping
-from turnout.readers.column_forms import is_count_or_time
+from turnout.readers.column_forms import is_count_or_time, rises_in_steps
 from turnout.readers.lazy import Column
 from turnout.readers.missing_codes import count_alone, missing_code
 from turnout.readers.packing import fill_values
@@ -224,7 +224,8 @@ def faults_by_channel(
     of_axes = {
         i: source.error(f"{where}, channel {mapping.channel.name!r}", AXIS_PROBLEM, AXIS_REMEDY, "channel_missing")
         for i, mapping in enumerate(channel_maps)
-        if mapping.channel.quantity in ("force", "acceleration") and is_count_or_time(record.samples[mapping.index])
+        if mapping.channel.quantity in ("force", "acceleration")
+        and (is_count_or_time(column := record.samples[mapping.index]) or rises_in_steps(column))
     }
     of_copies = _copy_errors(record, channel_maps, where, source)
     return of_copies | _missing_sample_errors(record, channel_maps, statistics, where, source) | of_axes | of_statistics
