@@ -9,6 +9,7 @@ HEAD_SIZE = 1000  # samples from which a column is judged before all of it is re
 MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequence
 MAX_JUMP_SHARE = 0.02  # gaps per step among the first samples: with more a column rises too unevenly for a time axis
 MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
+MAX_STEP_DEVIATION = 0.5  # of a step of a clock: its last digit may be that of the floating-point number
 MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measures nothing
 
 
@@ -43,7 +44,7 @@ def _ends(column: Column) -> list[np.ndarray]:
 
 
 def rises_in_steps(column: Column) -> bool:
-    """Whether a column rises at both ends and falls at neither, as a clock whose step is longer than the samples'.
+    """Whether a column holds each value for some samples and rises in equal steps, as a clock of few digits does.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def rises_in_steps(column: Column) -> bool:
     Returns
     -------
     bool
-        False for fewer than 64 samples, and for fewer than 8 rises at one end.
+        False for fewer than 64 samples, for fewer than 8 steps at one end, and where a sample falls.
 
     Examples
     --------
@@ -62,8 +63,12 @@ def rises_in_steps(column: Column) -> bool:
     """
     if len(column) < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
         return False
-    steps = [np.diff(end) for end in _ends(column)]
-    return all(bool((s >= 0).all()) and np.count_nonzero(s) >= MIN_AXIS_SIZE for s in steps)
+    for steps in map(np.diff, _ends(column)):
+        rises = steps[steps != 0.0]
+        is_even = len(rises) >= MIN_AXIS_SIZE and np.ptp(rises) <= MAX_STEP_DEVIATION * np.median(rises)
+        if len(rises) == len(steps) or not is_even:
+            return False
+    return True
 
 
 def counts_in_disorder(column: Column) -> bool:

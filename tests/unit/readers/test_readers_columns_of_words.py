@@ -84,3 +84,11 @@ def test_the_units_are_those_above_the_numbers(tmp_path):
     result = read("a.csv", tmp_path, RawDescription(CHANNELS, rate=5000.0))
     np.testing.assert_array_equal([r.samples for r in result.recordings], [[FORCE, RAIL]])
     assert not result.errors
+
+
+def test_words_between_blanks(tmp_path):
+    rows = "".join(f"{f:.4f}  {a:.4f} ok\n" for f, a in zip(FORCE, RAIL))
+    (tmp_path / "a.txt").write_text("force [N]  rail [m/s2]  st\n" + rows)
+    result = read("a.txt", tmp_path, RawDescription(CHANNELS, rate=5000.0))
+    np.testing.assert_array_equal([r.samples for r in result.recordings], [[FORCE, RAIL]])
+    assert not result.errors

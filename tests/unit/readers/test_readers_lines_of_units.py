@@ -38,6 +38,7 @@ def read_table(tmp_path, head, separator, begin="{t:.5f};", channels=IN_FILE_UNI
         ("Name:;Force;Rail\nUnit:;kN;g\n", ""),
         ("Name;Force;Rail\nUnit;kN;g\ndx;5E-5;5E-5\n", ""),
         ("s;kN;g\nTime;CH1;CH2\nTime;Force;Rail\n", "{t:.5f};"),
+        ("Name;Force;Rail\nUnit;kN;g\nMaximum;n/a;n/a\n", ";"),
         ("s;kN;g\nTime;Force;Rail\ns;kN;g\n", "{t:.5f};"),
         ("s;kN;g\nTime;CH1;CH2\nTime;Force;Rail\ns;kN;g\n", "{t:.5f};"),
     ],

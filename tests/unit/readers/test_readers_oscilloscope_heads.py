@@ -137,6 +137,17 @@ def test_samples_that_do_not_fit_on_the_screen_are_reported(head, tmp_path):
     assert [error.reason for error in result.errors] == ["entry_unknown"]
 
 
+@pytest.mark.parametrize("line", ["Comment;Track: 5;Panel: CP", "Position;A: 12.5 m;B: 13.0 m", "Scale;CH1:1;CH2:1"])
+def test_labels_that_are_no_channels_are_names(line, tmp_path):
+    result = head_file(tmp_path, line)
+    assert (len(result.recordings), result.errors) == (1, ())
+
+
+@pytest.mark.parametrize("line", ["Scale;CH1:0.5;CH2:1", "Gain;force:2;rail:1", "Polarity;force:normal;rail:inverted"])
+def test_a_scale_behind_the_label_of_a_channel_is_compared(line, tmp_path):
+    assert not head_file(tmp_path, line).recordings
+
+
 @pytest.mark.parametrize("line", ["Tstart,-0.1", "Tstart;-0.1", "XStart:-1.0E-01"])
 def test_the_first_time_of_the_axis_is_no_scale(line, tmp_path):
     result = head_file(tmp_path, line)
