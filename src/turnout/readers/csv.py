@@ -32,7 +32,6 @@ import numpy as np
 
 from turnout.errors import ReadError
 from turnout.readers.array_metadata import Metadata
-from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.csv_blank_rows import blank_end_remarks, end_without_blank_rows
 from turnout.readers.csv_cells import (
     BLANK,
@@ -48,7 +47,7 @@ from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_outer_rows import outer_row_remarks
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns
-from turnout.readers.csv_words import entries_of_words
+from turnout.readers.csv_words import entries_of_words, holds_words
 from turnout.readers.entries import Entry
 from turnout.readers.label_lines import has_labels, with_joined_labels
 from turnout.readers.lazy import Column, LazyColumn
@@ -271,8 +270,7 @@ def _records(
         if time is None or _is_empty(columns[time])
         else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     )
-    texts = {names[i] or str(i): column for i, column in enumerate(columns) if column.dtype.kind == "O"}
-    words = {name: column for name, column in texts.items() if not is_clock_or_date(column[0] or "")}
+    words = {names[i] or str(i): np.asarray(c[:]) for i, c in enumerate(columns) if holds_words(c)}
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
     n = len(spans)

@@ -6,8 +6,10 @@ from mmap import mmap
 
 import numpy as np
 
+from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.csv_cells import cells_of, decode_line, is_number, is_word
 from turnout.readers.entries import Entry
+from turnout.readers.lazy import Column
 from turnout.readers.overload_flags import is_of_overload
 
 N_ROWS = 32  # rows in which the same columns hold words: so many are no lines of a head
@@ -83,6 +85,23 @@ def are_words(column: np.ndarray) -> bool:
     """
     words = {cell.strip() for cell in column.tolist() if cell is not None}
     return bool(words) and all(is_word(word) and _is_state(word) for word in words)
+
+
+def holds_words(column: Column) -> bool:
+    """Whether a column was read as text and its first text is neither a date nor a time of day.
+
+    Parameters
+    ----------
+    column : (n,) array or LazyColumn
+        A column of the file.
+
+    Returns
+    -------
+    bool
+    """
+    texts = np.asarray(column[:]).tolist() if column.dtype.kind == "O" else []
+    first = next((text for text in texts if text is not None), "")
+    return bool(first) and not is_clock_or_date(first)
 
 
 def entries_of_words(name: str, column: np.ndarray) -> Sequence[Entry]:
