@@ -23,6 +23,7 @@ BASE = {
     "reasons",
     "records",
     "threads",
+    "unit_spellings",
     "units",
 }
 FOUNDATION = {"config", "readers", "signal", "registry", "fingerprint"}
@@ -43,7 +44,8 @@ ALLOWED = {
     "reasons": set(),
     "records": {"errors", "plots"},
     "threads": set(),
-    "units": {"constants", "errors", "records"},
+    "unit_spellings": set(),
+    "units": {"constants", "errors", "records", "unit_spellings"},
     **{package: BASE for package in FOUNDATION},
     "kernel_cache": {"fingerprint"},
     **{package: BASE | FOUNDATION | COMPILED for package in PARTS},

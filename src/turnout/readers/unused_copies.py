@@ -46,18 +46,18 @@ def unused_copy_errors(
         Empty where the values agree, or nothing states the unit of the unused column.
     """
     used = {m.index for m in mappings}
-    others = [i for i, unit in enumerate(record.units) if i not in used and known_unit(unit)]
-    others = [i for i in others if record.samples[i].dtype.kind in "fiu"]
+    unused = [i for i, unit in enumerate(record.units) if i not in used and known_unit(unit)]
+    unused = [i for i in unused if record.samples[i].dtype.kind in "fiu"]
     of_layout = {channel.name: channel for channel in channels}
     errors: dict[int, ReadError] = {}
-    if not others:
+    if not unused:
         return errors
-    heads = [np.asarray(record.samples[i][:N_COMPARED]) for i in (*(m.index for m in mappings), *others)]
+    heads = [np.asarray(record.samples[i][:N_COMPARED]) for i in (*(m.index for m in mappings), *unused)]
     for first, second, factor in scaled_copies(heads):
         if first >= len(mappings) or second < len(mappings):
             continue
-        mapping, other = mappings[first], others[second - len(mappings)]
-        channel, unit = of_layout[mapping.channel.name], record.units[other]
+        mapping, column = mappings[first], unused[second - len(mappings)]
+        channel, unit = of_layout[mapping.channel.name], record.units[column]
         in_use = known_unit(record.units[mapping.index]) or known_unit((channel.unit or "").rstrip("!"))
         if in_use is None or in_use.dimension == getattr(known_unit(unit), "dimension", ""):
             continue
@@ -67,7 +67,7 @@ def unused_copy_errors(
             continue
         ratio = abs(mapping.scale / (factor * scale))
         if not channel.overrules_file and abs(ratio - 1.0) > MAX_DIFFERENCE:
-            name = record.names[other] or str(other)
+            name = record.names[column] or str(column)
             problem = f"it is {ratio:.4g} times what the same signal in channel {name!r} with the unit {unit!r} gives"
             errors[first] = source.error(f"{where}, channel {channel.name!r}", problem, REMEDY, reason="scale_unknown")
     return errors
