@@ -111,7 +111,7 @@ def weighed_trains(
     settings : PassageSettings
         Settings of the passages.
     max_trains : int
-        Files are read until this number is reached.
+        Files are read until this number has a recording that can be used.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def weighed_trains(
     row_times = [row.passed_at for row in listed if row.axle_load is not None]
     recordings: list[RecordedTrain] = []
     passage_units = [u for u in scan(turnout, Path(raw_root)).units if u.kind == "passage"] if row_times else []
-    rows: set[ListedTrain] = set()  # that a recording may have
+    rows: set[ListedTrain] = set()  # that a usable recording may have
     starts = sorted({time for u in passage_units if (time := time_of_label(u.label)) is not None})
     for unit in sorted(passage_units, key=lambda u: u.label, reverse=True):
         started = time_of_label(unit.label)
@@ -133,7 +133,8 @@ def weighed_trains(
             break  # no further file has a recording of these trains, or another train near them
         for recording in _recordings_of(unit, turnout, raw_root, patterns, settings):
             row = listed_for(recording.moment, recording.passage.n_axle, listed, settings.train_data_tolerance)
-            rows |= {row} if row is not None and row.axle_load is not None else set()
+            if row is not None and row.axle_load is not None and recording.amplitudes:
+                rows.add(row)
             recordings.append(recording)
     return _trains_of_known_load(recordings, listed, settings)
 

@@ -129,6 +129,21 @@ def test_a_train_whose_own_row_has_no_load_does_not_have_that_of_another(turnout
     assert weighed_trains(own, tmp_path, PATTERNS, own.settings["passage"]) == []
 
 
+def test_recordings_that_cannot_be_used_do_not_end_the_search(turnout, tmp_path):
+    """The newest recording begins within its train. The one of an hour before is weighed in its place."""
+    folder, rows = tmp_path / "tommerup_s1" / "passages", ["passed_at_utc,train_type,axle_load_t"]
+    folder.mkdir(parents=True)
+    for minutes, skipped in ((0, 0), (60, round(1.9 * RATE))):
+        moment, x = NOON + timedelta(minutes=minutes), train(7)
+        cut = replace(x, samples=x.samples[:, skipped:], started_at=moment)
+        write([cut], folder / f"{moment:%Y%m%dT%H%M%SZ}.h5", "hdf5")
+        rows.append(f"{(moment + timedelta(seconds=2)).isoformat()},IC3,{12.0 + minutes / 60}")
+    (tmp_path / "tommerup_s1" / "trains.csv").write_text("\n".join(rows) + "\n")
+    own = with_raw(turnout, tmp_path)
+    trains = weighed_trains(own, tmp_path, PATTERNS, own.settings["passage"], max_trains=1)
+    assert [t["load"] for t in trains] == [12.0]
+
+
 def test_a_train_late_in_a_long_file_is_weighed():
     """Half an hour after the start of its file. Formerly only files that start near a row were read."""
     assert _has_row(NOON, [NOON], [NOON + timedelta(minutes=30)])
