@@ -19,6 +19,7 @@ import sys
 from contextlib import contextmanager
 from decimal import Decimal
 from difflib import get_close_matches
+from pathlib import Path
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
@@ -187,7 +188,7 @@ def open_output(path: str) -> Iterator[TextIO]:
         return
     try:
         with whole_file(path) as unfinished, open(unfinished, "w", newline="", encoding="utf-8") as stream:
-            if str(unfinished) != path:  # a pipe or a device is for a program
+            if unfinished != Path(path):  # a pipe or a device is for a program
                 stream.write(MARK)
             yield stream
     except OSError as error:

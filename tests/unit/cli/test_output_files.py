@@ -108,7 +108,7 @@ def test_a_spreadsheet_reads_a_table_as_utf_8(folder, registry, line):
     assert "turnout_id" in duckdb.sql(f"from read_csv('{table}', header = true)").columns
 
 
-@pytest.mark.parametrize("path", ["-", "/dev/stdout"])
+@pytest.mark.parametrize("path", ["-", "/dev/stdout", "/dev//stdout", "/dev/./stdout"])
 def test_a_program_gets_a_table_without_a_mark(folder, registry, path):
     command = [sys.executable, "-m", "turnout", "query", "select 1 as name", "--csv", path]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True)
