@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from turnout.passage.timetable import OtherPassage
-from turnout.stages.filed_times import time_of_label
-from turnout.workflow.notes import starts_near
+from turnout.workflow.notes import start_of, starts_near
+from turnout.workflow.scan import is_ignored
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -34,7 +34,7 @@ def passages_beside(path: str, raw_root: str | Path, moment: datetime, tolerance
     list of OtherPassage
         Their numbers of axles are not known. Empty where the name of the file has no time.
     """
-    start, folder = time_of_label(path), os.path.dirname(os.path.join(raw_root, path))
+    start, folder = start_of(os.path.basename(path)), os.path.dirname(os.path.join(raw_root, path))
     if start is None or not os.path.isdir(folder):
         return []
     starts = _starts_in(folder, os.stat(folder).st_mtime_ns)
@@ -43,6 +43,6 @@ def passages_beside(path: str, raw_root: str | Path, moment: datetime, tolerance
 
 @lru_cache(maxsize=8)
 def _starts_in(folder: str, changed_at: int) -> list[datetime]:
-    """Times in the names of the files of a folder, in order; ``changed_at`` [ns] tells its states apart."""
-    times = (time_of_label(name) for name in os.listdir(folder))
+    """Times in the names of the recordings of a folder, in order; ``changed_at`` [ns] tells its states apart."""
+    times = (start_of(name) for name in os.listdir(folder) if not is_ignored(name))
     return sorted(time for time in times if time is not None)

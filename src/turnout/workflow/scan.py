@@ -113,7 +113,7 @@ class RawFolder:
             return
         for entry in entries:
             name = entry.name
-            if name.startswith(IGNORED_PREFIXES) or name.endswith(UNFINISHED_SUFFIXES) or name in IGNORED_NAMES:
+            if is_ignored(name):
                 continue
             if not inside and name in NOTE_FILES:
                 self.tables.append(name)
@@ -148,6 +148,27 @@ class RawFolder:
 
     def _leave_out(self, inside: str, where: str, finding: str, remedy: str, reason: str = "unreadable") -> None:
         self.problems.append(ReadError(_path_text(self.raw, inside), where, finding, remedy, reason))
+
+
+def is_ignored(name: str) -> bool:
+    """Whether a name is that of an unfinished file, of a lock, or of a file for people.
+
+    Parameters
+    ----------
+    name : str
+        Name of a file or folder.
+
+    Returns
+    -------
+    bool
+        Such an entry of a raw folder is no recording and no problem.
+
+    Examples
+    --------
+    >>> is_ignored("20240513T120000Z.h5.part"), is_ignored("20240513T120000Z.h5")
+    (True, False)
+    """
+    return name.startswith(IGNORED_PREFIXES) or name.endswith(UNFINISHED_SUFFIXES) or name in IGNORED_NAMES
 
 
 def _path_text(raw: str, inside: str) -> str:

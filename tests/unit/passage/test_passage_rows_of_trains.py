@@ -142,6 +142,31 @@ def test_a_new_file_beside_another_makes_its_result_outdated(tmp_path, repositor
     assert [o.moment for o in passages_beside(path, tmp_path, at(1), 90.0)] == [at(41), at(61)]
 
 
+@pytest.mark.parametrize(
+    ("name", "is_rival"),
+    [
+        ("20240513T120040Z.csv", True),
+        ("lok_20240513T120040Z.h5", True),  # a layout may have names with a text before the time
+        ("20240513T120040Z_2.h5", True),
+        ("20240513T120040Z.h5.part", False),  # an upload, which may end without a file
+        ("~$20240513T120040Z.csv", False),
+    ],
+)
+def test_a_file_is_a_rival_if_it_makes_the_result_outdated(tmp_path, repository, name, is_rival):
+    """The digest of a passage and its row of the train data rest on the same files."""
+    path, turnout = "t/20240513T120000Z.h5", load_configuration(repository / "config").turnout("tommerup_s1")
+    (tmp_path / "t").mkdir()
+    turnout = replace(turnout, raw="t", trains=({"passed_at_utc": "2024-05-13T12:00:42Z"},))
+    turnout = replace(turnout, hammer=None, passages=replace(turnout.passages, files="*{time}*"))
+    (tmp_path / path).touch()
+    (alone,) = notes_of(turnout, scan(turnout, tmp_path).units)
+    (tmp_path / "t" / name).touch()
+    units = scan(turnout, tmp_path).units
+    notes = {unit.files[0][0]: note for unit, note in zip(units, notes_of(turnout, units))}
+    assert (notes[path] != alone) == is_rival
+    assert bool(passages_beside(path, tmp_path, at(1), 90.0)) == is_rival
+
+
 def test_rows_are_read_in_order_of_time():
     rows = [{"passed_at_utc": f"2024-05-13T12:0{k}:00Z"} for k in (2, 0, 1)]
     assert [t.passed_at.minute for t in listed_trains(rows)[0]] == [0, 1, 2]
