@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
 
 from turnout.config.events import parse_utc
 from turnout.number_text import decimal_number
 
+COLUMNS = ("passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track", "n_axles")
 MIN_DISTANCE_RATIO, MIN_TIME_APART = 2.0, 5.0  # -, s: a second train or passage in time is farther by as much
 
 
@@ -51,32 +53,30 @@ def listed_trains(rows: Sequence[Mapping[str, str]]) -> tuple[tuple[ListedTrain,
     trains, errors = [], []
     for k, row in enumerate(rows, 1):
         try:
-            trains.append(_listed_train(row))
+            trains.append(_listed_train(*(row.get(column) or "" for column in COLUMNS)))
         except ValueError as error:
             errors.append(f"row {k}: {error}")
     return tuple(sorted(trains, key=lambda t: (t.passed_at, t.train_type or ""))), tuple(errors)
 
 
-def _listed_train(row: Mapping[str, str]) -> ListedTrain:
-    text = row.get("passed_at_utc") or ""
+@lru_cache(maxsize=50_000)  # every file of a turnout needs all of its rows
+def _listed_train(passed_at: str, train_type: str, speed: str, axle_load: str, track: str, n_axles: str) -> ListedTrain:
     try:
-        moment = parse_utc(text)
+        moment = parse_utc(passed_at)
     except ValueError:
-        raise ValueError(f"passed_at_utc {text!r} is not a time like 2024-05-13T10:00:00") from None
+        raise ValueError(f"passed_at_utc {passed_at!r} is not a time like 2024-05-13T10:00:00") from None
     if moment.tzinfo is not None:
-        raise ValueError(f"passed_at_utc {text!r} has a time zone, write UTC without one")
-    numbers = {}
-    for column, name, low, high in (("speed_kmh", "speed", 1, 400), ("axle_load_t", "axle_load", 0.1, 60)):
-        numbers[name] = _number(row.get(column), column, low, high)
-    count = _number(row.get("n_axles"), "n_axles", 1, 2000)
-    n_axles = None if count is None else int(count)
-    track = row.get("track") or None
-    if track not in (None, "main", "diverging"):
+        raise ValueError(f"passed_at_utc {passed_at!r} has a time zone, write UTC without one")
+    speed_kmh, load = _number(speed, "speed_kmh", 1, 400), _number(axle_load, "axle_load_t", 0.1, 60)
+    count = _number(n_axles, "n_axles", 1, 2000)
+    if track not in ("", "main", "diverging"):
         raise ValueError(f"track {track!r} is neither main nor diverging")
-    return ListedTrain(moment, row.get("train_type") or None, track=track, n_axles=n_axles, **numbers)
+    return ListedTrain(
+        moment, train_type or None, speed_kmh, load, track or None, None if count is None else int(count)
+    )
 
 
-def _number(text: str | None, column: str, low: float, high: float) -> float | None:
+def _number(text: str, column: str, low: float, high: float) -> float | None:
     if not text:
         return None
     try:
