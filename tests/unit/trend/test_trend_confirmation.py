@@ -109,6 +109,38 @@ def test_sections_that_lie_on_opposite_sides_have_rows_of_their_own(settings):
     assert "voids" in below[3] and "frost" in above[3] and "voids" not in above[3]
 
 
+@pytest.mark.parametrize(
+    ("table", "weeks_ago", "expected"),
+    [
+        ("change_findings", 0, "result of S5"),
+        ("mismatch_findings", 0, "result of S5"),
+        ("mismatch_findings", 2, "no decision: the diagnosis of 2017-02-20 is older than the change (turnout diagnose)"),
+    ],
+)
+def test_the_diagnosis_is_that_of_the_section_that_the_sentence_names(settings, table, weeks_ago, expected):
+    """S5 lies farthest off, and S2 comes first by name. Formerly the row of S5 had the diagnosis of S2, or none.
+
+    Formerly an effect that was named against the track file was "need no effect" for a campaign to confirm.
+    """
+    fleet = Fleet(turnouts=1, weeks=60, band="ballast", frequency=150.0)
+    change = np.zeros((1, 8, 60))
+    change[0, [2, 5], -1] = 28.0, 35.0
+    rows = modes(fleet, 5, change)
+    findings = pd.DataFrame(
+        {
+            "finding_id": ["f2", "f5"], "turnout_id": "T00000", "sections": ["S2", "S5"], "visit": "2017-02-20",
+            "found_at_utc": rows["measured_at_utc"].max() - pd.Timedelta(weeks=weeks_ago), "verdict": "named",
+            "term": "local_ballast", "sentence": ["result of S2", "result of S5"],
+        }
+    )  # fmt: skip
+    if table == "change_findings":
+        findings = findings.drop(columns="finding_id")
+    with evaluated_views(rows, settings, **{table: findings}) as con:
+        query = "select sections, sentence, diagnosis from worklist where state = 'confirm now'"
+        ((sections, sentence, diagnosis),) = con.execute(query).fetchall()
+    assert sections == "S2, S5" and sentence.startswith("S5: ") and diagnosis == expected
+
+
 def test_charts_that_cannot_tell_are_together_only_for_the_same_reason(settings):
     """The number of the first section is stated in words, those of the others behind their names."""
     rows = modes(Fleet(turnouts=1, weeks=130, sigma=2.0, campaign=0.0), 3, None)

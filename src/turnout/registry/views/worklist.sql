@@ -96,7 +96,8 @@ confirming as (
         printf('the campaign of %s lies %.1f %%', campaign_name(c.turnout_id, c.measured_at_utc), abs(c.deviation_pct))
             || coalesce(printf(' (± %.1f, 95 %%)', 100 * (c.expected_high_hz / c.expected_hz - 1)), '')
             || case when c.deviation_pct < 0 then ' below' else ' above' end || ' its expected value; not yet confirmed'
-            as why
+            as why,
+        c.measured_at_utc - interval 1 day as visit_from_utc  -- a visit lasts a day at most
     from then_status n
     join charts c
         on c.turnout_id = n.turnout_id and c.section_id = n.section_id and c.band = n.band and c.source = n.source
@@ -171,7 +172,7 @@ grouped as (
 ),
 listed as (
     select
-        *, case when section_id = '*' then 'whole turnout' else split_part(section_id, '/', -1) end as sections
+        *, split_part(section_id, '/', -1) as named, case when section_id = '*' then 'whole turnout' else named end as sections
     from rows_to_list
     where why is null
     union all by name
@@ -179,14 +180,14 @@ listed as (
         turnout_id, case when count(*) = 1 then min(section_id) end as section_id,
         case min(section_id)
             when '*' then 'whole turnout' else string_agg(label, ', ' order by section_id)
-        end as sections, band, source, state, max(direction) as direction,
+        end as sections, max(label) filter (speaks) as named, band, source, state, max(direction) as direction,
         case when count(distinct why) = 1 then min(why)
-            else replace(max(label) filter (speaks), '*', 'whole turnout') || ': ' || max(why) filter (speaks)
+            else replace(named, '*', 'whole turnout') || ': ' || max(why) filter (speaks)
                 || '; likewise ' || string_agg(label, ', ' order by section_id) filter (not speaks)
                 || coalesce(' (' || one_or_range(min(size_pct) filter (not speaks), max(size_pct) filter (not speaks)) || ')', '')
         end as why,
         max(change_pct) filter (speaks) as change_pct, max(low_pct) filter (speaks) as low_pct,
-        max(high_pct) filter (speaks) as high_pct, max(target_pct) as target_pct
+        max(high_pct) filter (speaks) as high_pct, max(target_pct) as target_pct, max(visit_from_utc) as visit_from_utc
     from grouped
     group by turnout_id, band, source, state, reason
 ),
@@ -368,12 +369,12 @@ select
                 else ''
             end
             || case
-                when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) or g.verdict is distinct from 'named'
+                when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc, h.visit_from_utc) or g.verdict is distinct from 'named'
                     or g.term = c.term or c.verdict = 'unknown' then ''
                 else '; against the track file the recordings of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
                     || ' name another effect, ' || replace(g.term, '_', ' ')
             end
-        when g.finding_id is not null and g.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc) and g.verdict <> 'none' then
+        when g.finding_id is not null and g.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc, h.visit_from_utc) and g.verdict <> 'none' then
             g.sentence
         when c.verdict = 'no_decision' then c.sentence
         when c.sentence is not null and c.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
@@ -384,7 +385,7 @@ select
             || c.sentence
         when c.sentence is not null then 'no decision: ' || c.sentence
         when g.finding_id is null then 'no decision: no diagnosis of this section yet (turnout diagnose)'
-        when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc) then
+        when g.found_at_utc < coalesce(h.since_at_utc, h.raised_at_utc, h.visit_from_utc) then
             'no decision: the diagnosis of ' || coalesce(g.visit, strftime(g.found_at_utc, '%Y-%m-%d'))
             || ' is older than the change (turnout diagnose)'
         else
@@ -405,13 +406,13 @@ left join chart_status s
 left join maintenance m
     on m.turnout_id = h.turnout_id and m.sections = h.sections and m.band = h.band and m.source = h.source
         and m.state = h.state
-left join diagnosed g on g.turnout_id = h.turnout_id and g.label = split_part(h.section_id, '/', -1)
-left join changed c on c.turnout_id = h.turnout_id and c.label = split_part(h.sections, ', ', 1)
+left join diagnosed g on g.turnout_id = h.turnout_id and g.label = h.named
+left join changed c on c.turnout_id = h.turnout_id and c.label = h.named
 left join diagnosed_sleepers w
-    on w.turnout_id = h.turnout_id and w.label = split_part(h.sections, ', ', 1)
+    on w.turnout_id = h.turnout_id and w.label = h.named
         and w.found_at_utc >= coalesce(h.since_at_utc, h.raised_at_utc)
         and (h.band not in ('ballast', 'railpad') or w.is_softer = (h.direction = 'down'))
-left join sections p on p.section_id = h.section_id
+left join sections p on p.section_id = h.turnout_id || '/' || h.named
 left join turnouts t on t.turnout_id = h.turnout_id
 cross join fleet f
 window importance as (
