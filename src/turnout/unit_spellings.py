@@ -25,13 +25,13 @@ PREFIXES_OF_WORDS = {
 }  # fmt: skip
 SYMBOLS = {"newton": "N", "volt": "V", "pascal": "Pa"}
 PEAK = re.compile(r"(.*[^\W_]\)?|.*\d)[ _]?(?:0-)?\(?(?:0-)?(?:pk|peak)\)?")
-# The sign that a number multiplies, and a power of ten: "x10", "10^3", "x 10**-3".
-MULTIPLE = r"(?:[x*·] ?)?([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?:\^|\*\*)([+-]?\d{1,2}))?"
-LEADING_MULTIPLE = re.compile(rf"{MULTIPLE}[ x*·]*(.+)")
-TRAILING_POWER = re.compile(r"(.+?) ?[x*·] ?10(?:\^|\*\*)([+-]?\d{1,2})")
+# A power of ten or a number, with the sign that it multiplies: "10^3", "x 10**-3", "x10".
+POWER = r"10(?:\^|\*\*)([+-]?\d{1,2})"
+LEADING_MULTIPLE = re.compile(rf"(?:[x*·] ?)?(?:{POWER}|([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?))[ x*·]*(.+)")
+TRAILING_POWER = re.compile(rf"(.+?) ?[x*·] ?{POWER}")
 # Values over a stretch of time, of which none is a sample: a mean square, a mean, a swing from peak to peak.
 OF_A_STRETCH = re.compile(
-    r"(?i).*(?:[ _(]|(?<=[a-z2]))(?:rms|eff|pp|p-p|pk[-/ ]?pk|p(?:ea)?k[- ](?:to[- ])?p(?:ea)?k|ptp|mean|avg)\)?"
+    r"(?i)(.*)(?:[ _(]|(?<=[a-z2]))(?:rms|eff|pp|p-p|pk[-/ ]?pk|p(?:ea)?k[- ](?:to[- ])?p(?:ea)?k|ptp|mean|avg)\)?"
 )
 
 
@@ -108,7 +108,7 @@ def canonical_spelling(text: str) -> str:
     >>> [canonical_spelling(t) for t in ("mm s^-2", "um/s**2", "k N", "Kilonewtons", "g pk", "m/(s^2)", "ms2", "kg")]
     ['mm/s²', 'µm/s²', 'kN', 'kN', 'g', 'm/s²', 'ms2', 'kg']
     """
-    if (peak := PEAK.fullmatch(text)) and not is_of_a_stretch(text):
+    if (peak := PEAK.fullmatch(text)) and not unit_of_a_stretch(text):
         text = plain_unit(peak[1])
     if match := ACCELERATION.fullmatch(text):
         return f"{LENGTHS.get(match[1], match[1])}/s²"
@@ -117,24 +117,26 @@ def canonical_spelling(text: str) -> str:
     return PREFIX_APART.sub(r"\1", text)
 
 
-def is_of_a_stretch(unit: str) -> bool:
-    """Whether a unit says that its numbers are no samples: root mean squares, means, or swings from peak to peak.
+def unit_of_a_stretch(text: str) -> str:
+    """What stands before the mark of root mean squares, means, or swings from peak to peak.
 
     Parameters
     ----------
-    unit : str
-        Unit as it is written.
+    text : str
+        Unit in the form of ``plain_unit``.
 
     Returns
     -------
-    bool
+    str
+        "" for a text without such a mark. Any word may end as one: "supp".
 
     Examples
     --------
-    >>> [is_of_a_stretch(unit) for unit in ("g rms", "gRMS", "m/s² (pk-pk)", "mVpp", "g pk", "g", "kp")]
-    [True, True, True, True, False, False, False]
+    >>> [unit_of_a_stretch(t) for t in ("g rms", "gRMS", "m/s^2 (pk-pk)", "mVpp", "g pk", "supp")]
+    ['g', 'g', 'm/s^2', 'mV', '', 'su']
     """
-    return OF_A_STRETCH.fullmatch(plain_unit(unit)) is not None
+    match = OF_A_STRETCH.fullmatch(text)
+    return match[1].strip(" _(") if match else ""
 
 
 def factor_and_unit(text: str) -> tuple[float, str]:
@@ -156,7 +158,7 @@ def factor_and_unit(text: str) -> tuple[float, str]:
     ((0.5, 'mV'), (10.0, 'N'), (1000.0, 'N'), (1000.0, 'N'))
     """
     if match := LEADING_MULTIPLE.fullmatch(text):
-        return float(match[1]) ** int(match[2] or 1), match[3].strip()
+        return float(f"1e{match[1]}" if match[1] else match[2]), match[3].strip()
     if match := TRAILING_POWER.fullmatch(text):
-        return 10.0 ** int(match[2]), match[1].strip()
+        return float(f"1e{match[2]}"), match[1].strip()
     return 1.0, text

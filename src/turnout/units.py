@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from turnout.constants import KMH, STANDARD_GRAVITY
-from turnout.unit_spellings import canonical_spelling, factor_and_unit, is_of_a_stretch, plain_unit
+from turnout.unit_spellings import canonical_spelling, factor_and_unit, plain_unit, unit_of_a_stretch
 
 IGNORED = "ignored"  # quantity of a channel that is in the file and is not read
 
@@ -202,6 +202,28 @@ def _canonical_name(text: str) -> str | None:
     return _CANONICAL.get(text) or _CANONICAL.get(plain_unit(canonical_spelling(text)))
 
 
+def is_of_a_stretch(unit: str) -> bool:
+    """Whether a unit says that its numbers are no samples: root mean squares, means, or swings from peak to peak.
+
+    Parameters
+    ----------
+    unit : str
+        Unit as it is written.
+
+    Returns
+    -------
+    bool
+        False where no known unit stands before the mark.
+
+    Examples
+    --------
+    >>> [is_of_a_stretch(unit) for unit in ("g rms", "0.5 mVpp", "m/s² (pk-pk)", "g pk", "kp", "supp", "left mean")]
+    [True, True, True, False, False, False, False]
+    """
+    _, name = factor_and_unit(unit_of_a_stretch(in_latin(plain_unit(unit))))
+    return _canonical_name(name) is not None
+
+
 @lru_cache(maxsize=1024)
 def conversion(unit: str) -> Conversion:
     """Conversion of numbers in a unit to SI; a leading factor is the value of one step or of full scale.
@@ -235,7 +257,7 @@ def conversion(unit: str) -> Conversion:
     if name is None:
         factor, text = factor_and_unit(text)
         name = _canonical_name(text)
-    if name is None and is_of_a_stretch(text):
+    if name is None and is_of_a_stretch(unit):
         raise ValueError(
             f"the unit {unit!r} is not known: such values are taken over a stretch of time, and no samples"
         )

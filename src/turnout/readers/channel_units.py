@@ -13,8 +13,7 @@ from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
 from turnout.readers.stated_units import contradicting_unit, is_meaningless
 from turnout.records import RawChannel
-from turnout.unit_spellings import is_of_a_stretch
-from turnout.units import Conversion, conversion, to_si
+from turnout.units import Conversion, conversion, is_of_a_stretch, to_si
 
 FULL_SCALE_UNIT = re.compile(r"\s*[+-]?[\d.]")  # a unit with a number, as in "10 V"
 FIND_OUT = "Find out which is right; then set it in the layout"

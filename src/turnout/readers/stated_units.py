@@ -17,8 +17,8 @@ from turnout.readers.rate_units import RateUnit, rate_unit, words_of
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord
 from turnout.readers.texts import readings_together
 from turnout.readers.unit_names import conditions_of_unit, is_unit_name
-from turnout.unit_spellings import BRACKETS_IN_ASCII, is_of_a_stretch
-from turnout.units import Conversion, conversion
+from turnout.unit_spellings import BRACKETS_IN_ASCII
+from turnout.units import Conversion, conversion, is_of_a_stretch
 
 # Units of the same channel at another place of its measuring chain.
 CHAIN_WORDS = frozenset("raw sensor input electrical signal native adc hardware transducer description roh".split())

@@ -84,3 +84,20 @@ def test_brackets_of_any_kind_hold_the_unit_of_a_column(brackets, is_in_names, t
     rows = "".join(f"{f};{a}\n" for f, a in zip(FORCE, RAIL))
     (tmp_path / "a.csv").write_text(f"{head}\n{rows}", "utf-8")
     np.testing.assert_allclose(outcome(tmp_path, "a.csv", CHANNELS), [FORCE * 1e3, RAIL * G])
+
+
+@pytest.mark.parametrize("unit", ["0^-3 N", "1e99^99 N", "2^3 N", "10^-99^9 N", "0 N", "1e999 N", "0**-1 m/s²"])
+def test_a_multiple_that_is_no_power_of_ten_is_an_unknown_unit(unit):
+    with pytest.raises(ValueError, match="is not known"):
+        conversion(unit)
+
+
+@pytest.mark.parametrize("place", ["supp", "opp", "Klapp", "left mean", "links eff"])
+def test_a_place_in_the_name_of_a_channel_is_no_mark_of_root_mean_squares(place, tmp_path):
+    name = f"force {{{place}}}"
+    rows = "".join(f"{f};{a}\n" for f, a in zip(FORCE, RAIL))
+    (tmp_path / "a.csv").write_text(f"{name};rail\n{rows}", "utf-8")
+    channels = RawChannel("force", name, "force", "N"), IN_SI[1]
+    np.testing.assert_allclose(outcome(tmp_path, "a.csv", channels), [FORCE, RAIL])
+    with pytest.raises(ValueError, match="known are"):
+        conversion(place)
