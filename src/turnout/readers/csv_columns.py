@@ -175,6 +175,9 @@ def _are_units(cells: Sequence[str], share: float) -> bool:
     return sum(map(_is_unit, filled_cells)) >= share * len(filled_cells)
 
 
+NUMBER_BEFORE_UNIT = re.compile(r"[+-]?[.,]?\d")  # as of a length, "12 m", and of a range, "-10 V" or ".5 V"
+
+
 def _is_unit(cell: str) -> bool:
     """Whether a cell is a known unit, a meaningless one, or anything in brackets; "12 m" is a length."""
     bare = without_brackets(cell)
@@ -186,7 +189,7 @@ def _is_unit(cell: str) -> bool:
     ):
         return True
     try:
-        return not bare[0].isdigit() and bool(conversion(bare))
+        return not NUMBER_BEFORE_UNIT.match(bare) and bool(conversion(bare))
     except ValueError:
         return False
 
@@ -278,8 +281,8 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
         if (unit := _contradicting_unit(cell, other))
     }
     others = [line for i, line in enumerate(lines) if i not in (name_line, unit_line) and not any(map(is_number, line))]
-    for line in (line for line in others if len(line) > 1 and all(is_known(without_brackets(cell)) for cell in line)):
-        pairs_of_units = enumerate(zip(below, map(without_brackets, line)))
+    for line in (line for line in ([*map(without_brackets, line)] for line in others) if _are_units_alone(line)):
+        pairs_of_units = enumerate(zip(below, line))
         problems = {
             i: f"its lines of units say {b!r} and {a!r}" for i, (a, b) in pairs_of_units if _are_different(b, a)
         }
@@ -302,6 +305,11 @@ def _is_name_below(upper: str, lower: str) -> bool:
         return False
     unit = name_and_unit(lower)[1]
     return not upper or (bool(unit) and _is_unit_of_time_alone(unit))
+
+
+def _are_units_alone(cells: Sequence[str]) -> bool:
+    """Whether several cells are known units, without a number before them."""
+    return len(cells) > 1 and all(is_known(cell) and not NUMBER_BEFORE_UNIT.match(cell) for cell in cells)
 
 
 def _contradicting_unit(cell: str, unit: str) -> str:

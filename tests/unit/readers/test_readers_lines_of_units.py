@@ -87,3 +87,11 @@ def test_two_lines_of_units_that_differ_are_an_error(head, tmp_path):
         result = read_table(tmp_path, head, ";")
         raise result.errors[0]
     assert caught.value.reason in ("unit_unknown", "scale_unknown")
+
+
+@pytest.mark.parametrize("ranges", ["10 V;5 V", "5000 N;100 m/s²", "0.1 N;.01 m/s²", "-5 V;-5 V"])
+@pytest.mark.parametrize("head", ["{}\nForce;Rail\nkN;g\n", "Force;Rail\nkN;g\n{}\n"])
+def test_numbers_with_units_are_ranges_and_no_second_line_of_units(head, ranges, tmp_path):
+    result = read_table(tmp_path, head.format(ranges), ";", "")
+    assert len(result.recordings) == 1 and [error.reason for error in result.errors] in ([], ["entry_unknown"])
+    np.testing.assert_allclose(result.recordings[0].samples, [1e3 * FORCE, 9.80665 * RAIL])
