@@ -110,7 +110,7 @@ def channel_mappings(
         used = [c for i, c in zip(indices, channels) if c.quantity != IGNORED and _is_axis_by_form(record, i)]
         if used:
             problem += f", and its channel {used[0].source!r} rises in equal steps: it is a time or counts the samples"
-            remedy = f"Count this channel in the layout: 'source' of {used[0].name!r} is another one"
+            remedy = f"Correct 'source' of {used[0].name!r} in the layout; numbers of channels count this one, too"
         raise source.error(where, problem, remedy, reason="channel_unknown")
     if problem := exchanged_channels(record, indices, channels):
         raise source.error(where, problem, EXCHANGED_REMEDY, reason="unit_unknown")

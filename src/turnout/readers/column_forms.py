@@ -10,6 +10,7 @@ MIN_AXIS_SIZE = 8  # samples: fewer do not tell a time axis from a chance sequen
 MAX_JUMP_SHARE = 0.02  # gaps per step among the first samples: with more a column rises too unevenly for a time axis
 MAX_HEAD_DEVIATION = 1.0  # steps: rounding to printed digits moves a time by less
 MAX_STEP_DEVIATION = 0.5  # of a step of a clock: its last digit may be that of the floating-point number
+MAX_HOLD_DIFFERENCE = 2  # samples: a clock holds its values equally long, but for the rounding at both ends of each
 MIN_RAMP_SIZE = 64  # samples: a channel that rises in as many equal steps measures nothing
 
 
@@ -44,7 +45,7 @@ def _ends(column: Column) -> list[np.ndarray]:
 
 
 def rises_in_steps(column: Column) -> bool:
-    """Whether a column holds each value for some samples and rises in equal steps, as a clock of few digits does.
+    """Whether a column holds each value equally long and rises in equal steps, as a clock of few digits does.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def rises_in_steps(column: Column) -> bool:
 
     Examples
     --------
-    >>> rises_in_steps(np.arange(1000) // 20), rises_in_steps(np.minimum(np.arange(1000), 5))
+    >>> rises_in_steps(np.arange(1000) // 20), rises_in_steps(np.arange(1000) ** 2 // 20000)
     (True, False)
     """
     if len(column) < MIN_RAMP_SIZE or column.dtype.kind not in "fiu":
@@ -66,7 +67,7 @@ def rises_in_steps(column: Column) -> bool:
     for steps in map(np.diff, _ends(column)):
         rises = steps[steps != 0.0]
         is_even = len(rises) >= MIN_AXIS_SIZE and np.ptp(rises) <= MAX_STEP_DEVIATION * np.median(rises)
-        if len(rises) == len(steps) or not is_even:
+        if len(rises) == len(steps) or not is_even or np.ptp(np.diff(np.flatnonzero(steps))) > MAX_HOLD_DIFFERENCE:
             return False
     return True
 

@@ -55,7 +55,7 @@ def test_the_error_states_which_channel_is_the_time(kind, file_name, tmp_path):
     write(tmp_path / file_name, TIMES[kind])
     _, error = outcome(tmp_path / file_name, 0)
     if error.reason == "channel_unknown":
-        assert "its channel 0 rises in equal steps" in error.problem and "'source' of 'force'" in error.remedy
+        assert "its channel 0 rises in equal steps" in error.problem and "Correct 'source' of 'force'" in error.remedy
 
 
 @pytest.mark.parametrize("kind", ["seconds", "late", "ms", "index"])
@@ -64,3 +64,13 @@ def test_a_layout_that_counts_the_time_reads_the_channels(kind, tmp_path):
     recordings, error = outcome(tmp_path / "a.csv", 1)
     np.testing.assert_array_equal(recordings, [[FORCE, RAIL]])
     assert error is None
+
+
+@pytest.mark.parametrize("kind", ["parabola", "quarter of a sine", "root"])
+def test_a_slow_rise_of_a_force_in_coarse_steps_is_no_clock(kind, tmp_path):
+    x = np.arange(N) / N
+    rise = {"parabola": (0.2 + x) ** 2, "quarter of a sine": np.sin(1.4 * x), "root": 0.25 * np.sqrt(x)}[kind]
+    np.savez(tmp_path / "a.npz", force=np.floor(200.0 * rise), rail=RAIL)
+    sensors = RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²")
+    result = read("a.npz", tmp_path, RawDescription(sensors, rate=RATE))
+    assert not result.errors and len(result.recordings[0].samples) == 2
