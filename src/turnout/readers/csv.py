@@ -47,7 +47,7 @@ from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_outer_rows import outer_row_remarks
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns
-from turnout.readers.csv_words import entries_of_words, holds_words
+from turnout.readers.csv_words import check_valid, entries_of_words, holds_words
 from turnout.readers.entries import Entry
 from turnout.readers.label_lines import has_labels, with_joined_labels
 from turnout.readers.lazy import Column, LazyColumn
@@ -271,6 +271,8 @@ def _records(
         else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     )
     words = {names[i] or str(i): np.asarray(c[:]) for i, c in enumerate(columns) if holds_words(c)}
+    for name, column in words.items():
+        check_valid(name, column, source)
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
     n = len(spans)

@@ -18,7 +18,7 @@ OVERLOAD = re.compile(
 # What is beside an overload: how it is detected, and at which value.
 BESIDE_OVERLOAD = re.compile(
     r"detect|enabl|check|level|limit|thresh|schwell|mode|action|hold|time|margin|recover|type|protect|proof|capacity"
-    r"|factor|ratio|rating|%"
+    r"|factor|(?<!satu)ratio|rating|%"
 )
 # Words that are said of rails, ballast and wagons, too: beside them only channels are named, or their signals.
 AMBIGUOUS = re.compile(r"clipped|saturated|overloaded")

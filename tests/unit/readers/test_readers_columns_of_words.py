@@ -41,10 +41,29 @@ def test_a_column_of_words_is_no_channel(kind, order, mark, tmp_path):
     assert not errors
 
 
-@pytest.mark.parametrize("word", ["OVR", "Over", "CLIP", "Overload", "Overflow CH1", "OL"])
+@pytest.mark.parametrize(
+    "word",
+    [
+        "OVR", "Over", "CLIP", "Overload", "Overflow CH1", "OL", "saturated", "saturation", "Überlast", "SÄTTIGUNG",
+        "Dépassement", "overbelastet", "mætning",
+    ],
+)  # fmt: skip
 def test_an_overload_in_a_column_of_words_is_reported(word, tmp_path):
     _, errors = outcome(tmp_path, ["OK"] * 200 + [word] * 3 + ["OK"] * (N - 203), kind="hammer")
     assert any("overload" in str(error).lower() or word in str(error) for error in errors)
+
+
+def test_an_overload_behind_many_other_words_is_reported(tmp_path):
+    words = ["OK"] * 100 + [f"Event {k}" for k in range(12)] + ["OVR"] + ["OK"] * (N - 113)
+    _, errors = outcome(tmp_path, words)
+    assert any("OVR" in str(error) for error in errors)
+
+
+@pytest.mark.parametrize("first", ["OK", ""])
+@pytest.mark.parametrize("word", ["invalid", "Error", "ungültig", "FEHLER", "erreur", "fejl", "ugyldig"])
+def test_a_word_that_says_that_samples_are_invalid_is_an_error(word, first, tmp_path):
+    recordings, errors = outcome(tmp_path, [first] * 200 + [word] * 3 + [first] * (N - 203))
+    assert recordings == [] and repr(word) in str(errors[0]) and "State" in str(errors[0])
 
 
 @pytest.mark.parametrize(
