@@ -132,6 +132,7 @@ CASES = {
     "weak_and_contradicted": ([score(gain=23.0)], 0.9, {"consistent": False}),
     "reserved_not_predicted": ([score(gain=25.0)], 0.9, {"consistent": False}),
     "residual_has_structure": ([score()], 2.0, {"structure": 0.5, "residual_excess": 1.5}),
+    "leaves_force_at_its_position": ([score(gain=35.0)], 0.9, {"left_at_position": 41.0}),
     "value_without_meaning": ([score(size=-0.0034)], 2.0, {}),
     "single_source": ([score(single_source="day 2")], 2.0, {}),
     "condition_contradicts": ([score(worst=-9.0)], 2.0, {}),
@@ -154,6 +155,13 @@ def test_each_rule_on_an_effect_applies_to_a_case_of_its_own(name):
     (rule,) = (r for r in EFFECT_RULES if r.name == name)
     assert verdict.trail == (name,) and verdict.answer == rule.answer in ANSWERS and verdict.cause == rule.cause
     assert "{" not in verdict.reason and bool(verdict.reason) == bool(rule.reason)
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "answer"), [(35.0, 39.0, "named"), (45.0, 44.0, "named"), (45.0, 46.0, "unknown")]
+)
+def test_a_name_explains_more_than_it_leaves_at_its_position_or_leaves_no_more_than_intact_turnouts(gain, left, answer):
+    assert judge([score(gain=gain)], 0.9, MismatchSettings(), left_at_position=left).answer == answer
 
 
 def test_the_reason_states_the_figures_of_the_case():

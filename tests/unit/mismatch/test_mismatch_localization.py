@@ -1,5 +1,6 @@
 """Localization of a residual without a name: evidence for subspaces, quiet segments, and losses of the fit."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,14 @@ from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
 from turnout.mismatch.engine.fit_quality import is_significantly_worse
-from turnout.mismatch.engine.localization import Location, _credible_evidence, _location_of_candidate, locate
+from turnout.mismatch.engine.localization import (
+    Location,
+    _credible_evidence,
+    _location_of_candidate,
+    evidence_left_at,
+    locate,
+    location_of_left_force,
+)
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -163,6 +171,43 @@ def test_the_residual_at_one_position_outweighs_an_absorbing_value_by_evidence_o
     case = Places(rng.normal(size=(3, 150)) + 3.0 * np.outer(Places.seen[2], rng.normal(size=150)))
     absorbed = StrainedValue(Nuisance("value", "-", 0.0, 0.1, at=("train", "railcar")), 6.0, nats)
     assert locate(case, fit_jointly(case), absorbed=absorbed).frame == frame
+
+
+class Stretches(Places):
+    """With spaces of two neighbouring places."""
+
+    def residual_spaces(self, fit):
+        for space in super().residual_spaces(fit):
+            pairs = {
+                ("place", (x, x + 1.0)): np.concatenate(
+                    [space.combinations["place", x], space.combinations["place", x + 1.0]], axis=1
+                )
+                for x in (0.0, 1.0)
+            }
+            yield ResidualSpace(space.names, space.columns, {**space.combinations, **pairs})
+
+
+def test_a_name_leaves_the_force_that_is_strongest_at_its_position():
+    rng = np.random.default_rng(8)
+    case = Stretches(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(Places.seen[2], rng.normal(size=40)))
+    fit = fit_jointly(case)
+    strongest = next(w for w in weigh_spaces(case, fit, {"passage": 1.0}) if w.frame == "place")
+    assert strongest.level == (1.0, 2.0) or strongest.level == 2.0
+    left = evidence_left_at(case, fit, 2.0)
+    assert (left.level, left.nats) == (strongest.level, strongest.nats) and left.nats > 40.0
+    assert evidence_left_at(case, fit, 0.0) is None and evidence_left_at(case, fit, 2.1) is None
+    location = location_of_left_force(case, SimpleNamespace(fit=fit, candidate=SimpleNamespace(position=2.0)))
+    assert (location.frame, location.high) == ("place", 2.0)
+
+
+def test_recordings_like_intact_ones_and_fits_without_derivatives_leave_no_force():
+    rng = np.random.default_rng(8)
+    case = Stretches(0.05 * rng.normal(size=(3, 40)) + 0.4 * np.outer(Places.seen[2], rng.normal(size=40)))
+    case.control_level = {"passage": 1.0}
+    fit = fit_jointly(case)
+    left = evidence_left_at(case, fit, 2.0)
+    assert left is None or left.nats == 0.0
+    assert evidence_left_at(case, replace(fit, jacobian={}), 2.0) is None
 
 
 def test_an_effect_in_all_trains_is_not_located_in_one_train():

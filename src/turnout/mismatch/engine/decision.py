@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"
 COMPONENT_DIFFERS, COMPONENT_UNUSUAL = "component_differs_under_trains", "component_unlike_its_kind"
+LEAVES_FORCE = "leaves_force_at_its_position"
 LOCATED, ENDS = "decisions/residual-localization.md", "decisions/joint-fit-convergence.md"
 MISTAKES = "decisions/mistakes-in-campaigns.md"
 
@@ -88,6 +89,9 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
          "unknown",
          "beside {e.leader.in_words}, a force that depends freely on motion or load still explains {e.structure:.0%} "
          "of the residual", HOW),
+    Rule(LEAVES_FORCE, lambda e: e.left_at_position > max(THRESHOLDS.max_left_force, e.leader.gain), "unknown",
+         "with {e.leader.in_words}, the recordings still show a force there that it does not explain, with more "
+         "evidence than its own ({e.left_in_words})", LOCATED),
     Rule("value_without_meaning", lambda e: not e.leader.has_meaning, "unknown",
          "{e.leader.in_words} would have a value that is physically impossible", HOW),
     Rule("single_source", lambda e: e.leader.single_source, "unknown",

@@ -79,6 +79,8 @@ class EffectEvidence:
         Share of the residual of the best candidate that a free force law of the state still explains.
     residual_excess : float
         Weighted mean square of the residual of the best candidate over the control level.
+    left_at_position : float
+        Evidence that a force acts at the position of the best candidate, beside that candidate. [nats]
     disturbed : bool
         Another source than a train shakes the sensors in some recordings. These are not fitted.
     mismatched_trains : tuple of str
@@ -101,6 +103,7 @@ class EffectEvidence:
     consistent: bool = True
     structure: float = 0.0
     residual_excess: float = 1.0
+    left_at_position: float = 0.0
     disturbed: bool = False
     mismatched_trains: tuple[str, ...] = ()
     no_train_matches: bool = False
@@ -178,6 +181,11 @@ class EffectEvidence:
     def loss_in_words(self) -> str:
         """Loss of the condition that loses most by the leader."""
         return evidence_in_words(-self.leader.worst_gain)
+
+    @property
+    def left_in_words(self) -> str:
+        """The evidence ``left_at_position``."""
+        return evidence_in_words(self.left_at_position)
 
     @property
     def change_in_words(self) -> str:

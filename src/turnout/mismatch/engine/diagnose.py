@@ -15,6 +15,7 @@ from turnout.mismatch.engine.component_evidence import evidence_of_any_component
 from turnout.mismatch.engine.decision import (
     COMPONENT_DIFFERS,
     COMPONENT_UNUSUAL,
+    LEAVES_FORCE,
     NUMERICS_RULES,
     confirm,
     first_applicable,
@@ -26,7 +27,13 @@ from turnout.mismatch.engine.decision_facts import NumericalError
 from turnout.mismatch.engine.evidence import assess, excess_ratio, latent_force_of, worst_excess
 from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.free_laws import free_law_share
-from turnout.mismatch.engine.localization import Location, locate, locate_component, location_of_ambiguity
+from turnout.mismatch.engine.localization import (
+    Location,
+    locate,
+    locate_component,
+    location_of_ambiguity,
+    location_of_left_force,
+)
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.refit import score_candidates
 from turnout.mismatch.engine.reserved_error import error_of_fitted
@@ -308,6 +315,8 @@ def _locate_unknown(findings: Findings, verdict: Verdict) -> Location | None:
     if {COMPONENT_DIFFERS, COMPONENT_UNUSUAL} & set(verdict.trail):
         return locate_component(search.case, findings.base, threshold)
     leader = next((s for s in verdict.scores[:1] if s.gain > threshold), None)
+    if LEAVES_FORCE in verdict.trail and leader is not None:
+        return location_of_left_force(search.case, leader)
     leader = None if {"strained_value_remains", "local_change_remains"} & set(verdict.trail) else leader
     absorbed = strained_value(search.case, findings.base, threshold)
     return locate(search.case, findings.base, leader, verdict.cause, absorbed, threshold)

@@ -17,6 +17,7 @@ from turnout.mismatch.engine.decision import judge
 from turnout.mismatch.engine.decision_facts import is_contradicted, likeliest
 from turnout.mismatch.engine.fit_quality import is_significantly_worse, lost_evidence
 from turnout.mismatch.engine.latent_force import LatentForce, latent_law
+from turnout.mismatch.engine.localization import evidence_left_at
 from turnout.mismatch.engine.reserved_data import reserved_fit
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.strained_values import strained_value
@@ -250,6 +251,9 @@ def assess(search: Search, fit: Fit, scores: Sequence[Score]) -> tuple[Verdict, 
     if leader.gain > settings.threshold:
         consistent = predicts_reserved(search, fit, leader)
         structure = residual_structure(case, leader.fit)
+        if leader.candidate.position is not None:
+            left = evidence_left_at(case, leader.fit, leader.candidate.position)
+            facts["left_at_position"] = left.nats if left else 0.0
     verdict = judge(
         scores, excess, settings, consistent=consistent, structure=structure,
         residual_excess=excess_ratio(search, leader.fit), **facts,

@@ -149,6 +149,53 @@ def locate(
     return replace(_location_of_evidence(ranked), measured_range=case.measured_range)
 
 
+def evidence_left_at(case: Case, fit: Fit, position: float) -> SpaceEvidence | None:
+    """Evidence that a force acts at a position in the residual of a fit, if it is larger there than anywhere else.
+
+    The noise is at least that of intact recordings. An effect whose law is only similar to the true one leaves such a
+    force where it acts.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    position : float
+        [m]
+
+    Returns
+    -------
+    SpaceEvidence or None
+        Of the position or of a stretch around it. None without derivatives, or if another one has more evidence.
+    """
+    if not fit.jacobian:
+        return None
+    floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
+    strongest = next((w for w in weigh_spaces(case, fit, floor) if w.frame == "place"), None)
+    if strongest is None or not _ends(strongest.level)[0] <= position <= _ends(strongest.level)[1]:
+        return None
+    return strongest
+
+
+def location_of_left_force(case: Case, score: Score) -> Location | None:
+    """Location of the force that a rejected name leaves at its own position.
+
+    Parameters
+    ----------
+    case : Case
+    score : Score
+        Of the rejected name, which has a position.
+
+    Returns
+    -------
+    Location or None
+        None where ``evidence_left_at`` is None.
+    """
+    assert score.candidate.position is not None
+    left = evidence_left_at(case, score.fit, score.candidate.position)
+    return replace(_location_of_evidence([left]), measured_range=case.measured_range) if left else None
+
+
 def location_of_ambiguity(case: Case) -> Location | None:
     """Location of what the recordings show and cannot tell what it is.
 

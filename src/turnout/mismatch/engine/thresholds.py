@@ -52,6 +52,12 @@ class Thresholds:
     max_loss_share: float = threshold(
         0.2, "share of the gain", "a held-out condition that loses more, and half a threshold, contradicts it", FITS
     )
+    max_left_force: float = threshold(
+        40.0,
+        "nats",
+        "evidence for a force that any name may leave at its position: five of six intact turnouts leave less anywhere",
+        LOCATED,
+    )
     large_value_lead: float = threshold(
         3.0, "nats", "odds of 20 to 1 that a value lies far beyond its prior, beside the number of values", CALIBRATED
     )
