@@ -96,7 +96,7 @@ def with_squares(square, hammer):
     """A fit that leaves these mean squares in the raised channel and in impacts."""
     level, white = {"passage": 0.5, "hammer": hammer}, [np.full(100, np.sqrt(square))]
     psi, part = np.array([0.4]), lambda candidate: slice(0, 1)
-    return SimpleNamespace(level=level, white=white, candidates=(), psi=psi, psi_se=0.1 * psi, part=part)
+    return SimpleNamespace(level=level, white=white, candidates=(), psi=psi, psi_se=0.1 * psi, part=part, jacobian={})
 
 
 @pytest.mark.parametrize(("after", "answer", "grade"), [(4.0, "unknown", ""), (2.2, "named", "B"), (1.9, "named", "A")])

@@ -150,7 +150,10 @@ def test_queries_that_only_read_are_accepted(registry, sql):
 def test_a_csv_has_no_formula(registry, tmp_path):
     out = tmp_path / "out.csv"
     assert query(registry, "select name, line, -1.5 as n, '@x' as \"=y\" from turnouts", "--csv", str(out)) == 0
-    assert list(csv.reader(out.open())) == [["name", "line", "n", "'=y"], ["'=HYPERLINK(1)", "'-1+1", "-1.5", "'@x"]]
+    assert list(csv.reader(out.open(encoding="utf-8-sig"))) == [
+        ["name", "line", "n", "'=y"],
+        ["'=HYPERLINK(1)", "'-1+1", "-1.5", "'@x"],
+    ]
     stream = io.StringIO()
     _write(stream, ["name"], [("+x",), (-2.0,)])
     assert stream.getvalue() == "name\n'+x\n-2.0\n"

@@ -107,7 +107,7 @@ def test_query_prints_a_table_and_writes_csv(empty, tmp_path, capsys):
     assert capsys.readouterr().out.splitlines() == ["  a  b  c", "---  -  -", "1.5     x", "(1 row)"]
     target = tmp_path / "out.csv"
     assert main(["query", "from range(3) t(i)", "--csv", str(target), "--registry", str(empty)]) == 0
-    assert list(csv.reader(target.open())) == [["i"], ["0"], ["1"], ["2"]]
+    assert list(csv.reader(target.open(encoding="utf-8-sig"))) == [["i"], ["0"], ["1"], ["2"]]
     assert main(["query", "from range(100) t(i)", "--rows", "2", "--registry", str(empty)]) == 0
     assert capsys.readouterr().out.endswith("(2 of 100 rows)\n")
 
