@@ -11,6 +11,9 @@ from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.candidate import Candidate
 from turnout.mismatch.engine.case import Case
 from turnout.mismatch.engine.decision import calibrate, judge
+from turnout.mismatch.engine.diagnose import _locate_unknown
+from turnout.mismatch.engine.evidence import assess, score_of
+from turnout.mismatch.engine.findings import Findings
 from turnout.mismatch.engine.fit_quality import is_significantly_worse
 from turnout.mismatch.engine.localization import (
     Location,
@@ -25,6 +28,7 @@ from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.score import Score
+from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.space_evidence import (
     AMPLITUDES,
     NOISE_FACTORS,
@@ -35,6 +39,7 @@ from turnout.mismatch.engine.space_evidence import (
 from turnout.mismatch.engine.strained_values import StrainedValue
 from turnout.mismatch.turnout import disturbances
 from turnout.mismatch.turnout.priors import DISTURBANCE
+from turnout.physics import Parameter
 from turnout.stages.mismatch_text import title
 
 N, K = 60, 6
@@ -198,6 +203,40 @@ def test_a_name_leaves_the_force_that_is_strongest_at_its_position():
     assert evidence_left_at(case, fit, 0.0) is None and evidence_left_at(case, fit, 2.1) is None
     location = location_of_left_force(case, SimpleNamespace(fit=fit, candidate=SimpleNamespace(position=2.0)))
     assert (location.frame, location.high) == ("place", 2.0)
+
+
+class PartlyNamed(Bursts):
+    """The candidate at place 2 is the force there during its first samples alone."""
+
+    def __init__(self, n_named):
+        samples = np.arange(400)
+        burst = 9.0 * np.sin(1.0 + samples) * (samples < 5)
+        rng = np.random.default_rng(8)
+        super().__init__(0.2 * rng.normal(size=(3, 400)) + np.outer(Places.seen[2], burst))
+        self.control_level, self.place_level = {"passage": 1.0}, 200.0
+        self.shape = np.outer(Places.seen[2], burst * (samples < n_named)).ravel()
+        size = (Parameter("size", "-", 0.0, (-9.0, 9.0), "", "made up 2026"),)
+        self.candidates = (Candidate.of("local_pad", size, dict, ((0.5,),), {"place": 2.0}),)
+
+    def predict(self, values, terms, observations):
+        return [sum((term["size"] * self.shape for term in terms), np.zeros(1200))]
+
+
+@pytest.mark.parametrize(("n_named", "answer"), [(1, "unknown"), (5, "named")])
+def test_a_name_that_explains_less_than_it_leaves_at_its_position_is_located_and_not_named(n_named, answer):
+    """Before and after, the residual is that of intact recordings, and each name has more than 12 nats.
+
+    What is left has less evidence than a residual without any name needs for a position.
+    """
+    case = PartlyNamed(n_named)
+    search, (candidate,) = Search(case), case.candidates
+    base, refit = fit_jointly(case), fit_jointly(case, (candidate,), [0.5])
+    score = score_of(search, base, refit, candidate)
+    assert base.level["passage"] < 1.0 and score.gain > search.settings.threshold
+    verdict, _ = assess(search, base, [score])
+    assert verdict.answer == answer
+    location = _locate_unknown(Findings(search, base, base, (verdict,)), verdict)
+    assert (location and location.place) == (2.0 if answer == "unknown" else None)
 
 
 def test_recordings_like_intact_ones_and_fits_without_derivatives_leave_no_force():
