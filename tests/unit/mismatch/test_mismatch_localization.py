@@ -196,7 +196,9 @@ def test_a_name_leaves_the_force_that_is_strongest_at_its_position():
     rng = np.random.default_rng(8)
     case = Stretches(0.5 * rng.normal(size=(3, 40)) + 4.0 * np.outer(Places.seen[2], rng.normal(size=40)))
     fit = fit_jointly(case)
-    strongest = next(w for w in weigh_spaces(case, fit, {"passage": 1.0}) if w.frame == "place")
+    of_places = [w for w in weigh_spaces(case, fit, {"passage": 1.0}) if w.frame == "place"]
+    assert weigh_spaces(case, fit, {"passage": 1.0}, "place") == of_places
+    strongest = of_places[0]
     assert strongest.level == (1.0, 2.0) or strongest.level == 2.0
     left = evidence_left_at(case, fit, 2.0)
     assert (left.level, left.nats) == (strongest.level, strongest.nats) and left.nats > 40.0

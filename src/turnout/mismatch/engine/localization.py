@@ -171,7 +171,7 @@ def evidence_left_at(case: Case, fit: Fit, position: float) -> SpaceEvidence | N
     if not fit.jacobian:
         return None
     floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
-    strongest = next((w for w in weigh_spaces(case, fit, floor) if w.frame == "place"), None)
+    strongest = next(iter(weigh_spaces(case, fit, floor, "place")), None)
     if strongest is None or not _ends(strongest.level)[0] <= position <= _ends(strongest.level)[1]:
         return None
     return strongest

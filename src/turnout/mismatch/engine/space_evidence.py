@@ -11,7 +11,7 @@ eigenvalues of :math:`B^T C^{-1} B`, with ν and a at their best values, ν not 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,7 +82,7 @@ def subspace_evidence(gram: np.ndarray, inner: np.ndarray, square: float, n: int
     return max(0.0, float(log_likelihood.max() - log_likelihood[0].max()))
 
 
-def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[SpaceEvidence]:
+def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float], frame: str = "") -> list[SpaceEvidence]:
     """Evidence for each level of each frame, for the residual of a fit.
 
     Columns are whitened. The nuisances are projected out of them under their priors, as they are out of the residual.
@@ -94,6 +94,8 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[Space
         With its Jacobian.
     floor : mapping
         Data type -> least mean square of the noise.
+    frame : str
+        The only frame whose levels are weighed; "" for all.
 
     Returns
     -------
@@ -107,6 +109,10 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float]) -> list[Space
         n_samples += o.data.size
     by_level: dict[tuple[str, Any], dict[str, dict[str, float]]] = {}
     for space in case.residual_spaces(fit):
+        if frame:
+            space = replace(space, combinations={k: c for k, c in space.combinations.items() if k[0] == frame})
+        if not space.combinations:
+            continue
         members = [(case.observations[offsets[name][0]], offsets[name][1]) for name in space.names]
         first_member = members[0][0]
         products = marginal.products(space.columns, members)
