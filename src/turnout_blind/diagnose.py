@@ -7,13 +7,14 @@ import os
 import shlex
 import shutil
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import turnout
 from turnout_blind.isolation import HiddenFolders
-from turnout_blind.limited_process import run, with_cpu_limit
+from turnout_blind.limited_process import POLL_INTERVAL, end_running, run, with_cpu_limit
 from turnout_blind.seal import BlindError, check_seals, digest, digest_of_folder, read_commit
 
 if TYPE_CHECKING:
@@ -123,8 +124,11 @@ def diagnose_set(
                     diagnosis["cases"][jobs[job]] = job.result()
                     report(f"{jobs[job]}: {diagnosis['cases'][jobs[job]]['said']}")
                     _write_record(record_path, diagnosis)
-            except KeyboardInterrupt:
-                pool.shutdown(cancel_futures=True)
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                while not all(job.done() for job in jobs):  # one may have started its process since the last time
+                    end_running()
+                    time.sleep(POLL_INTERVAL)
                 raise
     _write_record(record_path, diagnosis)
     if digest_of_folder(tool) != tool_sha256:

@@ -19,6 +19,9 @@ POLL_INTERVAL = 0.2  # interval at which a running process is polled [s]
 MAX_LINE_LENGTH = 300  # length to which the last line of output is cut [characters]
 
 
+_running: set[int] = set()
+
+
 @dataclass(frozen=True)
 class ProcessResult:
     """Exit ``code`` (negative: a signal), output ``out`` and ``err``, ``cpu`` and ``wall`` [s].
@@ -87,12 +90,15 @@ def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: floa
     start = time.monotonic()
     with open(logs / "out.txt", "wb") as out, open(logs / "err.txt", "wb") as err:
         process = subprocess.Popen(command, stdout=out, stderr=err, cwd=folder, start_new_session=True)
+        _running.add(process.pid)
         try:
             status, usage, timed_out = _wait_until(process.pid, start + wall)
         except BaseException:  # interrupted: leave no process running
             _kill(process.pid)
             os.wait4(process.pid, 0)
             raise
+        finally:
+            _running.discard(process.pid)
     process.returncode = code = os.waitstatus_to_exitcode(status)
     cpu_time = usage.ru_utime + usage.ru_stime
     stop_reason = f"no answer within {wall:.0f} s of the clock" if timed_out else ""
@@ -101,6 +107,12 @@ def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: floa
         stop_reason = f"no answer within {cpu:.0f} s of the processor"
     texts = [(logs / name).read_text(encoding="utf-8", errors="replace") for name in ("out.txt", "err.txt")]
     return ProcessResult(code, texts[0], texts[1], cpu_time, time.monotonic() - start, stop_reason)
+
+
+def end_running() -> None:
+    """Kill every process that ``run`` waits for in a thread of this process, with its children."""
+    for pid in list(_running):
+        _kill(pid)
 
 
 def _wait_until(pid: int, deadline: float) -> tuple[int, Any, bool]:

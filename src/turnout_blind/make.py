@@ -7,11 +7,12 @@ import os
 import platform
 import secrets
 import shutil
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import turnout
+from turnout.child_processes import ProcessPool
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.history import HistoryPlan, make_history, plan_histories
@@ -98,7 +99,7 @@ def make_set(
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
     ]
     pending = [job for job in jobs if not _is_made(job)]
-    with ProcessPoolExecutor(workers) as pool:
+    with ProcessPool(workers) as pool:
         futures = [pool.submit(_make, job) for job in pending]
         for future in (progress or (lambda finished, total: finished))(as_completed(futures), len(futures)):
             future.result()

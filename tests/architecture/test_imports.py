@@ -11,6 +11,7 @@ from syntax_trees import tree_of
 
 BASE = {
     "arrow_memory",
+    "child_processes",
     "constants",
     "content",
     "counts",
@@ -31,6 +32,7 @@ COMPILED = {"kernel_cache"}
 PARTS = {"hammer_test", "modal", "passage", "simulate"}
 ALLOWED = {
     "arrow_memory": set(),
+    "child_processes": set(),
     "constants": set(),
     "content": set(),
     "counts": set(),

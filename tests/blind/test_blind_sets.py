@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
@@ -47,7 +48,7 @@ def small_set(tmp_path_factory):
     seed = 57  # whose first two cases in shuffled order are a control and a single
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("turnout_blind.campaign.stage", with_two_passages)
-        patch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)  # which has what is patched
+        patch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)  # which has what is patched
         make_set(out, truth, seed, only={"pad"}, limit=2)
     return out, truth
 
@@ -198,6 +199,26 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
+def test_an_interrupt_ends_the_case_in_progress_and_the_next_run_continues(copy, tmp_path):
+    out, truth = copy
+    begun, tool = tmp_path / "begun", tmp_path / "tool.py"
+    tool.write_text(f"import os, time; open({str(begun)!r}, 'w').write(str(os.getpid())); time.sleep(3600)")
+
+    def interrupted(jobs, total):
+        while not begun.exists() or not begun.read_text():
+            time.sleep(0.05)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_set(out, truth, f"{{python}} {tool}", report=lambda line: None, progress=interrupted)
+    assert not list((out / "copies").glob("*"))
+    begun.write_text("")
+    tool.write_text("raise SystemExit(3)")
+    held = diagnose_set(out, truth, f"{{python}} {tool}", report=lambda line: None)
+    assert not begun.read_text() and {run["status"] for run in held["cases"].values()} == {"failed"}
+
+
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_rows_are_read_from_the_output_of_the_tool(copy, tmp_path):
     """It prints notes and then its row in the folder of the case. Other output is a failure and is stored."""
     out, truth = copy
@@ -274,7 +295,7 @@ def test_an_interrupted_generation_of_a_set_continues(small_set, tmp_path, monke
         make_set(out, truth, 20, only={"pad"}, limit=2)
     made_again = []
     monkeypatch.setattr("turnout_blind.make._make", lambda job: made_again.append(job[2]))
-    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)
     (truth / f"{lost.name}.json").write_text("{}")
     shutil.rmtree(lost)
     with pytest.raises(BlindError, match="a set is there already"):

@@ -10,9 +10,7 @@ import logging
 import math
 import os
 import re
-import signal
 import sys
-import threading
 import time
 import traceback
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
@@ -23,6 +21,7 @@ from io import StringIO
 from typing import TYPE_CHECKING
 
 from turnout import __version__
+from turnout.child_processes import signals_interrupt
 from turnout.cli import COMMANDS, GROUPS
 from turnout.cli.options import DEFAULT_REGISTRY, add_common, leaf_parsers
 from turnout.errors import TurnoutError, installation_error, remedy_of_access
@@ -30,7 +29,6 @@ from turnout.threads import use_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from types import FrameType
     from typing import Any
 
 # Exit codes. `turnout nightly` also ends with that of Snakemake, and with 124 at its limit of time.
@@ -42,7 +40,7 @@ exit codes:
   2    not done: the command line, an input or a file is wrong; the message says what to do
   3    not done: a fault of the program
   124  nightly: ended at the limit of time
-  130  interrupted"""
+  130  interrupted by Ctrl-C (129: by the end of the terminal, 143: by SIGTERM)"""
 COLLECTION_THRESHOLD = 50_000  # new containers between searches for cycles; Python's 700 cost 1 % of a diagnosis
 COMMON_DEFAULTS = {
     "json": False,
@@ -198,7 +196,7 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
     """Exit code of a command and the message of its error, "" without one."""
     interrupts: list[int] = []
     try:
-        with _noted_interrupts(interrupts):
+        with signals_interrupt(interrupts):
             code = args.run(args) or (PROBLEM_FOUND if args.nothing_used else DONE)
             _flush_output()
         return code, ""
@@ -206,7 +204,7 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
         _discard_output()
         return DONE, ""
     except KeyboardInterrupt:
-        return INTERRUPTED, "interrupted"
+        return _code_of(interrupts), "interrupted"
     except (TurnoutError, OSError) as error:
         if args.verbose:
             traceback.print_exc()
@@ -218,7 +216,7 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
         return NOT_FOLLOWED, message
     except Exception as error:
         if interrupts:  # a library that turned the interrupt into an exception of its own
-            return INTERRUPTED, "interrupted"
+            return _code_of(interrupts), "interrupted"
         if isinstance(error.__context__, OSError) and error.__context__.errno == errno.ELOOP:  # of Path.resolve
             return NOT_FOLLOWED, _message(error.__context__, args)
         if absent := installation_error(error):
@@ -230,6 +228,11 @@ def _run(args: argparse.Namespace) -> tuple[int, str]:
         return PROGRAM_FAULT, f"a fault of the program, {fault}. Please report it with the lines above"
 
 
+def _code_of(interrupts: Sequence[int]) -> int:
+    """Exit code of a command that the first of these signals has ended."""
+    return 128 + interrupts[0] if interrupts else INTERRUPTED
+
+
 def _damage_of_registry(error: Exception, args: argparse.Namespace) -> str:
     """Message for an error of DuckDB about a file of the registry; "" for any other error."""
     if "duckdb" not in sys.modules:
@@ -237,25 +240,6 @@ def _damage_of_registry(error: Exception, args: argparse.Namespace) -> str:
     from turnout.registry.damage import damage_message
 
     return damage_message(error, getattr(args, "registry", None) or DEFAULT_REGISTRY)
-
-
-@contextmanager
-def _noted_interrupts(numbers: list[int]) -> Iterator[None]:
-    """Add each SIGINT to ``numbers`` and raise KeyboardInterrupt, as without this context."""
-
-    def note(number: int, frame: FrameType | None) -> None:
-        numbers.append(number)
-        raise KeyboardInterrupt
-
-    before = signal.getsignal(signal.SIGINT)
-    is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
-    if is_ours:
-        signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        if is_ours:
-            signal.signal(signal.SIGINT, before)
 
 
 def _flush_output() -> None:

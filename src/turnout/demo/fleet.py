@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from datetime import datetime, time
 from pathlib import Path
@@ -17,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 import turnout.demo.scenario as faults
+from turnout.child_processes import ProcessPool
 from turnout.config import load_configuration
 from turnout.demo.hammer import hammer_test, response_at
 from turnout.demo.passages import make_passage, make_passages
@@ -105,7 +104,7 @@ def make_fleet(
             else:
                 trains += make_passages(raw, scenario, layout, seed, n_passage, days[-1])
     runs = [job for scenario, positions in weekly.items() for job in weekly_jobs(scenario, positions, days[-1], n_week)]
-    with ProcessPoolExecutor(workers or os.cpu_count()) as pool:
+    with ProcessPool(workers) as pool:
         counts = pool.map(_make_tests, jobs, chunksize=4)
         total = sum(tqdm(counts, total=len(jobs), desc="hammer tests", unit="section", disable=not progress))
         results = pool.map(make_passage, trains)

@@ -7,6 +7,7 @@ import subprocess
 import time
 from typing import TYPE_CHECKING
 
+from turnout.child_processes import process_group
 from turnout.workflow.project import snakemake_environment
 
 if TYPE_CHECKING:
@@ -81,21 +82,21 @@ def run_with_progress(command: Sequence[str], log: Path, say: Callable[[str], ob
     """
     log.parent.mkdir(parents=True, exist_ok=True)
     with open(log, "w", encoding="utf-8") as stream:
-        process = subprocess.Popen(
+        lines = []
+        with process_group(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, encoding="utf-8", errors="replace",
             env=snakemake_environment(),
-        )  # fmt: skip
-        lines = []
+        ) as process:  # fmt: skip
 
-        def log_lines() -> Iterable[str]:
-            for line in process.stdout or ():
-                stream.write(line)
-                lines.append(line.rstrip("\n"))
-                yield lines[-1]
+            def log_lines() -> Iterable[str]:
+                for line in process.stdout or ():
+                    stream.write(line)
+                    lines.append(line.rstrip("\n"))
+                    yield lines[-1]
 
-        for text in stage_lines(log_lines()):
-            say(f"   {text}")
-    code = process.wait()
+            for text in stage_lines(log_lines()):
+                say(f"   {text}")
+            code = process.wait()
     if code:
         say("\n".join(["   the run failed; its last lines:", *(f"      {line}" for line in lines[-12:])]))
         say(f"   All of its output: {log}")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
 from typing import TYPE_CHECKING
 
+from turnout.child_processes import ProcessPool
 from turnout.errors import RegistryError
 from turnout.registry.connection import limit_memory
 from turnout.registry.database import open_registry
@@ -81,7 +80,7 @@ def _in_processes(
     Every process opens its own connection, because DuckDB connections cannot be forked.
     """
     names = list(content)
-    with ProcessPoolExecutor(threads, multiprocessing.get_context("spawn")) as pool:
+    with ProcessPool(threads, "spawn") as pool:
         shares = [{t: content[t] for t in names[k : k + AT_ONCE]} for k in range(0, len(names), AT_ONCE)]
         for future in [pool.submit(_write_share, registry, pages, share, generation, day) for share in shares]:
             future.result()

@@ -15,6 +15,7 @@ from types import FrameType
 
 from filelock import FileLock, Timeout
 
+from turnout.child_processes import process_group
 from turnout.counts import count_of, first_texts
 from turnout.errors import TurnoutError
 from turnout.files import changed_at
@@ -239,34 +240,15 @@ def _run(options: Sequence[str], limit: float | None, work: Path, quiet: bool = 
 
 def _snakemake(options: Sequence[str], limit: float | None, quiet: bool = False) -> int:
     """Exit code of Snakemake, run in its own process group so that the limit or a signal ends its jobs, too."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options],
-        start_new_session=True,
-        env=snakemake_environment(),
-        stdout=subprocess.DEVNULL if quiet else None,  # what the jobs print is progress, too
-        stderr=subprocess.DEVNULL if quiet else None,
-    )
-    try:
-        return process.wait(limit)
-    except subprocess.TimeoutExpired:
-        _end(process)
-        return EXIT_TIME_LIMIT
-    except BaseException:
-        _end(process)
-        raise
-
-
-def _end(process: subprocess.Popen) -> None:
-    """End a process and its group: SIGTERM first, SIGKILL after a minute or at another interrupt."""
-    try:
-        os.killpg(process.pid, signal.SIGTERM)
-        process.wait(60)
-    except (subprocess.TimeoutExpired, ProcessLookupError):
-        pass
-    finally:
-        with suppress(ProcessLookupError):  # Snakemake and all its jobs have ended
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    with suppress(subprocess.TimeoutExpired):
+        with process_group(
+            [sys.executable, "-m", "snakemake", *snakefile_options(Path()), *options],
+            env=snakemake_environment(),
+            stdout=subprocess.DEVNULL if quiet else None,  # what the jobs print is progress, too
+            stderr=subprocess.DEVNULL if quiet else None,
+        ) as process:
+            return process.wait(limit)
+    return EXIT_TIME_LIMIT
 
 
 def _batches(work: Path) -> set[tuple[Path, str]]:

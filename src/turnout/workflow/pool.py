@@ -5,14 +5,14 @@ The processes end with their parent, because nothing would use their results.
 
 import gc
 import multiprocessing
-import os
-import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
+
+from turnout.child_processes import end_with_parent
 
 _CALL: Callable | None = None
 
@@ -101,20 +101,7 @@ def _run_until_death(tasks: Sequence, threads: int, lost: list) -> Iterator:
 def _begin() -> None:
     """Keep inherited objects: a database connection that is closed without the threads of its parent crashes."""
     gc.freeze()
-    _end_with_parent()
-
-
-def _end_with_parent() -> None:
-    """End this process with its parent; otherwise it would wait for tasks for ever and keep its memory."""
-
-    parent = multiprocessing.parent_process()
-    assert parent is not None, "it is called in the processes of a pool"
-
-    def watch(join: Callable[[], None] = parent.join) -> None:
-        join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    end_with_parent()
 
 
 def _submit(pool: ProcessPoolExecutor, task: Any) -> Future:

@@ -3,6 +3,7 @@
 import argparse
 import json
 import re
+import signal
 import subprocess
 import sys
 from collections import defaultdict
@@ -228,6 +229,22 @@ def test_an_interrupt_that_a_library_converts_is_not_reported_as_a_fault_of_the_
     code += "from turnout.cli.main import main; sys.exit(main(['plan']))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (130, "turnout plan: interrupted\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_open_contexts_in_order_and_its_number_is_in_the_exit_code(tmp_path, number):
+    """So an unfinished file of any command is removed."""
+    code = (
+        "import os, signal, sys, time, turnout.cli.plan as command\n"
+        "from turnout.files import write_atomic\n"
+        "signal.signal(2, signal.default_int_handler)\n"
+        f"def slow(stream):\n    os.kill(os.getpid(), {int(number)}); time.sleep(5)\n"
+        f"command.run = lambda args: write_atomic({str(tmp_path / 'page.html')!r}, slow)\n"
+        "from turnout.cli.main import main; sys.exit(main(['plan']))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (128 + number, "turnout plan: interrupted\n")
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_interrupt_before_the_command_begins_is_not_reported_as_a_fault_of_the_program(monkeypatch, capsys):
