@@ -159,6 +159,8 @@ def output_problem(path: os.PathLike | str) -> tuple[str, str] | None:
     above = next(p for p in path.absolute().parents if os.path.lexists(p))
     if not above.is_dir():
         return f"{above} is a file, not a folder", "Write the name of a file in a folder"
+    if os.statvfs(above).f_flag & os.ST_RDONLY:
+        return f"the disk of {above} is mounted for reading", "Mount it for writing, or write a file in another folder"
     if not os.access(above, os.W_OK | os.X_OK):
         return f"no permission to write in {above}", "Correct its permissions, or write a file in another folder"
     return None
@@ -177,8 +179,22 @@ def _unfinished_file(path: Path, temporary: Path) -> Iterator[Path]:
             error.filename = str(path)  # nobody knows the temporary name
         raise
     finally:
-        with suppress(OSError):  # on a read-only disk it fails even without such a file
-            temporary.unlink(missing_ok=True)
+        remove_unfinished(temporary)
+
+
+def remove_unfinished(*paths: Path) -> None:
+    """Delete temporary files, where they are and can be: on a read-only disk this fails even without such a file.
+
+    An error of it would take the place of that which ended the writing.
+
+    Parameters
+    ----------
+    *paths : Path
+        Temporary files.
+    """
+    for path in paths:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def publish_file(unfinished: Path, final: Path) -> None:

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.files import write_atomic
 from turnout_blind.campaign import stage
 from turnout_blind.effect import load_effects
 from turnout_blind.reveal import read_findings
@@ -58,9 +59,8 @@ def write_archive(out: str | Path, folder: str | Path, truth: str | Path | None 
         "rows": rows,
         "diagnosis": diagnosis,
     }
-    folder.mkdir(parents=True, exist_ok=True)
     data = json.dumps(content, sort_keys=True, separators=(",", ":")).encode()
-    (folder / ARCHIVE_NAME).write_bytes(gzip.compress(data, 9, mtime=0))
+    write_atomic(folder / ARCHIVE_NAME, lambda stream: stream.write(gzip.compress(data, 9, mtime=0)))
     return folder / ARCHIVE_NAME
 
 

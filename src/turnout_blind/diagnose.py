@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import shutil
 import sys
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import turnout
+from turnout.files import write_text
 from turnout_blind.isolation import HiddenFolders
 from turnout_blind.limited_process import POLL_INTERVAL, end_running, run, with_cpu_limit
 from turnout_blind.seal import BlindError, check_seals, digest, digest_of_folder, read_commit
@@ -141,10 +141,7 @@ def _is_pending(run: Mapping[str, Any] | None, again: bool) -> bool:
 
 
 def _write_record(path: Path, diagnosis: Mapping[str, Any]) -> None:
-    """Replace the file at once: an interrupted write leaves the former file."""
-    temporary = path.with_suffix(".part")
-    temporary.write_text(json.dumps(diagnosis, indent=1, sort_keys=True) + "\n")
-    os.replace(temporary, path)
+    write_text(path, json.dumps(diagnosis, indent=1, sort_keys=True) + "\n")
 
 
 def _generator_folders() -> list[Path]:
@@ -200,7 +197,7 @@ def _diagnose_case(
         ok = printed is not None
         message = message if ok else f"printed no rows; {message}"
         if ok:
-            rows_path.write_text(json.dumps(printed, indent=1) + "\n")
+            write_text(rows_path, json.dumps(printed, indent=1) + "\n")
     ok = ok and _holds_rows(rows_path)
     status = "answered" if ok else "over budget" if process.stop_reason else "failed"
     return _run_record(status, process.code, process.cpu, process.wall, message, rows_path if ok else None)

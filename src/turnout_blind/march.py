@@ -10,6 +10,7 @@ All compiled parts are in this file: numba compiles ``march`` again only if the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar, cast
 
 import numba
@@ -44,7 +45,15 @@ def compile_part(fastmath: bool = False, for_python: bool = False) -> Callable[[
         The decorator.
     """
     options: dict[str, Any] = {"_nrt": False, "no_cpython_wrapper": not for_python, "no_cfunc_wrapper": True}
-    return cast("Callable[[Function], Function]", numba.njit(cache=True, fastmath=fastmath, **options))
+    return cast("Callable[[Function], Function]", partial(_compile, fastmath=fastmath, **options))
+
+
+def _compile(function: Callable, **options: Any) -> Any:
+    """The compiled function; without a folder that can be written, every process compiles it again."""
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # "no locator available": neither beside the source nor in the home folder
+        return numba.njit(**options)(function)
 
 
 def _value_at(value: Any, i: int) -> Any:
@@ -410,7 +419,7 @@ def _car_step(
         b[i] += dt * bv[i]
 
 
-@numba.njit(cache=True)
+@_compile
 def march(
     n_step: int,
     dt: float,

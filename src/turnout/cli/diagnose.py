@@ -29,6 +29,7 @@ from turnout.cli.options import (
     add_turnout,
     add_use,
     add_work,
+    check_work_folder,
 )
 from turnout.counts import count_of
 
@@ -101,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
     results = Results(args.work, args.turnout, args.registry)
     if args.accept:
         return _accept(args, results)
+    check_work_folder(args)
     from turnout.stages.budget import BudgetSpentError
 
     try:

@@ -159,6 +159,28 @@ def check_output_files(args: argparse.Namespace, *options: str) -> None:
             raise ConfigError(path, option, *problem)
 
 
+def check_work_folder(args: argparse.Namespace) -> None:
+    """Check ``--work`` before anything is computed that is to be stored there.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Options of the command.
+
+    Raises
+    ------
+    ConfigError
+        Nothing can be written in it: it is a file, its disk is mounted for reading, or the permission is missing.
+    """
+    from pathlib import Path
+
+    from turnout.errors import ConfigError
+    from turnout.files import output_problem
+
+    if problem := output_problem(Path(args.work) / "stored"):
+        raise ConfigError(args.work, "--work", problem[0], "Correct this, or name another folder")
+
+
 def add_track(parser: argparse.ArgumentParser, help: str = TRACK_HELP, default: str | None = None) -> None:
     """Add ``--track``, the track file.
 

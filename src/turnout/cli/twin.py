@@ -13,7 +13,16 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_result, add_track, add_turnout, add_warnings, add_work
+from turnout.cli.options import (
+    add_configuration,
+    add_raw,
+    add_result,
+    add_track,
+    add_turnout,
+    add_warnings,
+    add_work,
+    check_work_folder,
+)
 from turnout.counts import count_of
 from turnout.number_text import evidence_in_words
 
@@ -63,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.calibrated_model import answer_rows, calibrate_turnout
     from turnout.stages.track_files import improbable_entries
 
+    check_work_folder(args)
     turnout = load_configuration(args.configuration).turnout(args.turnout)
     add_warnings(args, improbable_entries(turnout, args.track))
     model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)

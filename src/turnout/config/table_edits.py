@@ -13,7 +13,7 @@ from turnout.config.csv_table import TableError, header_of, rows_of
 from turnout.config.document import Place
 from turnout.config.turnouts_table import NO_PROJECT, separator_problem, titles_of
 from turnout.errors import ConfigError, ConfigErrors
-from turnout.files import temporary_path, write_atomic
+from turnout.files import remove_unfinished, temporary_path, write_atomic
 from turnout.locks import folder_lock
 
 CONFIGURATION = "the configuration"
@@ -59,7 +59,7 @@ def added_row(path: Path, values: Mapping[str, str], columns: tuple[str, ...]) -
             with _errors_of_new_row(path, content):
                 yield {path.name: trial}
         finally:
-            trial.unlink(missing_ok=True)
+            remove_unfinished(trial)
         _write(path.resolve(), content, path)
 
 

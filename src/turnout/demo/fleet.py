@@ -23,6 +23,7 @@ from turnout.demo.progress import run_with_progress
 from turnout.demo.scenario import FLEET, SECTIONS, campaign_days, gap_under, rail_temperature, stiffness_factors
 from turnout.demo.track_state import unloaded_track_on
 from turnout.demo.weekly_trains import N_WEEK, simulate_run, weekly_jobs, write_weekly_trains
+from turnout.files import whole_file, write_text
 from turnout.readers.writing import write
 from turnout.workflow.project import snakefile_options
 
@@ -117,7 +118,7 @@ def make_fleet(
         truths[scenario.turnout] = write_weekly_trains(raw, scenario, positions, own, seed, days[-1], n_week)
     if n_passage:
         for turnout, turnout_truths in truths.items():
-            (Path(truth) / f"{turnout}_passages.json").write_text(json.dumps(turnout_truths, indent=1))
+            write_text(Path(truth) / f"{turnout}_passages.json", json.dumps(turnout_truths, indent=1))
     return total + sum(map(len, truths.values()))
 
 
@@ -144,15 +145,12 @@ def _make_tests(job: Job) -> int:
         impacts += [asdict(impact) | {"file_fault": fault} for impact in truths if impact.fault or fault]
     if impacts:
         name = f"{scenario.turnout}_{day.isoformat()}_{section}.json"
-        (Path(truth) / "impacts").mkdir(parents=True, exist_ok=True)
-        (Path(truth) / "impacts" / name).write_text(json.dumps(impacts))
+        write_text(Path(truth) / "impacts" / name, json.dumps(impacts))
     return 3
 
 
 def _write_campaigns(raw: Path, scenario: TurnoutScenario, days: Sequence[date], temperatures: Sequence[float]) -> None:
-    folder = raw / scenario.turnout
-    folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "campaigns.csv", "w", newline="") as file:
+    with whole_file(raw / scenario.turnout / "campaigns.csv") as path, open(path, "w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["campaign", "started_at_utc", "rail_temperature_c", "hammer_id", "tip", "operator"])
         for number, (day, temperature) in enumerate(zip(days, temperatures)):
@@ -165,7 +163,6 @@ def _write_campaigns(raw: Path, scenario: TurnoutScenario, days: Sequence[date],
 def _write_truth(
     truth: Path, scenario: TurnoutScenario, days: Sequence[date], temperatures: Sequence[float], seed: int
 ) -> None:
-    truth.mkdir(parents=True, exist_ok=True)
     sections = {
         section: [stiffness_factors(scenario, section, day, t) for day, t in zip(days, temperatures)]
         for section in SECTIONS
@@ -187,7 +184,7 @@ def _write_truth(
         "changes": [asdict(c) | {"since": c.since.isoformat(), "until": None} for c in scenario.changes],
         "file_faults": [[*k, v] for k, v in FILE_FAULTS.items() if k[0] == scenario.turnout],
     }
-    (truth / f"{scenario.turnout}.json").write_text(json.dumps(content, indent=1))
+    write_text(truth / f"{scenario.turnout}.json", json.dumps(content, indent=1))
 
 
 def run_pipeline(cores: int, *options: str) -> int:

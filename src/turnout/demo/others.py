@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from turnout.content import sha256_of
 from turnout.errors import TurnoutError
-from turnout.files import write_atomic
+from turnout.files import write_atomic, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,8 +83,7 @@ def fetch_all(raw: Path | str, say: Callable[[str], object] = print) -> None:
         with tempfile.TemporaryDirectory() as folder:
             archive = _download(source, Path(folder))
             _extract(archive, source, raw)
-    notes = raw / "pyfrf_beam" / "campaigns.csv"
-    notes.write_text(CAMPAIGNS)
+    write_text(raw / "pyfrf_beam" / "campaigns.csv", CAMPAIGNS)
 
 
 def _download(source: Source, folder: Path) -> Path:

@@ -15,6 +15,7 @@ import numpy as np
 from turnout.constants import GRAVITY, KMH
 from turnout.demo.scenario import gap_under, rail_temperature
 from turnout.demo.track_state import track_on
+from turnout.files import whole_file
 from turnout.physics.hanging_sleeper import HangingSleeper
 from turnout.readers.writing import write
 from turnout.simulate.parameters import load_vehicle
@@ -94,7 +95,7 @@ def make_passages(
             listed.append(entry | {"train_type": name, "speed_kmh": f"{speed * rng.normal(1.0, 0.02):.0f}"})
     folder = Path(raw) / scenario.turnout
     (folder / "passages").mkdir(parents=True, exist_ok=True)
-    with open(folder / "trains.csv", "w", newline="") as file:
+    with whole_file(folder / "trains.csv") as path, open(path, "w", newline="") as file:
         writer = csv.DictWriter(file, ["passed_at_utc", "train_type", "speed_kmh"], lineterminator="\n")
         writer.writeheader()
         writer.writerows(listed)

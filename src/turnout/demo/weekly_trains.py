@@ -21,6 +21,7 @@ from turnout.constants import GRAVITY, KMH
 from turnout.demo.passages import passage_sensor, vehicle_of
 from turnout.demo.scenario import MILLIMETRE, rail_temperature
 from turnout.demo.track_state import track_on
+from turnout.files import whole_file
 from turnout.readers.writing import write
 from turnout.records import Recording
 from turnout.simulate.passage import simulate_passage
@@ -195,7 +196,7 @@ def write_weekly_trains(
                 "speed_kmh": f"{truth['speed_kmh'] * rng.normal(1.0, 0.01):.0f}",
                 "axle_load_t": f"{truth['axle_load_t'] * rng.normal(1.0, 0.02):.1f}",
             })  # fmt: skip
-    with open(folder / "trains.csv", "w", newline="") as file:
+    with whole_file(folder / "trains.csv") as path, open(path, "w", newline="") as file:
         columns = ["passed_at_utc", "train_type", "speed_kmh", "axle_load_t", "track"]
         writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import duckdb
 
 from turnout.errors import RegistryError
-from turnout.files import publish_file, temporary_path
+from turnout.files import publish_file, remove_unfinished, temporary_path
 from turnout.registry import view_texts
 from turnout.registry.catalogue import create_catalogue, use_generation
 from turnout.registry.catalogue_template import catalogue_template
@@ -156,8 +156,7 @@ def build_database(registry_dir: Path, generation: Generation) -> None:
         ) from error
     finally:
         con.close()
-        for leftover in (unfinished, Path(f"{unfinished}.wal")):
-            leftover.unlink(missing_ok=True)
+        remove_unfinished(unfinished, Path(f"{unfinished}.wal"))
 
 
 def is_behind(registry_dir: Path, generation: Generation) -> bool:

@@ -6,7 +6,7 @@ import duckdb
 
 from turnout.content import sha256_of
 from turnout.errors import RegistryError
-from turnout.files import publish_file, temporary_path
+from turnout.files import publish_file, remove_unfinished, temporary_path
 from turnout.registry.generation import DataFile, schema_hash
 from turnout.registry.schema import file_literal, literal, names, sort_order, tables, time_column
 
@@ -101,7 +101,7 @@ def write_sorted(
             "free disk space or give write permission, then run again."
         ) from error
     finally:
-        unfinished.unlink(missing_ok=True)
+        remove_unfinished(unfinished)
         con.execute("drop table if exists to_write")
     path = f"{folder_of(table, year)}/{final.name}"
     return DataFile(path, table, year, rows, size, digest, f"{table}:{schema_hash(table)}", _newest(con, table, final))
@@ -178,7 +178,7 @@ def write_empty(con: duckdb.DuckDBPyConnection, registry_dir: Path, table: str) 
         except (duckdb.IOException, OSError) as error:
             raise RegistryError(f"cannot write {path}: {str(error).splitlines()[0]}") from error
         finally:
-            unfinished.unlink(missing_ok=True)
+            remove_unfinished(unfinished)
     return f"{table}/{path.name}"
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from turnout.config import TurnoutConfig, load_configuration
 from turnout.constants import Z95
 from turnout.errors import SimulationError
-from turnout.files import write_text
+from turnout.files import remove_unfinished, write_text
 from turnout.locks import folder_lock
 from turnout.physics import TERMS, effects_by_name
 from turnout.simulate import load_track
@@ -140,7 +140,7 @@ def _write(path: Path, text: str) -> None:
                 if not low <= getattr(term, p.name) <= high:
                     raise SimulationError(f"{path}: {entry.key}: {p.name} lies outside {low} to {high} {p.unit}.")
     finally:
-        trial.unlink(missing_ok=True)
+        remove_unfinished(trial)
     write_text(path, text)
 
 

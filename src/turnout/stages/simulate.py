@@ -19,7 +19,7 @@ from turnout.config.load import load_configuration
 from turnout.config.settings.simulate import SimulateSettings
 from turnout.constants import KMH
 from turnout.errors import SimulationError
-from turnout.files import write_text
+from turnout.files import output_problem, write_text
 from turnout.readers.writing import write
 from turnout.records import RawChannel, RawDescription, Recording
 from turnout.simulate import Hammer, Sensor, load_track, load_vehicle, simulate_hammer, simulate_passage
@@ -100,7 +100,9 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     description = None if turnout is None else section_channels(turnout, section)
     hammer, sensors = _hammer_channels(description, position, base)
     rate = description.rate if description and description.rate else settings.rate
+    day = time_of(request).date().isoformat()
     for test in range(1, request["tests"] + 1):
+        path = _output_file(request, turnout, f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}")
         recordings, impacts = simulate_hammer(
             track,
             section,
@@ -119,9 +121,7 @@ def write_hammer(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
             conditions=_noted_conditions(request),
             truth=True,
         )
-        day = time_of(request).date().isoformat()
-        name = f"hammer/{day}/{section}_{test}.{ending_of(request['format'])}"
-        path = _write(request, turnout, name, recordings, description)
+        _write(request, path, recordings, description)
         _write_truth(
             request, path, track, route, recordings[0], {"impacts": [_impact_truth(impact) for impact in impacts]}
         )
@@ -180,6 +180,8 @@ def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
     description = turnout.passages.description if turnout is not None and turnout.passages else None
     sensors = _passage_sensors(description, track)
     rate = description.rate if description and description.rate else settings.rate
+    name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{ending_of(request['format'])}"
+    path = _output_file(request, turnout, name)
     recording, truth = simulate_passage(
         track,
         vehicle,
@@ -199,8 +201,7 @@ def write_passage(request: Mapping[str, Any]) -> Iterator[tuple[Path, str]]:
         conditions=_noted_conditions(request),
         truth=True,
     )
-    name = f"passages/{time_of(request):%Y%m%dT%H%M%SZ}.{ending_of(request['format'])}"
-    path = _write(request, turnout, name, [recording], description)
+    _write(request, path, [recording], description)
     forces = {
         "peak_force_n": truth.force.max(axis=1).round(1).tolist(),
         "contact_lost": bool(np.any(truth.force <= 0.0)),
@@ -316,19 +317,22 @@ def _passage_sensors(description: RawDescription | None, track: TurnoutTrack) ->
     )  # a force has no position
 
 
-def _write(
-    request: Mapping[str, Any],
-    turnout: TurnoutConfig | None,
-    name: str,
-    recordings: Iterable[Recording],
-    description: RawDescription | None,
-) -> Path:
+def _output_file(request: Mapping[str, Any], turnout: TurnoutConfig | None, name: str) -> Path:
+    """File of a recording; SimulationError before it is simulated if the file cannot be written."""
     folder = Path(request["raw"]) / (turnout.raw if turnout is not None else "simulated")
     path = Path(request["out"]) if request.get("out") else folder / name
     if turnout is not None and not request.get("out") and path.exists():
         raise SimulationError(f"{path} is there already and may be a measurement: give another --at, or --out.")
+    if problem := output_problem(path):
+        raise SimulationError(f"{path}: {problem[0]}. {problem[1]}.")
+    return path
+
+
+def _write(
+    request: Mapping[str, Any], path: Path, recordings: Iterable[Recording], description: RawDescription | None
+) -> None:
     try:
-        return write([replace(r, source="") for r in recordings], path, request["format"], description)
+        write([replace(r, source="") for r in recordings], path, request["format"], description)
     except ValueError as error:
         raise SimulationError(f"{path} cannot be written as {request['format']}: {error}.") from None
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from turnout.errors import TurnoutError, remedy_of_access
-from turnout.files import temporary_path
+from turnout.files import remove_unfinished, temporary_path
 
 FOLDERS = ("work", "work/plan", "results", "results/registry", "results/pages", "logs", ".snakemake", ".")
 # Files that a run opens or replaces; a lock is opened for writing, the others are replaced by new files.
@@ -95,8 +95,7 @@ def _write_probe(folder: Path) -> None:
             stream.flush()
             os.fsync(stream.fileno())
     finally:
-        with suppress(OSError):
-            probe.unlink(missing_ok=True)
+        remove_unfinished(probe)
 
 
 def _check_file(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.files import write_text
 from turnout_blind.score.case_reports import case_texts
 from turnout_blind.score.plots import draw_reliability, draw_severity
 from turnout_blind.score.report import read_oracle, report_text, score_set
@@ -70,5 +71,5 @@ def write_page(
         ]
     )  # fmt: skip
     head, tail = text.split(BEGIN)
-    path.write_text(f"{head}{BEGIN}\n\n{measured}\n\n{END}{tail.split(END)[1]}", encoding="utf-8")
+    write_text(path, f"{head}{BEGIN}\n\n{measured}\n\n{END}{tail.split(END)[1]}")
     return path

@@ -1,5 +1,6 @@
 """On a full disk the command names the file, and leaves no incomplete file that looks complete."""
 
+import ast
 import errno
 import os
 import resource
@@ -9,11 +10,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from numba.core.caching import CompileResultCacheImpl
 
 from turnout import kernel_cache
 from turnout.cli.main import main
+from turnout.errors import RegistryError
 from turnout.files import whole_file, write_text
 from turnout.readers.writing import WRITERS
+from turnout.registry.database import build_database
+from turnout.registry.generation import load
+from turnout.registry.job import register
+from turnout_blind import march
+from turnout_blind.seal import write_commit, write_truth
 
 LIMIT = 4096  # bytes that fit on the simulated disk
 
@@ -115,3 +123,53 @@ def test_the_error_of_a_read_only_disk_names_the_requested_file(tmp_path, monkey
     with pytest.raises(OSError, match="Read-only") as caught:
         write_text(tmp_path / "a.html", "x")
     assert caught.value.filename == str(tmp_path / "a.html")
+
+
+def fail(path, *args, **kwargs):
+    raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+
+def test_a_registry_on_a_read_only_disk_is_named(tmp_path, monkeypatch):
+    register([], tmp_path, read=iter)
+    generation = load(tmp_path)
+    monkeypatch.setattr(Path, "write_bytes", fail)
+    monkeypatch.setattr(Path, "unlink", fail)
+    with pytest.raises(RegistryError, match=r"cannot write registry\.duckdb"):
+        build_database(tmp_path, generation)
+
+
+def test_no_error_of_a_removal_takes_the_place_of_that_of_the_writing(repository):
+    """The removal of an unfinished file fails on a read-only disk, also where the file never existed."""
+    removals = [
+        f"{path}:{call.lineno}"
+        for package in ("turnout", "turnout_blind")
+        for path in (repository / "src" / package).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Try)
+        for statement in node.finalbody
+        for call in ast.walk(statement)
+        if isinstance(call, ast.Attribute) and call.attr == "unlink"
+    ]
+    assert not removals, f"use turnout.files.remove_unfinished: {removals}"
+
+
+@pytest.mark.parametrize("name", ["set", "T01"])
+def test_a_sealed_truth_is_complete_or_absent(tmp_path, name):
+    """A cut set.json stopped every later start of `turnout blind make` as a fault of the program."""
+    with full_disk(), pytest.raises(OSError, match="too large") as caught:
+        write_truth(tmp_path, name, {"track": "x" * 3 * LIMIT}, 1)
+    assert caught.value.filename == str(tmp_path / f"{name}.json") and not list(tmp_path.iterdir())
+
+
+def test_a_commitment_is_complete_or_absent(tmp_path):
+    """A cut commit.json was taken for a finished set."""
+    truths = {"set": "0" * 64, **{f"T{k}": "0" * 64 for k in range(200)}}
+    with full_disk(), pytest.raises(OSError, match="too large") as caught:
+        write_commit(tmp_path, truths)
+    assert caught.value.filename == str(tmp_path / "commit.json") and not list(tmp_path.iterdir())
+
+
+def test_the_blind_generator_compiles_where_no_folder_can_be_written(monkeypatch):
+    """As for a user without a home, whose program belongs to another user."""
+    monkeypatch.setattr(CompileResultCacheImpl, "_locator_classes", [])
+    assert march._compile(twice)(2.0) == 4.0

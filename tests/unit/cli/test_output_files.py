@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import duckdb
 import pytest
@@ -78,6 +79,27 @@ def test_a_folder_without_permission_is_an_error_before_anything_is_read(folder,
     monkeypatch.setattr("turnout.files.os.access", lambda path, mode: False)  # root may write everywhere
     assert main([*COMMANDS[command, option].split(), option, "new/a.svg"]) == 2
     assert f"new/a.svg, {option}: {NO_PERMISSION} {folder}. Correct its permissions" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("line", [
+    "simulate hammer --section A7 --raw file", "simulate passage --raw file", "simulate passage --raw file/raw",
+    "twin --turnout W1 --work file", "diagnose --turnout W1 --work file/work",
+])  # fmt: skip
+def test_a_folder_of_results_that_cannot_be_written_is_an_error_before_anything_is_computed(
+    folder, capsys, monkeypatch, line
+):
+    for name in ("simulate_hammer", "simulate_passage"):
+        monkeypatch.setattr(f"turnout.stages.simulate.{name}", None)
+    assert main(line.split()) == 2
+    message = capsys.readouterr().err
+    assert "file" in message and "is a file, not a folder" in message and (folder / "file").read_text() == "kept"
+
+
+def test_a_disk_that_is_mounted_for_reading_is_not_called_a_lack_of_permission(folder, monkeypatch):
+    """No permissions help there."""
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_flag=os.ST_RDONLY))
+    problem, remedy = output_problem("new/a.svg")
+    assert problem == f"the disk of {folder} is mounted for reading" and remedy.startswith("Mount it for writing")
 
 
 def test_a_simulation_makes_the_folder_of_its_file(folder):
