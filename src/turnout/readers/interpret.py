@@ -43,6 +43,7 @@ from turnout.readers.unread_starts import is_of_other_day
 from turnout.readers.unused_copies import unused_copy_errors
 from turnout.records import LongRecording, RawDescription, Recording
 
+MAX_WORDS_SHOWN = 4  # of a column, in a message
 REMARKS = ("rate_ambiguous", "entry_unknown")  # once for all records of a file
 SHARED_START_REMEDY = "Start all channels by one trigger, or export them cut to the stretch that they share"
 PADDING_REMEDY = "If the logger fills its blocks, export the measured samples alone; else check cables and power"
@@ -104,8 +105,12 @@ def convert_records(
             if k in order_errors:
                 raise order_errors[k]
             record = entry_check.without_checked(record)
-            if is_whole and (problem := missing_samples(record, n_total)):
-                raise source.error(f"record {k + 1} of {len(raw.records)}", problem, COPY_AGAIN, reason="truncated")
+            problem, name = missing_samples(record, n_total) if is_whole else ("", "")
+            if problem:
+                remedy = (
+                    f"{COPY_AGAIN}; if a part of the memory was saved, write 'checked_entries: {name}' into the layout"
+                )
+                raise source.error(f"record {k + 1} of {len(raw.records)}", problem, remedy, reason="truncated")
             start = start_of[k]
             started_at = start if start and is_plausible(start) else None
             recording, channel_errors = conversion.recording(record, k, started_at)
@@ -263,7 +268,9 @@ class _Conversion:
         samples = np.empty((0, 0)) if is_long else block_reader(0, n_sample)
         from_record, from_samples = ChannelStatistics.from_record, ChannelStatistics.from_samples
         statistics = from_record(block_reader, n_sample) if is_long else from_samples(samples)
-        faults = unused_copy_errors(record, channel_maps, description.channels, where, source)
+        copies = unused_copy_errors(record, channel_maps, description.channels, where, source)
+        of_marks += [error for error in copies.values() if error.reason in REMARKS]
+        faults = {i: error for i, error in copies.items() if error.reason not in REMARKS}
         faults |= faults_by_channel(record, channel_maps, statistics, n_sample, where, source)
         usable = [i for i in range(len(channel_maps)) if i not in faults]
         if fault := decisive_fault(description, channel_maps, faults):
@@ -283,6 +290,8 @@ class _Conversion:
         is_rate_stated = any(s.certainty == CERTAIN and s.intervals for s in statements)
         of_entries = self.entry_check.remarks(record, rate, self.n_record, where, is_rate_stated)
         of_marks += _axes_remarks(record, checked, where, source)
+        if description.kind == "hammer":
+            of_marks += _word_remarks(record, checked, [*of_borders, *of_entries], where, source)
         if not description.n_samples:
             of_marks += _surplus_remarks(record, self.n_shortest, self.n_record, where, source)
         channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
@@ -317,6 +326,25 @@ def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, sourc
         if name.strip().casefold() not in checked:
             remedy = f"{AXES_REMEDY}; if it is right, write 'checked_entries: {name}' into the layout"
             yield source.error(f"{where}, variable {name!r}", problem, remedy, reason="entry_unknown")
+
+
+def _word_remarks(
+    record: RawRecord, checked: Collection[str], others: Sequence[ReadError], where: str, source: Source
+) -> Iterator[ReadError]:
+    """Remarks on columns of words of which some rows have another one: it may say in any language that a sensor failed.
+
+    ``others`` are remarks that quote such a column already.
+    """
+    for name, numbers in record.counters.items():
+        words = [str(entry.value) for entry in record.entries if entry.place == f"column {name!r}"]
+        is_quoted = any(repr(name) in str(other) for other in others)
+        if not words or name.casefold() in checked or is_quoted or np.ptp(numbers) == 0:
+            continue
+        n_other = len(numbers) - int(np.bincount(numbers).max())
+        listed = ", ".join(map(repr, words[:MAX_WORDS_SHOWN]))
+        problem = f"its words change: {n_other} of {len(numbers)} rows have another one than most ({listed})"
+        remedy = f"Find out whether they state a fault of a sensor; if not, write 'checked_entries: {name}'"
+        yield source.error(f"{where}, column {name!r}", problem, f"{remedy} into the layout", reason="entry_unknown")
 
 
 def _surplus_remarks(

@@ -23,7 +23,7 @@ COUNT_NAMES = frozenset(("n_samples", *SAMPLE_COUNT_NAMES))
 PROMISING_NAMES = COUNT_NAMES | {"record_length"}  # a small whole number may be seconds
 
 
-def missing_samples(record: RawRecord, n_sample: int) -> str:
+def missing_samples(record: RawRecord, n_sample: int) -> tuple[str, str]:
     """What the metadata of a record promise beyond the samples of the file.
 
     Parameters
@@ -35,13 +35,17 @@ def missing_samples(record: RawRecord, n_sample: int) -> str:
 
     Returns
     -------
-    str
-        The problem, for a message; "" if the file has no fewer samples than it states.
+    tuple of (str, str)
+        The problem, for a message, and the name of the entry; "" if the file has no fewer samples than it states, and
+        where another number is that of its samples: oscilloscopes state the length of their memory beside that of the
+        part which they save.
     """
-    for entry in record.entries:
-        if "_".join(words_of(entry.name)) in PROMISING_NAMES and (promised := _whole_number(entry.value)) > n_sample:
-            return f"the file ends after {n_sample} of the {promised} samples that {entry.place} states"
-    return ""
+    named = [(e, _whole_number(e.value)) for e in record.entries if "_".join(words_of(e.name)) in PROMISING_NAMES]
+    larger = [(entry, number) for entry, number in named if number > n_sample]
+    if not larger or any(number == n_sample for _, number in named):
+        return "", ""
+    entry, promised = larger[0]
+    return f"the file ends after {n_sample} of the {promised} samples that {entry.place} states", entry.name
 
 
 def stated_counts(record: RawRecord) -> frozenset[int]:

@@ -13,6 +13,9 @@ from turnout.records import RawChannel
 from turnout.units import to_si
 
 MAX_DIFFERENCE = 0.005  # relative, of two scales that agree: a copy of whole numbers is rounded
+# Relative, of two calibrations of one sensor: nominal sensitivities of hammers hold within 15 %. Another unit, a gain
+# or a shifted point makes more.
+MAX_CALIBRATION_DIFFERENCE = 0.15
 REMEDY = (
     "Find out which is right; then correct 'unit' or 'sensitivity' of this channel, name the other one as 'source', "
     "or set the unit with '!'"
@@ -22,10 +25,12 @@ REMEDY = (
 def unused_copy_errors(
     record: RawRecord, mappings: Sequence[ChannelMapping], channels: Sequence[RawChannel], where: str, source: Source
 ) -> dict[int, ReadError]:
-    """Errors by index of the channels of which the file has other values in another column.
+    """Errors and remarks by index of the channels of which the file has other values in another column.
 
     Both columns are one signal, at two places of its measuring chain: counts and volts, or volts and N. The unit of the
-    unused one, with the sensitivity of the layout, gives other values in SI than the channel has.
+    unused one, with the sensitivity of the layout, gives other values in SI than the channel has. A difference as
+    between two calibrations of a sensor is a remark: logger and layout have it from two certificates. The scale of
+    codes has no such error.
 
     Parameters
     ----------
@@ -69,5 +74,8 @@ def unused_copy_errors(
         if not channel.overrules_file and abs(ratio - 1.0) > MAX_DIFFERENCE:
             name = record.names[column] or str(column)
             problem = f"it is {ratio:.4g} times what the same signal in channel {name!r} with the unit {unit!r} gives"
-            errors[first] = source.error(f"{where}, channel {channel.name!r}", problem, REMEDY, reason="scale_unknown")
+            is_over_sensor = channel.quantity in (in_use.dimension, getattr(known_unit(unit), "dimension", ""))
+            is_calibration = is_over_sensor and abs(ratio - 1.0) <= MAX_CALIBRATION_DIFFERENCE
+            reason = "entry_unknown" if is_calibration else "scale_unknown"
+            errors[first] = source.error(f"{where}, channel {channel.name!r}", problem, REMEDY, reason=reason)
     return errors

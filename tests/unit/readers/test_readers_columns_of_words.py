@@ -80,6 +80,34 @@ def test_words_that_change_in_blocks_may_number_records(tmp_path):
     assert [error.reason for error in errors] in (["entry_unknown"], ["wrong_length"])
 
 
+@pytest.mark.parametrize(
+    ("usual", "other"),
+    [("gut", "Sensorbruch"), ("kunnossa", "anturivika"), ("v poradku", "rozpojeno"), ("in range", "open")],
+)
+@pytest.mark.parametrize("rows", [slice(150, 195), slice(0, 60), slice(0, N, 7), slice(399, 400)])
+def test_words_that_change_in_a_hammer_test_are_a_remark_in_any_language(usual, other, rows, tmp_path):
+    words = np.full(N, usual, dtype=object)
+    words[rows] = other
+    recordings, errors = outcome(tmp_path, words.tolist(), kind="hammer")
+    np.testing.assert_array_equal(recordings, [[FORCE, RAIL]])
+    n_other = len(range(N)[rows])
+    assert [error.reason for error in errors] == ["entry_unknown"]
+    assert f"{n_other} of {N} rows" in str(errors[0]) and repr(other) in str(errors[0])
+
+
+@pytest.mark.parametrize("words", [["gut"] * N, ["Sensor 4711"] * N])
+def test_words_that_never_change_are_no_remark(words, tmp_path):
+    recordings, errors = outcome(tmp_path, words, kind="hammer")
+    np.testing.assert_array_equal(recordings, [[FORCE, RAIL]])
+    assert not errors
+
+
+def test_words_that_the_layout_declares_checked_are_no_remark(tmp_path):
+    outcome(tmp_path, ["gut"] * 399 + ["Start"], kind="hammer")
+    description = RawDescription(CHANNELS, rate=5000.0, kind="hammer", checked_entries=("State",))
+    assert not read("a.csv", tmp_path, description).errors
+
+
 def test_a_word_in_a_column_of_numbers_is_an_error(tmp_path):
     cells = [f"{x:.4f}" for x in RAIL]
     cells[200] = "OVER"

@@ -1,5 +1,7 @@
 """A copy of a record or a channel in other units, or of raw beside scaled values, is no second measurement."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
@@ -118,6 +120,41 @@ def test_codes_beside_volts_are_compared_with_them(sources, unit, reason, kind, 
     result = read("a.csv", tmp_path, RawDescription(tuple(channels), rate=5000.0, kind=kind))
     assert {error.reason for error in result.errors} == ({reason} if reason else set())
     assert len(result.recordings) == (not reason)
+
+
+@pytest.mark.parametrize(
+    ("factor", "reason"), [(1.0, ""), (1.02, "entry_unknown"), (0.9, "entry_unknown"), (1.3, "scale_unknown"),
+                           (10.0, "scale_unknown"), (1 / 4.4482, "scale_unknown")],
+)  # fmt: skip
+@pytest.mark.parametrize("used", ["volts", "newtons"])
+def test_two_calibrations_of_a_sensor_are_a_remark_and_another_unit_or_gain_an_error(factor, reason, used, tmp_path):
+    """The program of the logger has the sensitivity of another certificate than the layout."""
+    volts, newtons = 0.0023 * FORCE, factor * FORCE
+    text = "".join(f"{v:.6f};{n:.4f};{r:.4f}\n" for v, n, r in zip(volts, newtons, RAIL))
+    (tmp_path / "a.csv").write_text(f"hammer [V];force [N];rail [m/s²]\n{text}", "utf-8")
+    sensor = RawChannel("hammer", 0 if used == "volts" else 1, "force", None, 2.3, "mV/N")
+    other = RawChannel("other", 1 if used == "volts" else 0, "ignored")
+    description = RawDescription((sensor, other, RawChannel("rail", 2, "acceleration")), rate=5000.0)
+    if used == "newtons":
+        description = replace(description, channels=(replace(sensor, sensitivity=None, sensitivity_unit=""), other,
+                                                     description.channels[2]))  # fmt: skip
+        reason = ""  # no sensitivity, nothing to compare
+    result = read("a.csv", tmp_path, description)
+    assert [error.reason for error in result.errors] == ([reason] if reason else [])
+    assert len(result.recordings) == (reason != "scale_unknown")
+
+
+def test_codes_have_no_calibration(tmp_path):
+    """2.4 % are a converter of 10.24 V that is taken for one of 10 V."""
+    text = "".join(f"{c:.0f};{f:.4f};{r:.4f}\n" for c, f, r in zip(FORCE / 1.024e-3, FORCE, RAIL))
+    (tmp_path / "a.csv").write_text(f"force raw [count];force [V];rail [m/s²]\n{text}", "utf-8")
+    channels = (
+        RawChannel("force", 0, "force", "1 mV", 1.0, "V/N"),
+        RawChannel("f", 1, "ignored"),
+        RawChannel("rail", 2, "acceleration"),
+    )
+    result = read("a.csv", tmp_path, RawDescription(channels, rate=5000.0))
+    assert [error.reason for error in result.errors] == ["scale_unknown"] and not result.recordings
 
 
 def test_a_force_in_other_units_beside_the_same_response_is_one_record(tmp_path):

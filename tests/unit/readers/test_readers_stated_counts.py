@@ -64,6 +64,22 @@ def test_a_file_with_fewer_samples_than_it_states_is_reported_as_truncated(exten
     assert error.reason == "truncated" and "the file ends after 400 of the 500 samples that" in str(error)
 
 
+@pytest.mark.parametrize(
+    ("entries", "is_whole"),
+    [({"Record Length": 500}, False), ({"Record Length": 500, "Number of samples": 450}, False),
+     ({"Record Length": 500, "Number of samples": 400}, True), ({"Samples": 400, "Number of points": 4000}, True)],
+)  # fmt: skip
+@pytest.mark.parametrize("extension", ["h5", "tdms", "wav"])
+def test_the_length_of_a_memory_beside_that_of_the_saved_part_is_no_loss(extension, entries, is_whole, tmp_path):
+    FORMATS[extension](tmp_path / f"a.{extension}", **entries)
+    result = result_of(tmp_path, f"a.{extension}")
+    assert len(result.recordings) == is_whole
+    if not is_whole:
+        assert result.errors[0].reason == "truncated" and "write 'checked_entries: " in str(result.errors[0])
+        checked = RawDescription(CHANNELS, rate=RATE, checked_entries=tuple(entries))
+        assert len(read(f"a.{extension}", tmp_path, checked).recordings) == 1
+
+
 @pytest.mark.parametrize("count", [400, 399, 0])
 @pytest.mark.parametrize("extension", FORMATS)
 def test_a_file_with_as_many_samples_as_it_states_is_read(extension, count, tmp_path):
