@@ -39,17 +39,17 @@ def signals_interrupt(numbers: list[int]) -> Iterator[None]:
         numbers.append(number)
         raise KeyboardInterrupt
 
-    before = {}
+    handlers = {}
     if threading.current_thread() is threading.main_thread():
-        before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
-    ours = [n for n, handler in before.items() if handler in (signal.SIG_DFL, signal.default_int_handler)]
-    for number in ours:
+        handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+    replaced = [n for n, handler in handlers.items() if handler in (signal.SIG_DFL, signal.default_int_handler)]
+    for number in replaced:
         signal.signal(number, note)
     try:
         yield
     finally:
-        for number in ours:
-            signal.signal(number, before[number])
+        for number in replaced:
+            signal.signal(number, handlers[number])
 
 
 class ProcessPool(ProcessPoolExecutor):
@@ -87,9 +87,9 @@ class ProcessPool(ProcessPoolExecutor):
         return super().submit(_call, fn, *args, **kwargs)
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None:
+        if error_type is not None:
             processes = list((self._processes or {}).values())
             self.shutdown(wait=False, cancel_futures=True)
             _end_processes(processes)

@@ -329,20 +329,20 @@ def _axes_remarks(record: RawRecord, checked: Collection[str], where: str, sourc
 
 
 def _word_remarks(
-    record: RawRecord, checked: Collection[str], others: Sequence[ReadError], where: str, source: Source
+    record: RawRecord, checked: Collection[str], remarks: Sequence[ReadError], where: str, source: Source
 ) -> Iterator[ReadError]:
     """Remarks on columns of words of which some rows have another one: it may say in any language that a sensor failed.
 
-    ``others`` are remarks that quote such a column already.
+    No second one on a column that one of ``remarks`` quotes already.
     """
     for name, numbers in record.counters.items():
         words = [str(entry.value) for entry in record.entries if entry.place == f"column {name!r}"]
-        is_quoted = any(repr(name) in str(other) for other in others)
+        is_quoted = any(repr(name) in str(remark) for remark in remarks)
         if not words or name.casefold() in checked or is_quoted or np.ptp(numbers) == 0:
             continue
-        n_other = len(numbers) - int(np.bincount(numbers).max())
+        n_changed = len(numbers) - int(np.bincount(numbers).max())
         listed = ", ".join(map(repr, words[:MAX_WORDS_SHOWN]))
-        problem = f"its words change: {n_other} of {len(numbers)} rows have another one than most ({listed})"
+        problem = f"its words change: {n_changed} of {len(numbers)} rows have another one than most ({listed})"
         remedy = f"Find out whether they state a fault of a sensor; if not, write 'checked_entries: {name}'"
         yield source.error(f"{where}, column {name!r}", problem, f"{remedy} into the layout", reason="entry_unknown")
 
