@@ -6,15 +6,16 @@ import json
 import shlex
 import shutil
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import turnout
+from turnout.counts import count_of
 from turnout.files import write_text
 from turnout_blind.isolation import HiddenFolders
-from turnout_blind.limited_process import POLL_INTERVAL, end_running, run, with_cpu_limit
+from turnout_blind.limited_process import run, with_cpu_limit
 from turnout_blind.seal import BlindError, check_seals, digest, digest_of_folder, read_commit
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def diagnose_set(
 
     A case that has run is not run again; with ``again`` failed ones are. A case fails if the tool fails, or exceeds its
     budget. It then has no rows, only the last line of output. A failure never stops the other cases, and the scorer
-    counts it as no answer.
+    counts it as no answer. A case that runs when the diagnosis is interrupted is ended and has not run.
 
     Parameters
     ----------
@@ -114,9 +115,10 @@ def diagnose_set(
     ) as hidden:
         diagnosis |= {"isolation": hidden.method, "canary": hidden.canary}
         pending = [case for case in sorted(only or commit["cases"]) if _is_pending(diagnosis["cases"].get(case), again)]
+        stop = Event()
         with ThreadPoolExecutor(workers) as pool:  # threads suffice: each waits for a process of its own
             jobs = {
-                pool.submit(_diagnose_safely, hidden, (out, folder), case, command, timeout, cpu): case
+                pool.submit(_diagnose_safely, hidden, (out, folder), case, command, timeout, cpu, stop): case
                 for case in pending
             }
             try:
@@ -125,10 +127,8 @@ def diagnose_set(
                     report(f"{jobs[job]}: {diagnosis['cases'][jobs[job]]['said']}")
                     _write_record(record_path, diagnosis)
             except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                while not all(job.done() for job in jobs):  # one may have started its process since the last time
-                    end_running()
-                    time.sleep(POLL_INTERVAL)
+                stop.set()
+                pool.shutdown(cancel_futures=True)
                 raise
     _write_record(record_path, diagnosis)
     if digest_of_folder(tool) != tool_sha256:
@@ -169,17 +169,17 @@ def diagnosis_folder(out: str | Path, label: str | None = None) -> Path:
 
 
 def _diagnose_safely(
-    hidden: HiddenFolders, folders: tuple[Path, Path], case: str, command: str, timeout: float, cpu: float
+    hidden: HiddenFolders, folders: tuple[Path, Path], case: str, command: str, timeout: float, cpu: float, stop: Event
 ) -> dict[str, Any]:
     """``_diagnose_case``, with any error turned into the result of that case."""
     try:
-        return _diagnose_case(hidden, *folders, case, command, timeout, cpu)
+        return _diagnose_case(hidden, *folders, case, command, timeout, cpu, stop)
     except Exception as error:
         return _run_record("failed", -1, 0.0, 0.0, f"{type(error).__name__}: {error}", None)
 
 
 def _diagnose_case(
-    hidden: HiddenFolders, out: Path, folder: Path, case: str, command: str, timeout: float, cpu: float
+    hidden: HiddenFolders, out: Path, folder: Path, case: str, command: str, timeout: float, cpu: float, stop: Event
 ) -> dict[str, Any]:
     rows_path, work, copy = folder / "findings" / f"{case}.json", folder / "work" / case, folder / "copies" / case
     shutil.rmtree(copy, ignore_errors=True)
@@ -188,15 +188,17 @@ def _diagnose_case(
     fields = {"python": sys.executable, "case": case, "folder": copy, "out": rows_path, "work": work / "tool"}
     try:
         arguments = [w.format(**fields) for w in shlex.split(command)]
-        process = run(with_cpu_limit(hidden.isolated_command(arguments), cpu), copy, work, timeout, cpu)
+        process = run(with_cpu_limit(hidden.isolated_command(arguments), cpu), copy, work, timeout, cpu, stop)
     finally:
         shutil.rmtree(copy, ignore_errors=True)
     message, ok = process.last_line, process.code == 0
     if ok and "{out}" not in command:
         printed = printed_rows(process.out)
         ok = printed is not None
-        message = message if ok else f"printed no rows; {message}"
-        if ok:
+        if printed is None:
+            message = f"printed no rows; {message}"
+        else:
+            message = f"{count_of(len(printed), 'row')} printed" if printed else message
             write_text(rows_path, json.dumps(printed, indent=1) + "\n")
     ok = ok and _holds_rows(rows_path)
     status = "answered" if ok else "over budget" if process.stop_reason else "failed"

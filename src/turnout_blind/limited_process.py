@@ -13,13 +13,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from threading import Event
     from typing import Any
 
 POLL_INTERVAL = 0.2  # interval at which a running process is polled [s]
 MAX_LINE_LENGTH = 300  # length to which the last line of output is cut [characters]
-
-
-_running: set[int] = set()
 
 
 @dataclass(frozen=True)
@@ -61,11 +59,13 @@ def with_cpu_limit(command: Iterable[Any], cpu: float) -> list[str]:
     return ["sh", "-c", f"ulimit -S -t {soft}; ulimit -H -t {soft + 5}; exec {shlex.join(map(str, command))}"]
 
 
-def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: float, cpu: float) -> ProcessResult:
+def run(
+    command: Sequence[str], folder: str | Path, logs: str | Path, wall: float, cpu: float, stop: Event | None = None
+) -> ProcessResult:
     """Run a command in a folder; its output goes to files.
 
-    It is killed with all its children after the limit of wall clock, and by the system after that of CPU time. CPU time
-    is that of the process and of the children it has waited for.
+    It is killed with all its children after the limit of wall clock or when ``stop`` is set, and by the system after
+    the limit of CPU time. CPU time is that of the process and of the children it has waited for.
 
     Parameters
     ----------
@@ -79,6 +79,8 @@ def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: floa
         Limit of wall clock. [s]
     cpu : float
         Limit of CPU time that the command has. [s]
+    stop : threading.Event or None
+        Set by another thread to end the process.
 
     Returns
     -------
@@ -90,18 +92,17 @@ def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: floa
     start = time.monotonic()
     with open(logs / "out.txt", "wb") as out, open(logs / "err.txt", "wb") as err:
         process = subprocess.Popen(command, stdout=out, stderr=err, cwd=folder, start_new_session=True)
-        _running.add(process.pid)
         try:
-            status, usage, timed_out = _wait_until(process.pid, start + wall)
+            status, usage, was_killed = _wait_until(process.pid, start + wall, stop)
         except BaseException:  # interrupted: leave no process running
             _kill(process.pid)
             os.wait4(process.pid, 0)
             raise
-        finally:
-            _running.discard(process.pid)
     process.returncode = code = os.waitstatus_to_exitcode(status)
     cpu_time = usage.ru_utime + usage.ru_stime
-    stop_reason = f"no answer within {wall:.0f} s of the clock" if timed_out else ""
+    stop_reason = ""
+    if was_killed:
+        stop_reason = "interrupted" if stop and stop.is_set() else f"no answer within {wall:.0f} s of the clock"
     # the system counts in ticks and may stop a process before its exact CPU time reaches the limit
     if not stop_reason and (code == -signal.SIGXCPU or (code == -signal.SIGKILL and cpu_time >= 0.8 * cpu)):
         stop_reason = f"no answer within {cpu:.0f} s of the processor"
@@ -109,19 +110,13 @@ def run(command: Sequence[str], folder: str | Path, logs: str | Path, wall: floa
     return ProcessResult(code, texts[0], texts[1], cpu_time, time.monotonic() - start, stop_reason)
 
 
-def end_running() -> None:
-    """Kill every process that ``run`` waits for in a thread of this process, with its children."""
-    for pid in list(_running):
-        _kill(pid)
-
-
-def _wait_until(pid: int, deadline: float) -> tuple[int, Any, bool]:
-    """(status, usage, whether it was killed at the deadline)."""
+def _wait_until(pid: int, deadline: float, stop: Event | None) -> tuple[int, Any, bool]:
+    """(status, usage, whether it was killed at the deadline or by ``stop``)."""
     while True:
         finished_pid, status, usage = os.wait4(pid, os.WNOHANG)
         if finished_pid:
             return status, usage, False
-        if time.monotonic() > deadline:
+        if time.monotonic() > deadline or (stop is not None and stop.is_set()):
             _kill(pid)
             _, status, usage = os.wait4(pid, 0)
             return status, usage, True

@@ -17,7 +17,7 @@ from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.history import HistoryPlan, make_history, plan_histories
 from turnout_blind.seal import SET_FILE, BlindError, digest, digest_of_folder, seed_for, write_commit, write_truth
-from turnout_blind.site import PLAIN
+from turnout_blind.site import CROSSING, PLAIN
 from turnout_blind.strata import CasePlan, case_id, plan_cases
 
 if TYPE_CHECKING:
@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 
 # folder of the cases, folder of the truths, id, plan, folders with further effects, seed of the set
 Job = tuple[Path, Path, str, CasePlan | HistoryPlan, tuple[str, ...], int]
+# entries of set.json that options state
+OPTIONS = {
+    "seed": "--seed", "full": "--fast", "effects": "--effects-folder", "only": "--only", "limit": "--limit",
+    "panel": "--panel", "histories": "--histories and --passages",
+}  # fmt: skip
 
 
 def make_set(
@@ -64,8 +69,8 @@ def make_set(
     progress : callable or None
         (iterable of finished cases, their number) -> iterable.
     histories : (int, int) or None
-        Number of sites with a history of two years, and of passages at each visit; None: single campaigns. ``full``
-        and ``only`` have no meaning for them, and of panels ``SWITCH`` alone has.
+        Number of sites with a history of two years, and of passages at each visit; None: single campaigns. They have
+        no fast tier and no choice of kinds. Half of them are in crossing panels, or all in switch panels.
 
     Returns
     -------
@@ -75,14 +80,16 @@ def make_set(
     Raises
     ------
     BlindError
-        If ``truth`` lies inside ``out``, if ``out`` holds a complete set already, or if an interrupted set was started
-        with other options or other sources.
+        If ``truth`` lies inside ``out``, if ``out`` holds a complete set already, if an interrupted set was started
+        with other options or other sources, or if histories are to have what they cannot have.
     """
     out, truth = Path(out).resolve(), Path(truth).resolve()
     if truth.is_relative_to(out):
         raise BlindError(truth, "--truth", "inside the folder that the tool is given", "Choose a folder beside it")
     if (out / "commit.json").exists():
         raise BlindError(out, "cases", "a set is there already", "Choose another folder, or remove it")
+    if histories is not None:
+        _check_histories(full, only, panel)
     examines = digest_of_folder(Path(turnout.__file__).parent) if seed == "tool" else None
     if unknown := sorted(set(only or ()) - set(load_effects(*folders))):
         available = ", ".join(sorted(load_effects(*folders)))
@@ -109,6 +116,14 @@ def make_set(
     return write_commit(out, truths, examines)
 
 
+def _check_histories(full: bool, only: Collection[str] | None, panel: str) -> None:
+    """Reject what sites with a history cannot have."""
+    remedy = "Histories have kinds of their own, half of them in crossing panels, or all with --panel switch"
+    unusable = {"--fast": not full, "--only": bool(only), "--panel crossing": panel == CROSSING}
+    for option in [name for name, is_given in unusable.items() if is_given]:
+        raise BlindError("--histories", option, "a set of histories does not have this option", remedy)
+
+
 def _open_set(
     truth: Path,
     seed: int | str | None,
@@ -133,12 +148,27 @@ def _open_set(
         write_truth(truth, "set", {"seed": seed, **settings}, seed)
         return json.loads(path.read_bytes())
     set_info = json.loads(path.read_bytes())
-    changed = [k for k, v in settings.items() if set_info.get(k) != v] + (
-        ["seed"] if seed not in (None, set_info["seed"]) else []
-    )
-    if changed:
-        raise BlindError(path, changed[0], "begun otherwise", "Go on as it was begun, or remove both folders")
+    settings["seed"] = set_info["seed"] if seed is None else int(seed)
+    settings.setdefault("histories", None)
+    for name, value in settings.items():
+        if set_info.get(name) != value:
+            before, now = _stated(name, set_info.get(name)), _stated(name, value)
+            problem = f"begun otherwise: {before}" + ("" if now == before else f", now {now}")
+            raise BlindError(path, OPTIONS.get(name, name), problem, "Go on as it was begun, or remove both folders")
     return set_info
+
+
+def _stated(name: str, value: Any) -> str:
+    """A value of set.json as its option states it, such as "2 and 1" for histories."""
+    if name == "seed":  # it tells the concealed effects
+        return "another seed"
+    if name == "full":
+        return "without it" if value else "with it"
+    if name == "generator_sha256":
+        return f"sources {str(value)[:12]}"
+    return (
+        " and ".join(map(str, value)) or "none" if isinstance(value, list) else "none" if value is None else str(value)
+    )
 
 
 def _is_made(job: Job) -> bool:

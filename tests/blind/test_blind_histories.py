@@ -9,6 +9,7 @@ from datetime import date, datetime, timedelta
 import numpy as np
 import pytest
 
+from turnout.cli.main import main
 from turnout.config.events import read_events
 from turnout_blind import history
 from turnout_blind.effect import ConcealedEffect, load_effects
@@ -16,6 +17,7 @@ from turnout_blind.history import HistoryPlan, make_history, parameters_at, plan
 from turnout_blind.make import make_set
 from turnout_blind.score.histories import history_figures, judge_history
 from turnout_blind.score.metrics import Rate, Share
+from turnout_blind.seal import BlindError
 
 EFFECTS = load_effects()
 
@@ -145,6 +147,54 @@ def test_a_set_of_histories_is_sealed_like_any_other(tmp_path, monkeypatch):
     sha = [make_set(tmp_path / f"s{k}", tmp_path / f"t{k}", 7, histories=(4, 2)) for k in range(2)]
     assert sha[0] == sha[1]
     assert json.loads((tmp_path / "t0" / "set.json").read_text())["histories"] == [4, 2]
+
+
+@pytest.fixture
+def begun_set(tmp_path, monkeypatch):
+    """Makes a set of which nothing but set.json exists, as after an interruption."""
+
+    def make(**options):
+        monkeypatch.setattr("turnout_blind.make.plan_cases", lambda *arguments: [])
+        monkeypatch.setattr("turnout_blind.make.plan_histories", lambda *arguments, **named: [])
+        make_set(tmp_path / "s", tmp_path / "t", **options)
+        (tmp_path / "s" / "commit.json").unlink()
+
+    (tmp_path / "s").mkdir()
+    return make
+
+
+@pytest.mark.parametrize(
+    ("begun", "now", "message"),
+    [
+        ({"histories": (2, 1)}, {}, "--histories and --passages: begun otherwise: 2 and 1, now none"),
+        ({}, {"histories": (2, 3)}, "--histories and --passages: begun otherwise: none, now 2 and 3"),
+        ({"full": False}, {}, "--fast: begun otherwise: with it, now without it"),
+        ({"only": {"dip", "pad"}}, {"only": {"pad"}}, "--only: begun otherwise: dip and pad, now pad"),
+        ({"limit": 3}, {}, "--limit: begun otherwise: 3, now none"),
+        ({"panel": "switch"}, {}, "--panel: begun otherwise: switch, now plain"),
+        ({"seed": 1}, {"seed": 2}, "--seed: begun otherwise: another seed. Go on"),
+    ],
+)
+def test_a_set_that_is_continued_with_other_options_states_both(begun_set, begun, now, message):
+    """Formerly a set of histories could be continued as one of single campaigns, and messages named no option."""
+    begun_set(**begun)
+    with pytest.raises(BlindError, match=message):
+        begun_set(**now)
+    begun_set(**begun)
+
+
+@pytest.mark.parametrize("options", [["--fast"], ["--only", "dip"], ["--panel", "crossing"]])
+def test_options_that_histories_do_not_have_are_errors(tmp_path, capsys, options):
+    """Formerly they were ignored: --panel crossing gave plain track at half of the sites."""
+    where = ["--out", str(tmp_path / "s")]
+    assert main(["blind", "make", "--histories", "2", *options, *where]) == 2
+    assert f"{' '.join(options[:2]) if options[0] == '--panel' else options[0]}: a set" in capsys.readouterr().err
+    assert not (tmp_path / "s-truth").exists()
+
+
+def test_passages_are_an_option_of_histories_alone(tmp_path, capsys):
+    assert main(["blind", "make", "--limit", "1", "--passages", "3", "--out", str(tmp_path / "s")]) == 2
+    assert "--passages, 3: only histories have this option. Give --histories N, too" in capsys.readouterr().err
 
 
 TRUTH = {

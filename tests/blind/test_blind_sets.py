@@ -199,26 +199,6 @@ def test_a_tool_that_fails_is_counted_and_not_hidden(copy):
 
 
 @pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
-def test_an_interrupt_ends_the_case_in_progress_and_the_next_run_continues(copy, tmp_path):
-    out, truth = copy
-    begun, tool = tmp_path / "begun", tmp_path / "tool.py"
-    tool.write_text(f"import os, time; open({str(begun)!r}, 'w').write(str(os.getpid())); time.sleep(3600)")
-
-    def interrupted(jobs, total):
-        while not begun.exists() or not begun.read_text():
-            time.sleep(0.05)
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        diagnose_set(out, truth, f"{{python}} {tool}", report=lambda line: None, progress=interrupted)
-    assert not list((out / "copies").glob("*"))
-    begun.write_text("")
-    tool.write_text("raise SystemExit(3)")
-    held = diagnose_set(out, truth, f"{{python}} {tool}", report=lambda line: None)
-    assert not begun.read_text() and {run["status"] for run in held["cases"].values()} == {"failed"}
-
-
-@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
 def test_rows_are_read_from_the_output_of_the_tool(copy, tmp_path):
     """It prints notes and then its row in the folder of the case. Other output is a failure and is stored."""
     out, truth = copy
@@ -280,6 +260,38 @@ def test_files_that_the_tool_writes_beside_the_case_do_not_change_its_hash(copy)
     assert {run["status"] for run in held["cases"].values()} == {"answered"}
     assert len(verify(out, truth)) == 2
     assert not list((out / "copies").iterdir())
+
+
+@pytest.mark.skipif(not isolation_method(), reason="nothing here can hide a folder from this user")
+def test_an_interrupted_diagnosis_ends_at_once_and_continues(copy, tmp_path):
+    """Formerly it waited for the case that ran, for half an hour at most, and its answer was thrown away."""
+    out, truth = copy
+    first, second = (c.name for c in cases(out))
+    tool = tmp_path / "tool.py"
+    tool.write_text(
+        f"import sys, time\nif sys.argv[1] == {second!r}:\n    time.sleep(60)\n"
+        'print("[{\\"verdict\\": \\"none\\"}]")\n'
+    )
+    lines = []
+
+    def press(finished, total):
+        yield next(finished)
+        start.append(time.monotonic())
+        raise KeyboardInterrupt
+
+    start, command = [], f"{{python}} {tool} {{case}}"
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_set(out, truth, command, report=lines.append, progress=press)
+    assert time.monotonic() - start[0] < 20.0
+    assert lines == [f"{first}: 1 row printed"]
+    record = json.loads((out / "diagnosis.json").read_text())
+    assert set(record["cases"]) == {first}
+    assert not list((out / "copies").iterdir())
+    tool.write_text('print("[{\\"verdict\\": \\"none\\"}]")')
+    lines.clear()
+    held = diagnose_set(out, truth, command, report=lines.append)
+    assert lines == [f"{second}: 1 row printed"]
+    assert {run["status"] for run in held["cases"].values()} == {"answered"}
 
 
 def test_an_interrupted_generation_of_a_set_continues(small_set, tmp_path, monkeypatch):

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_former(make, "--workers", "--cores", type=at_least_one)
     make.add_argument("--histories", type=at_least_one, metavar="N", help="N sites with a history of two years")
     make.add_argument(
-        "--passages", type=at_least_one, default=1, help="passages at each visit of a history (default 1)"
+        "--passages", type=at_least_one, help="passages at each visit of a history (default 1; with --histories)"
     )
     diagnose = steps.add_parser("diagnose", help="diagnose every case without access to the truth")
     diagnose.add_argument(
@@ -122,8 +122,10 @@ def _make(args: argparse.Namespace) -> None:
             raise BlindError(
                 folder, "--effects-folder", "no file of an effect", "Name a folder with one file .py per effect"
             )
+    if args.passages and not args.histories:
+        raise BlindError("--passages", args.passages, "only histories have this option", "Give --histories N, too")
     only = args.only.split(",") if args.only else None
-    histories = (args.histories, args.passages) if args.histories else None
+    histories = (args.histories, args.passages or 1) if args.histories else None
     sha = make_set(
         args.out, _truth(args), args.seed, not args.fast, args.effects_folder, only, args.limit, args.panel, args.cores,
         _bar, histories,
