@@ -120,8 +120,8 @@ def _modes(connection: duckdb.DuckDBPyConnection, campaign: str) -> PaperTable:
 def _fits(
     connection: duckdb.DuckDBPyConnection, turnout: str, campaign: str, train_type: str, speed: float
 ) -> PaperTable:
-    is_main = "p.track = 'main' and abs(p.speed_kmh - $speed) <= $tolerance"
-    is_diverging = "p.track = 'diverging'"
+    is_main = "f.track = 'main' and abs(f.speed_kmh - $speed) <= $tolerance"
+    is_diverging = "f.track = 'diverging'"
     aggregates = ", ".join(
         f"{function}(f.{column}) filter ({group})"
         for group in (is_main, is_diverging)
@@ -133,8 +133,8 @@ def _fits(
     query = f"""
         select k.section_id, k.hammer_fit_pct, k.n_impacts_used, k.validation_fit_pct, k.n_validation, {aggregates}
         from models_current k
-            left join passage_fits_current f on f.section_id = k.section_id and f.turnout_id = $turnout
-            left join passages_current p on p.passage_id = f.passage_id and p.train_type = $train_type
+            left join section_scores f on f.section_id = k.section_id and f.turnout_id = $turnout
+                and f.train_type = $train_type
         where k.campaign_id = $campaign and k.status <> 'rejected' group by all order by 1
     """
     parameters = {

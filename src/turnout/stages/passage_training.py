@@ -46,8 +46,8 @@ MAX_PASSAGES = 20_000  # for the clusters: more do not change them, and a mixtur
 MAX_WAY_TO_ROW = 900.0  # s, from the start of a file to a row of the train data that may be of its train
 SAME_SPEED = 0.02  # share by which two recordings of a train that brakes may differ, beyond their errors
 RECENT_QUERY = """
-    select train_type, speed_kmh, axle_load_t from passages_current
-    where status <> 'rejected' and train_type is not null and speed_kmh is not null
+    select train_type, speed_kmh, axle_load_t from trains_current
+    where train_type is not null and speed_kmh is not null
     order by passed_at_utc desc, passage_id limit ?
 """
 

@@ -23,6 +23,7 @@ from turnout.passage.result import Passage, SpeedFinding
 from turnout.passage.timetable import listed_trains
 from turnout.readers.writing import write
 from turnout.records import Channel
+from turnout.registry.view_texts import view_files
 from turnout.stages.passage_context import read_clusters, read_loads
 from turnout.stages.passage_training import learn_clusters, learn_loads, weighed_trains
 
@@ -252,12 +253,15 @@ def connection_of(rng, n):
     con = duckdb.connect()
     con.execute(
         "create table passages_current (passage_id varchar, passed_at_utc timestamp, status varchar, "
-        "train_type varchar, speed_kmh double, axle_load_t double)"
+        "train_type varchar, speed_kmh double, axle_load_t double, turnout_id varchar, direction varchar, "
+        "track varchar)"
     )
+    for name in ("is_next_train", "trains_current"):
+        con.execute(view_files()[name])
     for k in range(n):
         fast = k % 2 == 0
         con.execute(
-            "insert into passages_current values (?, ?, 'accepted', 'IC3', ?, ?)",
+            "insert into passages_current values (?, ?, 'accepted', 'IC3', ?, ?, 'T1', 'facing', 'main')",
             [str(k), datetime(2024, 1, 1) + timedelta(hours=k), *_speed_and_load(rng, fast)],
         )
     return con

@@ -1,11 +1,18 @@
 """SQL views of the effects of train type, speed and axle load on scores, compared with statsmodels."""
 
+from dataclasses import replace
+from datetime import timedelta
+
 import numpy as np
 import pandas as pd
 import pytest
 import statsmodels.api as sm
 from registry_fleet import passage_results
 from scipy import stats
+
+from turnout.registry.ids import content_id
+from turnout.registry.view_texts import view_files
+from turnout.workflow.notes import MAX_LOGGER_DIFFERENCE
 
 SAME = {"rtol": 1e-8, "atol": 1e-8}
 
@@ -136,6 +143,69 @@ def test_several_sensors_of_one_passage_count_as_one_passage(bench, tmp_path):
     assert more.ask("select sum(n) from fit_by_cluster_week") == [
         (3 * bench.ask("select sum(n) from fit_by_cluster_week")[0][0],)
     ]
+
+
+def of_another_logger(result, k, seconds=3.0, **changed):
+    """A second recording of a train by a logger with sensors of its own."""
+    passage, fits = result.tables["passages"][0], result.tables["passage_fits"]
+    at = passage["passed_at_utc"] + timedelta(seconds=seconds)
+    shared = {"passage_id": content_id("second", k), "passed_at_utc": at}
+    second = passage | shared | {"recording_id": content_id("second recording", k)} | changed
+    tables = {
+        "passages": [second],
+        "passage_fits": [f | shared | {"channel": f"b_{f['section_id'][-2:]}"} for f in fits],
+    }
+    return replace(result, unit=f"{result.unit}-b", tables=tables)
+
+
+def counts_of_trains(registry):
+    """What every view says that counts trains, or has an error from their number."""
+    queries = {
+        "weeks": "select section_id, measured_at_utc, frequency_hz, frequency_se_hz from passage_values order by all",
+        "trains": "select train_type, count(*) as n from trains_current group by all order by all",
+    }
+    return without_channels(registry) | {name: registry.frame(query) for name, query in queries.items()}
+
+
+def test_recordings_of_a_train_by_two_loggers_count_as_one_train(bench, tmp_path):
+    """The second logger knows neither track nor type. It changes no mean, and reduces no error."""
+    trains = passage_results(n=400)
+    for k, result in enumerate(trains):
+        fits = [f | {"peak_ms2": 100.0 + k % 7} for f in result.tables["passage_fits"]]
+        result.tables["passage_fits"] = fits
+    second = [of_another_logger(r, k, track="unknown", train_type="unknown") for k, r in enumerate(trains)]
+    both = type(bench)(tmp_path / "both")
+    bench.register(*trains)
+    both.register(*trains, *second)
+    expected, found = counts_of_trains(bench), counts_of_trains(both)
+    for view, frame in expected.items():
+        assert len(frame), view
+        pd.testing.assert_frame_equal(found[view], frame, rtol=1e-9, obj=view)
+    assert both.ask("select distinct n_recordings from trains_current") == [(2,)]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "changed", "n"),
+    [
+        (15.0, {}, 1),
+        (15.1, {}, 2),
+        (3.0, {"direction": "trailing"}, 2),
+        (3.0, {"track": "diverging"}, 2),
+        (3.0, {"track": "unknown", "direction": "unknown"}, 1),
+    ],
+)
+def test_a_train_that_follows_or_comes_the_other_way_is_another_one(bench, seconds, changed, n):
+    first = passage_results(n=1)[0]
+    turnouts = [{"turnout_id": "north_1", "layout": "l", "config_hash": "h"}]
+    bench.register(first, of_another_logger(first, 0, seconds, **changed), tables={"turnouts": turnouts})
+    assert bench.ask("select n_passages from fleet_state") == [(n,)]
+    assert bench.ask("select n_passages from fit_by_type where section_id = 'north_1/A7'") == [(n,)]
+    assert bench.ask("select count(*) from passage_scores where section_id = 'north_1/A7'") == [(2,)]
+
+
+def test_views_and_train_data_have_one_limit_between_loggers():
+    text = view_files()["is_next_train"]
+    assert f"interval {MAX_LOGGER_DIFFERENCE:.0f} second" in text
 
 
 def test_errors_are_computed_from_passages_if_the_scores_of_sensors_are_correlated(bench):

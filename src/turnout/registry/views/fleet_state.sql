@@ -1,5 +1,5 @@
 -- One row per turnout: what is known of it, how old that is, and what waits in quarantine.
--- needs: modes_current, models_current, quarantine_open, passages_current
+-- needs: modes_current, models_current, quarantine_open, trains_current
 create or replace view fleet_state as
 with measured as (
     select turnout_id, count(distinct section_id) as n_sections_measured, count(distinct campaign_id) as n_campaigns,
@@ -9,7 +9,7 @@ with measured as (
 ),
 passed as (
     select turnout_id, count(*) as n_passages, max(passed_at_utc) as last_passage_utc
-    from passages_current where status <> 'rejected' group by turnout_id
+    from trains_current group by turnout_id
 ),
 waiting as (select turnout_id, count(*) as n_quarantine from quarantine_open where not is_remark group by turnout_id),
 work as (select turnout_id, max(event_at_utc) as last_event_utc, arg_max(kind, event_at_utc) as last_event
@@ -36,7 +36,7 @@ from turnouts t left join measured using (turnout_id) left join passed using (tu
 -- n_models | bigint | | models that are not rejected
 -- n_models_rejected | bigint | | rejected models
 -- last_campaign_utc | timestamp | UTC | newest hammer campaign
--- n_passages | bigint | | passages used
+-- n_passages | bigint | | trains whose passages are used
 -- last_passage_utc | timestamp | UTC | newest passage used
 -- n_quarantine | bigint | | open quarantine rows
 -- last_event | varchar | | newest maintenance event

@@ -1,21 +1,37 @@
--- One row per passage and section: the mean scores of its sensors. They record the same wheels: three sensors are not
--- three trains, and a standard error over sensors instead of trains is too small.
--- needs: passage_scores
+-- One row per train and section: the mean scores of its sensors. They record the same wheels: three sensors are not
+-- three trains, nor are the recordings of two loggers two trains. A standard error over them would be too small.
+-- Windows only: a condition on turnout_id or section_id reaches the files.
+-- needs: passage_scores, is_next_train
 create or replace view section_scores as
+with marked as (
+    select
+        *, is_next_train(
+            passed_at_utc - lag(passed_at_utc) over passing, direction, lag(direction) over passing,
+            track, lag(track) over passing
+        )::integer as is_next
+    from passage_scores
+    window passing as (partition by turnout_id, section_id order by passed_at_utc)
+),
+numbered as (
+    select *, sum(is_next) over (partition by turnout_id, section_id order by passed_at_utc) as train_no from marked
+)
 select
-    turnout_id, section_id, passage_id, passed_at_utc, count(*) as n,
+    turnout_id, section_id, min(passage_id) as passage_id, min(passed_at_utc) as passed_at_utc, count(*) as n,
     avg(fit_pct) as fit_pct, count(fit_pct) as n_fit, avg(fit_null_pct) as fit_null_pct,
     avg(forecast_pct) as forecast_pct, count(forecast_pct) as n_forecast, avg(forecast_null_pct) as forecast_null_pct,
     avg(leave_one_out_pct) as leave_one_out_pct, avg((status = 'null_explains')::integer) as null_share,
-    any_value(train_type) as train_type, any_value(speed_kmh) as speed_kmh, any_value(axle_load_t) as axle_load_t,
-    any_value(cluster_id) as cluster_id
-from passage_scores
-group by turnout_id, section_id, passage_id, passed_at_utc;
+    coalesce(min(nullif(train_type, 'unknown')), min(train_type)) as train_type,  -- of recordings that know the type
+    coalesce(avg(speed_kmh) filter (train_type <> 'unknown'), avg(speed_kmh)) as speed_kmh,
+    coalesce(avg(axle_load_t) filter (train_type <> 'unknown'), avg(axle_load_t)) as axle_load_t,
+    coalesce(min(cluster_id) filter (train_type <> 'unknown'), min(cluster_id)) as cluster_id,
+    coalesce(min(nullif(track, 'unknown')), min(track)) as track
+from numbered
+group by turnout_id, section_id, train_no;
 
 -- columns of section_scores
 -- turnout_id | varchar | | turnout
 -- section_id | varchar | | section
--- passage_id | varchar | | passage
+-- passage_id | varchar | | passage, or one of those of the train
 -- passed_at_utc | timestamp | UTC | when it passed
 -- n | bigint | | fits: sensors and models
 -- fit_pct | double | % | mean in-sample fit of the sensors
@@ -30,3 +46,4 @@ group by turnout_id, section_id, passage_id, passed_at_utc;
 -- speed_kmh | double | km/h | speed
 -- axle_load_t | double | t | mean axle load
 -- cluster_id | varchar | | cluster of like passages
+-- track | varchar | | track taken
