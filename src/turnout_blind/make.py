@@ -152,13 +152,13 @@ def _open_set(
     settings.setdefault("histories", None)
     for name, value in settings.items():
         if set_info.get(name) != value:
-            before, now = _stated(name, set_info.get(name)), _stated(name, value)
+            before, now = _value_text(name, set_info.get(name)), _value_text(name, value)
             problem = f"begun otherwise: {before}" + ("" if now == before else f", now {now}")
             raise BlindError(path, OPTIONS.get(name, name), problem, "Go on as it was begun, or remove both folders")
     return set_info
 
 
-def _stated(name: str, value: Any) -> str:
+def _value_text(name: str, value: Any) -> str:
     """A value of set.json as its option states it, such as "2 and 1" for histories."""
     if name == "seed":  # it tells the concealed effects
         return "another seed"
