@@ -17,7 +17,7 @@ from turnout.trend.times import days, timestamps
 
 NAMES = (
     "students_t", "campaign_name", "campaign_weight", "epochs", "resonance_drift",
-    "is_next_train", "passage_values", "chart_values", "recursive_modes", "mode_residuals",
+    "passage_trains", "passage_values", "chart_values", "recursive_modes", "mode_residuals",
     "cusum", "change_since_event", "maintenance_effect",
     "chart_status_at", "unusable", "cannot_see", "acknowledgement_counts", "in_service", "time_to_threshold",
     "is_below_target", "stiffness_words", "half_band_pct", "damping_charts", "chart_states", "worklist",

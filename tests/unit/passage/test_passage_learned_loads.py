@@ -256,7 +256,7 @@ def connection_of(rng, n):
         "train_type varchar, speed_kmh double, axle_load_t double, turnout_id varchar, direction varchar, "
         "track varchar)"
     )
-    for name in ("is_next_train", "trains_current"):
+    for name in ("passage_trains", "trains_current"):
         con.execute(view_files()[name])
     for k in range(n):
         fast = k % 2 == 0

@@ -204,7 +204,7 @@ def test_a_train_that_follows_or_comes_the_other_way_is_another_one(bench, secon
 
 
 def test_views_and_train_data_have_one_limit_between_loggers():
-    text = view_files()["is_next_train"]
+    text = view_files()["passage_trains"]
     assert f"interval {MAX_LOGGER_DIFFERENCE:.0f} second" in text
 
 

@@ -2,7 +2,7 @@
 -- Modes of passages where another program entered any (this one identifies none), weighted by their errors; and
 -- band 'amplitude', the peak acceleration [m/s²] at the usual speed, where at least five trains were measured:
 -- every sensor against its own first year, so that one that stops recording does not shift the level.
--- needs: modes_current, passages_current, passage_fits_current, is_next_train
+-- needs: modes_current, passages_current, passage_fits_current, passage_trains
 create or replace view passage_values as
 with weighed as (
     select
@@ -15,8 +15,7 @@ peaks as (
     select
         f.turnout_id, f.section_id, f.channel, f.passage_id, any_value(f.passed_at_utc) as passed_at_utc,
         any_value(ln(f.peak_ms2)) as log_peak, any_value(ln(p.speed_kmh)) as log_speed,
-        any_value(p.rail_temperature_c) as rail_temperature_c,
-        any_value(p.direction) as direction, any_value(p.track) as track
+        any_value(p.rail_temperature_c) as rail_temperature_c
     from passage_fits_current f join passages_current p using (passage_id)
     where f.status <> 'rejected' and f.peak_ms2 > 0 and p.speed_kmh > 0
     group by f.turnout_id, f.section_id, f.channel, f.passage_id
@@ -44,27 +43,13 @@ first_year as (
     where passed_at_utc >= first_at and passed_at_utc < first_at + interval 365 day
     group by section_id, channel
 ),
-marked as (
-    select
-        *, is_next_train(
-            passed_at_utc - lag(passed_at_utc) over passing, direction, lag(direction) over passing,
-            track, lag(track) over passing
-        )::integer as is_next
-    from peaks
-    window passing as (partition by turnout_id, section_id order by passed_at_utc)
-),
-numbered as (
-    select
-        *, sum(is_next) over (partition by turnout_id, section_id order by passed_at_utc) as train_no
-    from marked
-),
 levelled as (
     select
         p.turnout_id, p.section_id, date_trunc('week', min(p.passed_at_utc))::timestamp as week_utc,
         avg(p.log_peak - y.exponent * (p.log_speed - y.usual_speed) - y.usual_peak) as log_ratio,
         avg(p.rail_temperature_c) as rail_temperature_c
-    from numbered p join first_year y using (section_id, channel)
-    group by p.turnout_id, p.section_id, p.train_no
+    from peaks p join first_year y using (section_id, channel) join passage_trains t using (turnout_id, passage_id)
+    group by p.turnout_id, p.section_id, t.train_id
 ),
 usual as (select section_id, avg(usual_peak) as usual_peak from first_year group by section_id)
 select

@@ -1,20 +1,7 @@
 -- One row per train and section: the mean scores of its sensors. They record the same wheels: three sensors are not
 -- three trains, nor are the recordings of two loggers two trains. A standard error over them would be too small.
--- Windows only: a condition on turnout_id or section_id reaches the files.
--- needs: passage_scores, is_next_train
+-- needs: passage_scores, passage_trains
 create or replace view section_scores as
-with marked as (
-    select
-        *, is_next_train(
-            passed_at_utc - lag(passed_at_utc) over passing, direction, lag(direction) over passing,
-            track, lag(track) over passing
-        )::integer as is_next
-    from passage_scores
-    window passing as (partition by turnout_id, section_id order by passed_at_utc)
-),
-numbered as (
-    select *, sum(is_next) over (partition by turnout_id, section_id order by passed_at_utc) as train_no from marked
-)
 select
     turnout_id, section_id, min(passage_id) as passage_id, min(passed_at_utc) as passed_at_utc, count(*) as n,
     avg(fit_pct) as fit_pct, count(fit_pct) as n_fit, avg(fit_null_pct) as fit_null_pct,
@@ -25,8 +12,8 @@ select
     coalesce(avg(axle_load_t) filter (train_type <> 'unknown'), avg(axle_load_t)) as axle_load_t,
     coalesce(min(cluster_id) filter (train_type <> 'unknown'), min(cluster_id)) as cluster_id,
     coalesce(min(nullif(track, 'unknown')), min(track)) as track
-from numbered
-group by turnout_id, section_id, train_no;
+from passage_scores join passage_trains using (turnout_id, passage_id)
+group by turnout_id, section_id, train_id;
 
 -- columns of section_scores
 -- turnout_id | varchar | | turnout
