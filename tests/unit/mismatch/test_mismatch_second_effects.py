@@ -19,7 +19,7 @@ from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.two_effects import add_second
+from turnout.mismatch.engine.second_effect import add_second
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.mismatch.turnout import TrackCase
 from turnout.mismatch.turnout.planned_case import measured_campaign, small_plan

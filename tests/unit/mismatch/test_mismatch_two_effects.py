@@ -22,7 +22,8 @@ from turnout.mismatch.engine.projector import Projector
 from turnout.mismatch.engine.residual_space import ResidualSpace
 from turnout.mismatch.engine.score import Score
 from turnout.mismatch.engine.search import Search
-from turnout.mismatch.engine.two_effects import add_second, settle_pair
+from turnout.mismatch.engine.second_effect import add_second
+from turnout.mismatch.engine.two_effects import settle_pair
 from turnout.mismatch.engine.verdict import Verdict
 from turnout.physics import Parameter
 from turnout.stages.mismatch_rows import _evidence
@@ -375,8 +376,9 @@ def test_a_first_name_without_a_gain_beside_the_second_is_withdrawn():
     for true, left in (({"ramp": 2.5}, ("ramp",)), ({"ramp": 2.5, "bowl": 2.5}, ("bowl", "ramp"))):
         case = Shapes(("ramp", "bowl"), **true)
         pair = case.candidates[::-1]
-        fit = fit_jointly(case, pair, [0.1, 0.1], iterations=20)
-        verdicts = [Verdict("named", (c.family,), "A", 0.97, {}, (Score(c, 50.0, 0.0, 1.0, fit),)) for c in pair]
+        first, fit = (fit_jointly(case, pair[:n], [0.1] * n, iterations=20) for n in (1, 2))
+        scores = [Score(c, 50.0, 0.0, 1.0, f) for c, f in zip(pair, (first, fit))]
+        verdicts = [Verdict("named", (s.family,), "A", 0.97, {}, (s,)) for s in scores]
         found = settle_pair(Findings(Search(case), fit_jointly(case), fit, tuple(verdicts)))
         assert tuple(v.names[0] for v in found.verdicts) == left == tuple(c.family for c in found.fit.candidates)
     assert found.fit.psi == pytest.approx([2.5, 2.5], abs=0.15)

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
     from turnout.mismatch.engine.fit import Fit
     from turnout.mismatch.engine.score import Score
-    from turnout.mismatch.engine.two_effects import PairEvidence, SecondEvidence
+    from turnout.mismatch.engine.second_effect import SecondEvidence
+    from turnout.mismatch.engine.two_effects import PairEvidence
     from turnout.mismatch.engine.verification import Verification
 
 HOW, PAIRS, SURFACES = "mismatch.md", "decisions/two-effects.md", "decisions/running-surface-priors.md"

@@ -1,6 +1,6 @@
 """Facts on which the rules of ``decision`` rest: of one effect, of a name and of the reserved recordings.
 
-Those of two effects are in ``two_effects``.
+Those of two effects are in ``second_effect`` and ``two_effects``.
 """
 
 from __future__ import annotations

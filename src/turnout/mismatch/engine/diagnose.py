@@ -40,10 +40,11 @@ from turnout.mismatch.engine.reserved_error import error_of_fitted
 from turnout.mismatch.engine.residual_attribution import Attribution, attribute, cell_energies
 from turnout.mismatch.engine.search import Search
 from turnout.mismatch.engine.search_limit import SearchLimit, SearchLimitError
+from turnout.mismatch.engine.second_effect import add_second
 from turnout.mismatch.engine.strained_values import conflict_of_files, strained_value
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 from turnout.mismatch.engine.tolerated_effects import name_tolerated
-from turnout.mismatch.engine.two_effects import add_second, settle_pair
+from turnout.mismatch.engine.two_effects import settle_pair
 from turnout.mismatch.engine.unproven_cases import withhold_names
 from turnout.mismatch.engine.verdict import AMBIGUOUS, Verdict
 from turnout.mismatch.engine.verification import Verification, verify
