@@ -120,13 +120,15 @@ def _call(function: Callable, *args: Any, **kwargs: Any) -> Any:
 
 
 def _end_processes(processes: Sequence[Any]) -> None:
-    """SIGTERM to each process of a pool, SIGKILL to those that are alive after ``MAX_TASK_END``."""
-    for process in processes:
-        process.terminate()
-    deadline = time.monotonic() + MAX_TASK_END
-    for process in processes:
-        process.join(max(0.0, deadline - time.monotonic()))
-        if process.is_alive():
+    """SIGTERM to each process of a pool, SIGKILL to those that live after ``MAX_TASK_END`` or at another interrupt."""
+    try:
+        for process in processes:
+            process.terminate()
+        deadline = time.monotonic() + MAX_TASK_END
+        for process in processes:
+            process.join(max(0.0, deadline - time.monotonic()))
+    finally:
+        for process in processes:
             process.kill()
 
 

@@ -90,6 +90,20 @@ def test_a_signal_ends_the_processes_of_a_pool_in_the_middle_of_their_tasks(tmp_
     assert not alive(pids) and not list(tmp_path.glob("*.tmp"))
 
 
+def test_a_second_signal_kills_tasks_that_do_not_end(tmp_path):
+    """As in compiled code, which sees no signal. Formerly the command waited for such tasks to finish."""
+    deaf = POOL.replace("    unfinished =", "    signal.signal(signal.SIGTERM, signal.SIG_IGN)\n    unfinished =")
+    command, pids = started(deaf.replace("METHOD", "None"), tmp_path)
+    command.send_signal(signal.SIGTERM)
+    time.sleep(0.5)  # it waits for its processes now, MAX_TASK_END at most
+    command.send_signal(signal.SIGTERM)
+    try:
+        assert command.wait(20) == 100 + signal.SIGTERM and not alive(pids)
+    finally:
+        for pid in alive(pids):
+            os.kill(pid, signal.SIGKILL)
+
+
 def test_the_processes_of_a_pool_end_with_a_parent_that_is_killed(tmp_path):
     command, pids = started(POOL.replace("METHOD", "None"), tmp_path)
     command.kill()
