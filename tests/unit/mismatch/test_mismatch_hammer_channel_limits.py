@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
+from turnout.mismatch.turnout import saturation
 from turnout.mismatch.turnout.campaign import HammerInput
 from turnout.mismatch.turnout.priors import SATURATION
 from turnout.mismatch.turnout.saturation import common_limit, limit_under_impacts, saturated_channels
@@ -148,6 +149,14 @@ def test_impacts_alone_show_a_limit_unless_there_is_only_one_channel(names, foun
 def test_no_limit_is_far_below_the_peaks_of_trains(peak, found):
     """A square wave of 30 overshoots to 38 m/s² in the recorder's filter; the larger side by a tenth more."""
     assert list(saturated_channels(campaign(hammer=two_tests(), peaks=[(peak, 200.0)]), 12.0)) == found
+
+
+@pytest.mark.parametrize("of_b, found", [(30.0, ["A", "B"]), (35.0, ["A", "B"]), (51.0, [])])
+def test_two_limits_that_differ_are_no_fault_of_the_channels(monkeypatch, of_b, found):
+    """Each limit has an error of 10 %. A rattling guard rail stops the peaks of each sensor at its own value."""
+    limits = {"A": (30.0, 40.0), "B": (of_b, 40.0)}
+    monkeypatch.setattr(saturation, "limit_under_impacts", lambda hammer, sensor: limits.get(sensor.name, (30.0, 0.0)))
+    assert list(saturated_channels(campaign(), 12.0)) == found
 
 
 @pytest.mark.parametrize("limit, share", [(30.0, 1.0), (10.0, 0.0)])

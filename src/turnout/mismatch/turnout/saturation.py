@@ -162,7 +162,9 @@ class SaturationLimit:
 def saturated_channels(campaign: CampaignInput, threshold: float) -> dict[str, SaturationLimit]:
     """SaturationLimit of every sensor, by name, with evidence beyond ``threshold`` [nats] from passages and impacts.
 
-    Reserved recordings count as well: whether a channel is usable is no prediction, and applies to them, too.
+    Reserved recordings count as well: whether a channel is usable is no prediction, and applies to them, too. A part of
+    the track that collides with another one limits the peaks of several sensors, each at its own value. So channels
+    with limits that differ are not at fault, nor are all at once.
 
     Parameters
     ----------
@@ -174,7 +176,7 @@ def saturated_channels(campaign: CampaignInput, threshold: float) -> dict[str, S
     Returns
     -------
     dict
-        Sensor -> SaturationLimit; {} if it were all of them.
+        Sensor -> SaturationLimit; {} if it were all of them, or if their limits differed.
     """
     by_passages, saturated = _limits_in_passages(campaign), {}
     for sensor in campaign.sensors:
@@ -183,7 +185,9 @@ def saturated_channels(campaign: CampaignInput, threshold: float) -> dict[str, S
         limit = replace(limit, gain=limit.gain - float(np.log(len(campaign.sensors))))
         if limit.gain > threshold and limit.limit >= lowest_limit(raw_peak(campaign, sensor.name)):
             saturated[sensor.name] = limit
-    return saturated if len(saturated) < len(campaign.sensors) else {}
+    limits = np.log([s.limit for s in saturated.values()])
+    differ = limits.size > 1 and bool(np.ptp(limits) > 2.0 * SATURATION.limit_sd)
+    return {} if differ or limits.size == len(campaign.sensors) else saturated
 
 
 def _combine_limits(by_passages: SaturationLimit, by_impacts: SaturationLimit) -> SaturationLimit:
