@@ -85,7 +85,7 @@ def equilibrium(
     Raises
     ------
     SimulationError
-        If the residual is not below ``TOLERANCE`` after 50 steps.
+        If the residual is not below ``TOLERANCE`` after 50 steps, or if these diverge.
     """
     rows, weights, local, share, dip = initial_ports
     n_port = ports.body.size
@@ -117,7 +117,10 @@ def equilibrium(
         jacobian[:n_port, n_port:] = -slope[:, None] * touches.T
         jacobian[n_port:, :n_port], jacobian[n_port:, n_port:] = touches, stiff
         # Least squares: the position of a wheel with a given force is not determined.
-        change = np.linalg.lstsq(jacobian, residual, rcond=1e-15)[0]
+        try:
+            change = np.linalg.lstsq(jacobian, residual, rcond=1e-15)[0]
+        except np.linalg.LinAlgError:  # the steps diverge, to numbers too large for it
+            break
         force, wheel_z = force - change[:n_port], wheel_z - change[n_port:]
     worst = int(np.argmax(np.abs(residual)))
     raise SimulationError(

@@ -14,6 +14,7 @@ from turnout.simulate import (
     prepare_passage,
     simulate_hammer,
     simulate_passage,
+    statics,
     uniform_track,
 )
 from turnout.simulate.force_laws import PowerLaw, TableLaw
@@ -91,6 +92,18 @@ def test_an_error_about_convergence_states_time_wheel_and_residual(monkeypatch):
     drive = Drive(12.0, 0.0, entry=0.0, free_fall=(0.0, 1.0))
     with pytest.raises(SimulationError, match=r"did not converge at 0\.0\d+ s: residual .* N at wheel 0"):
         run(prepare(TRACK, 1e-4), 0.05, [], wheel, drive)
+
+
+def test_an_equilibrium_whose_steps_diverge_is_an_error_of_the_simulation(monkeypatch):
+    """LAPACK gives up on numbers of very different size. A fit takes a shorter step then, as for any other error."""
+
+    def diverging(*args, **kwargs):
+        raise np.linalg.LinAlgError("SVD did not converge in Linear Least Squares")
+
+    monkeypatch.setattr(np.linalg, "lstsq", diverging)
+    monkeypatch.setattr(statics, "TOLERANCE", 0.0)  # else the first guess is the equilibrium of this wheel
+    with pytest.raises(SimulationError, match="static equilibrium at time 0 s not found: residual"):
+        run(prepare(TRACK, 1e-4), 0.05, [], lone_wheels(700.0), Drive(12.0, 10.0, entry=0.0))
 
 
 def test_a_track_that_carries_nothing_is_rejected():
