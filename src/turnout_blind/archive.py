@@ -7,13 +7,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.files import write_atomic
 from turnout_blind.campaign import stage
 from turnout_blind.effect import load_effects
 from turnout_blind.reveal import read_findings
 from turnout_blind.seal import SET_FILE, BlindError, digest, file_digests, verify
 from turnout_blind.site import PLAIN
 from turnout_blind.strata import CasePlan, case_id, plan_cases
+from turnout_blind.whole_file import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -60,7 +60,7 @@ def write_archive(out: str | Path, folder: str | Path, truth: str | Path | None 
         "diagnosis": diagnosis,
     }
     data = json.dumps(content, sort_keys=True, separators=(",", ":")).encode()
-    write_atomic(folder / ARCHIVE_NAME, lambda stream: stream.write(gzip.compress(data, 9, mtime=0)))
+    write_whole(folder / ARCHIVE_NAME, gzip.compress(data, 9, mtime=0))
     return folder / ARCHIVE_NAME
 
 

@@ -12,11 +12,10 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 import turnout
-from turnout.counts import count_of
-from turnout.files import write_text
 from turnout_blind.isolation import HiddenFolders
 from turnout_blind.limited_process import run, with_cpu_limit
 from turnout_blind.seal import BlindError, check_seals, digest, digest_of_folder, read_commit
+from turnout_blind.whole_file import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -141,7 +140,7 @@ def _is_pending(run: Mapping[str, Any] | None, again: bool) -> bool:
 
 
 def _write_record(path: Path, diagnosis: Mapping[str, Any]) -> None:
-    write_text(path, json.dumps(diagnosis, indent=1, sort_keys=True) + "\n")
+    write_whole(path, (json.dumps(diagnosis, indent=1, sort_keys=True) + "\n").encode())
 
 
 def _generator_folders() -> list[Path]:
@@ -198,8 +197,8 @@ def _diagnose_case(
         if printed is None:
             message = f"printed no rows; {message}"
         else:
-            message = f"{count_of(len(printed), 'row')} printed" if printed else message
-            write_text(rows_path, json.dumps(printed, indent=1) + "\n")
+            message = f"{len(printed)} row{'s' if len(printed) > 1 else ''} printed" if printed else message
+            write_whole(rows_path, (json.dumps(printed, indent=1) + "\n").encode())
     ok = ok and _holds_rows(rows_path)
     status = "answered" if ok else "over budget" if process.stop_reason else "failed"
     return _run_record(status, process.code, process.cpu, process.wall, message, rows_path if ok else None)

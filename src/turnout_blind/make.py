@@ -7,12 +7,11 @@ import os
 import platform
 import secrets
 import shutil
-from concurrent.futures import as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import turnout
-from turnout.child_processes import ProcessPool
 from turnout_blind.campaign import make_case
 from turnout_blind.effect import load_effects
 from turnout_blind.history import HistoryPlan, make_history, plan_histories
@@ -45,6 +44,7 @@ def make_set(
     workers: int = 1,
     progress: Callable[..., Iterable] | None = None,
     histories: tuple[int, int] | None = None,
+    pool: Callable[[int], Executor] | None = None,
 ) -> str:
     """Write ``out``/cases, ``out``/commit.json and the truths below ``truth``.
 
@@ -71,6 +71,8 @@ def make_set(
     histories : (int, int) or None
         Number of sites with a history of two years, and of passages at each visit; None: single campaigns. They have
         no fast tier and no choice of kinds. Half of them are in crossing panels, or all in switch panels.
+    pool : callable or None
+        Number of processes -> executor; None: that of the standard library, which completes all cases if interrupted.
 
     Returns
     -------
@@ -106,8 +108,8 @@ def make_set(
         (out / "cases", truth, case_id(set_seed, k), plan, effect_folders, set_seed) for k, plan in enumerate(plans)
     ]
     pending = [job for job in jobs if not _is_made(job)]
-    with ProcessPool(workers) as pool:
-        futures = [pool.submit(_make, job) for job in pending]
+    with (pool or ProcessPoolExecutor)(workers) as executor:
+        futures = [executor.submit(_make, job) for job in pending]
         for future in (progress or (lambda finished, total: finished))(as_completed(futures), len(futures)):
             future.result()
     shutil.rmtree(out / "unfinished", ignore_errors=True)

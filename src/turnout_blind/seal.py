@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.errors import TurnoutError
-from turnout.files import write_atomic
+from turnout_blind.whole_file import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -106,7 +106,7 @@ def write_truth(folder: str | Path, name: str, content: Mapping[str, Any], seed:
     """
     nonce = digest(f"nonce {seed} {name}".encode())[:32]
     data = json.dumps({**content, "nonce": nonce}, indent=1, sort_keys=True).encode() + b"\n"
-    write_atomic(Path(folder) / f"{name}.json", lambda stream: stream.write(data))
+    write_whole(Path(folder) / f"{name}.json", data)
     return digest(data)
 
 
@@ -158,7 +158,7 @@ def write_commit(out: str | Path, truths: Mapping[str, str], examines: str | Non
         "cases": cases,
     }
     data = json.dumps(content, indent=1, sort_keys=True).encode() + b"\n"
-    write_atomic(out / COMMIT_FILE, lambda stream: stream.write(data))
+    write_whole(out / COMMIT_FILE, data)
     return digest(data)
 
 

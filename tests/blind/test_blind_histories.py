@@ -143,7 +143,7 @@ def test_a_set_of_histories_is_sealed_like_any_other(tmp_path, monkeypatch):
         return {"case": case, "pattern": plan.pattern, "effects": []}
 
     monkeypatch.setattr("turnout_blind.make.make_history", make_small_case)
-    monkeypatch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)
+    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
     sha = [make_set(tmp_path / f"s{k}", tmp_path / f"t{k}", 7, histories=(4, 2)) for k in range(2)]
     assert sha[0] == sha[1]
     assert json.loads((tmp_path / "t0" / "set.json").read_text())["histories"] == [4, 2]

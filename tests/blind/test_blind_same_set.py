@@ -21,7 +21,7 @@ def small_cases(monkeypatch):
         return {"case": case, "stratum": plan.stratum, "effects": []}
 
     monkeypatch.setattr("turnout_blind.make.make_case", make_small_case)
-    monkeypatch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)
+    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
 
 
 def tool_is(monkeypatch, sha):

@@ -48,7 +48,7 @@ def small_set(tmp_path_factory):
     seed = 57  # whose first two cases in shuffled order are a control and a single
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("turnout_blind.campaign.stage", with_two_passages)
-        patch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)  # which has what is patched
+        patch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)  # which has what is patched
         make_set(out, truth, seed, only={"pad"}, limit=2)
     return out, truth
 
@@ -307,7 +307,7 @@ def test_an_interrupted_generation_of_a_set_continues(small_set, tmp_path, monke
         make_set(out, truth, 20, only={"pad"}, limit=2)
     made_again = []
     monkeypatch.setattr("turnout_blind.make._make", lambda job: made_again.append(job[2]))
-    monkeypatch.setattr("turnout_blind.make.ProcessPool", ThreadPoolExecutor)
+    monkeypatch.setattr("turnout_blind.make.ProcessPoolExecutor", ThreadPoolExecutor)
     (truth / f"{lost.name}.json").write_text("{}")
     shutil.rmtree(lost)
     with pytest.raises(BlindError, match="a set is there already"):

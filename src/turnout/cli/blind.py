@@ -114,6 +114,7 @@ def _truth(args: argparse.Namespace) -> str:
 def _make(args: argparse.Namespace) -> None:
     from pathlib import Path
 
+    from turnout.child_processes import ProcessPool
     from turnout_blind.make import make_set
     from turnout_blind.seal import BlindError
 
@@ -128,7 +129,7 @@ def _make(args: argparse.Namespace) -> None:
     histories = (args.histories, args.passages or 1) if args.histories else None
     sha = make_set(
         args.out, _truth(args), args.seed, not args.fast, args.effects_folder, only, args.limit, args.panel, args.cores,
-        _bar, histories,
+        _bar, histories, ProcessPool,
     )  # fmt: skip
     print(f"sealed: SHA-256 of commit.json is {sha}; the truth lies in {_truth(args)}")
 

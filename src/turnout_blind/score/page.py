@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.files import write_text
 from turnout_blind.score.case_reports import case_texts
 from turnout_blind.score.plots import draw_reliability, draw_severity
 from turnout_blind.score.report import read_oracle, report_text, score_set
 from turnout_blind.seal import BlindError
+from turnout_blind.whole_file import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -71,5 +71,5 @@ def write_page(
         ]
     )  # fmt: skip
     head, tail = text.split(BEGIN)
-    write_text(path, f"{head}{BEGIN}\n\n{measured}\n\n{END}{tail.split(END)[1]}")
+    write_whole(path, f"{head}{BEGIN}\n\n{measured}\n\n{END}{tail.split(END)[1]}".encode())
     return path

@@ -237,7 +237,8 @@ def test_a_signal_leaves_open_contexts_in_order_and_its_number_is_in_the_exit_co
     code = (
         "import os, signal, sys, time, turnout.cli.plan as command\n"
         "from turnout.files import write_atomic\n"
-        "signal.signal(2, signal.default_int_handler)\n"
+        "signal.signal(1, signal.SIG_DFL)\n"  # ignored below nohup
+        "signal.signal(2, signal.default_int_handler)\n"  # ignored in the background
         f"def slow(stream):\n    os.kill(os.getpid(), {int(number)}); time.sleep(5)\n"
         f"command.run = lambda args: write_atomic({str(tmp_path / 'page.html')!r}, slow)\n"
         "from turnout.cli.main import main; sys.exit(main(['plan']))"
