@@ -139,7 +139,7 @@ def test_several_sensors_of_one_passage_count_as_one_passage(bench, tmp_path):
     expected, found = without_channels(bench), without_channels(more)
     for view, frame in expected.items():
         assert len(frame) and frame.notna().any().all(), view
-        pd.testing.assert_frame_equal(found[view], frame, rtol=1e-9, obj=view)
+        pd.testing.assert_frame_equal(of_both[view], frame, rtol=1e-9, obj=view)
     assert more.ask("select sum(n) from fit_by_cluster_week") == [
         (3 * bench.ask("select sum(n) from fit_by_cluster_week")[0][0],)
     ]
@@ -177,10 +177,10 @@ def test_recordings_of_a_train_by_two_loggers_count_as_one_train(bench, tmp_path
     both = type(bench)(tmp_path / "both")
     bench.register(*trains)
     both.register(*trains, *second)
-    expected, found = counts_of_trains(bench), counts_of_trains(both)
-    for view, frame in expected.items():
+    of_one, of_both = counts_of_trains(bench), counts_of_trains(both)
+    for view, frame in of_one.items():
         assert len(frame), view
-        pd.testing.assert_frame_equal(found[view], frame, rtol=1e-9, obj=view)
+        pd.testing.assert_frame_equal(of_both[view], frame, rtol=1e-9, obj=view)
     assert both.ask("select distinct n_recordings from trains_current") == [(2,)]
 
 

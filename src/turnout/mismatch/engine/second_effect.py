@@ -144,8 +144,8 @@ def add_second(findings: Findings, second: Verdict, score: Score | None) -> tupl
     rule = first_applicable(SECOND_RULES, evidence)
     first, *further = findings.verdicts
     if rule.answer == "first":
-        kept = replace(first, reason=rule.reason_for(evidence)) if rule.reason else first
-        return findings.after(rule, verdicts=(kept, *further)), False
+        first = replace(first, reason=rule.reason_for(evidence)) if rule.reason else first
+        return findings.after(rule, verdicts=(first, *further)), False
     verdicts = (evidence.split_first, *further)
     if rule.answer == "split first":
         return findings.after(rule, verdicts=verdicts), False
