@@ -139,7 +139,7 @@ def test_several_sensors_of_one_passage_count_as_one_passage(bench, tmp_path):
     expected, found = without_channels(bench), without_channels(more)
     for view, frame in expected.items():
         assert len(frame) and frame.notna().any().all(), view
-        pd.testing.assert_frame_equal(of_both[view], frame, rtol=1e-9, obj=view)
+        pd.testing.assert_frame_equal(found[view], frame, rtol=1e-9, obj=view)
     assert more.ask("select sum(n) from fit_by_cluster_week") == [
         (3 * bench.ask("select sum(n) from fit_by_cluster_week")[0][0],)
     ]
