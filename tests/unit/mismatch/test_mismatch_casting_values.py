@@ -9,6 +9,8 @@ from turnout.mismatch.turnout.planned_case import small_plan
 from turnout.mismatch.turnout.rail_parameters import CASTING_SDS, RAIL_SDS, rail_sds, with_rail
 from turnout.mismatch.turnout.track_parameters import track_nuisances
 from turnout.mismatch.turnout.zone import casting_elements, zone_of
+from turnout.simulate.frequency_response import receptance
+from turnout.simulate.matrices import assemble
 from turnout.simulate.track import RailStretch
 
 PLAN = small_plan((15.0,), hammer_positions=(24.0,))
@@ -90,6 +92,38 @@ def test_castings_are_those_of_the_track_on_which_impacts_are_modelled():
     turnout = replace(PLAN.turnout, track=TRACK, tracks={"diverging": TRACK, "main": cast})
     assert zone_of(turnout, [21.0, 27.3]).castings
     assert not zone_of(replace(turnout, track=cast, tracks={"diverging": cast, "main": TRACK}), [21.0, 27.3]).castings
+
+
+def test_both_ends_of_a_casting_that_leaves_the_measured_range_have_values_of_their_own():
+    """It ends 5 m behind the last sensor. Another one begins 7 m before the first."""
+    long, away = RailStretch(25.0, 32.3, HEAVY), RailStretch(5.0, 14.0, HEAVY)
+    cast = TRACK.with_(stretches=(away, long))
+    pieces = zone_of(replace(PLAN.turnout, track=cast, tracks={"main": cast}), [21.0, 27.3]).castings
+    assert [(c.piece.start, c.piece.end, c.inner) for c in pieces][-2:] == [
+        pytest.approx((32.0, 32.3, False)), pytest.approx((32.3, 32.6, False)),
+    ]  # fmt: skip
+    assert {c.stretch for c in pieces} == {long} and pieces[0].piece.start == pytest.approx(24.7)
+
+
+def test_the_end_of_a_casting_almost_five_metres_away_matters_more_than_the_farthest_pad_with_a_value_of_its_own():
+    """A section that grows over 0.6 m reflects less than a step. A pad 1.8 m away is 15 % stiffer."""
+    frequency = np.arange(300.0, 800.0, 10.0)
+    beams = [
+        replace(TRACK.rail, bending_stiffness=(1.0 + 0.7 * share) * TRACK.rail.bending_stiffness,
+                mass=(1.0 + 1.2 * share) * TRACK.rail.mass)
+        for share in np.arange(0.95, 0.0, -0.1)
+    ]  # fmt: skip
+    ramp = tuple(RailStretch(32.0 + 0.06 * k, 32.06 + 0.06 * k, beam) for k, beam in enumerate(beams))
+    step = TRACK.with_(stretches=(RailStretch(25.0, 32.3, HEAVY),))
+    grown = TRACK.with_(stretches=(RailStretch(25.0, 32.0, HEAVY), *ramp))
+    pads = np.where(np.abs(TRACK.support - 29.4) < 1e-6, 1.15, 1.0) * TRACK.pad_stiffness
+
+    def change(one, other):
+        h = [receptance(assemble(track), frequency, 27.6, 27.3) for track in (one, other)]
+        return np.sqrt(np.mean(np.abs(h[1] / h[0] - 1.0) ** 2))
+
+    assert np.count_nonzero(pads != TRACK.pad_stiffness) == 1
+    assert change(step, grown) > change(TRACK, TRACK.with_(pad_stiffness=pads))
 
 
 def test_plain_track_has_no_castings():

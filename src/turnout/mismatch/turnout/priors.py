@@ -87,6 +87,9 @@ class TrackPriors:
         JOINT_RECEPTANCE)
     support_reach: float = prior(
         1.9, "m", "beyond sensors and impacts: supports there have values of their own", COMMON_PARAMETERS)
+    casting_reach: float = prior(
+        6.0, "m", "beyond sensors and impacts: pieces of a casting there have values of their own: its ends reflect",
+        CROSSING_PANELS)
     effect_reach: float = prior(
         0.7, "m", "beyond sensors and impacts: supports there may have an effect; those farther out absorb all beyond",
         LOCATED)

@@ -79,9 +79,9 @@ def zone_of(turnout: TurnoutTrack, positions: Sequence[float]) -> Zone:
     inside, effect_supports = (
         np.flatnonzero((support >= low - r) & (support <= high + r)) for r in (TRACK.support_reach, TRACK.effect_reach)
     )
-    castings = castings_of(
-        smaller.track_of("main"), low - TRACK.support_reach, high + TRACK.support_reach
-    )  # receptances are modelled on it
+    castings = castings_of(  # on the track on which receptances are modelled
+        smaller.track_of("main"), low - TRACK.casting_reach, high + TRACK.casting_reach
+    )
     return Zone(
         smaller, int(inside[0]), int(inside[-1]), range(int(effect_supports[0]), int(effect_supports[-1]) + 1), castings
     )
