@@ -14,7 +14,7 @@ from turnout.readers.attached_units import name_and_unit, names_and_units_in
 from turnout.readers.channel_descriptions import describing_entries, exchanged_channels
 from turnout.readers.channel_units import CORRECT_SOURCE, checked_conversion
 from turnout.readers.column_forms import HEAD_SIZE, counts_samples, rises_evenly
-from turnout.readers.entries import UnreadObject
+from turnout.readers.entries import Entry, UnreadObject
 from turnout.readers.rate_units import rate_unit
 from turnout.readers.rate_vocabulary import is_rate_name
 from turnout.readers.source import RawRecord, Source
@@ -56,12 +56,14 @@ def kind_of(dtype: Any) -> str:
 
 
 def channel_mappings(
-    record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source
+    record: RawRecord, channels: Sequence[RawChannel], where: str, source: Source, is_passage: bool = False
 ) -> tuple[ChannelMapping, ...]:
     """Assign the channels of the layout to rows of the file.
 
     ``RawChannel.limit`` and ``resolution`` are in SI already. Channels with the quantity "ignored" are not read and may
     be absent if the layout names them. A number that the file does not have shows that the layout counts otherwise.
+    A file of a passage may lack channels that the layout names, as that of one of two loggers does, if the layout names
+    all of its own: then none of them can be a missing one under another name.
 
     Parameters
     ----------
@@ -73,6 +75,8 @@ def channel_mappings(
         The record, for the message.
     source : Source
         The raw file.
+    is_passage : bool
+        Whether the record is of a passage.
 
     Returns
     -------
@@ -90,18 +94,23 @@ def channel_mappings(
         if c.quantity != IGNORED or isinstance(c.source, int) or _has_channel(record, c.source, where, source)
     ]
     sources = [channel.source for channel in channels]
-    indices = [index_of(record, wanted, where, source, sources) for wanted in sources]
+    present = [c for c in channels if not _is_absent(record, c.source)] if is_passage else channels
+    indices = [index_of(record, c.source, where, source, sources) for c in present]
     if len(set(indices)) < len(indices):
         twice = next(i for i in indices if indices.count(i) > 1)
         raise source.error(where, f"the layout names the channel {record.names[twice]!r} twice", "Name each once")
-    unknown = sorted(set(range(len(record.names))) - set(indices))
-    if unknown := [
+    unknown = [
         i
-        for i in unknown
+        for i in sorted(set(range(len(record.names))) - set(indices))
         if not is_axis_name(record.names[i], record.units[i])
         and not is_rate_name(record.names[i])
         and not _needs_no_name(record, i)
-    ]:
+    ]
+    if absent := [c.source for c in channels if c not in present]:
+        if unknown or not any(c.quantity != IGNORED for c in present):
+            index_of(record, absent[0], where, source, sources)
+        channels = present
+    if unknown:
         names = _name_list([record.names[i] or str(i) for i in unknown])
         problem = (
             f"the file has {'channel' if len(unknown) == 1 else 'channels'} {names}, which the layout does not name"
@@ -195,13 +204,27 @@ def index_of(
         else f"{CORRECT_SOURCE}, or find out why the logger did not record the channel"
     )
     problem = f"there is no channel {wanted!r}; there are {_name_list(record.names)}"
-    texts = [(e, text) for e in record.entries for text in (e.value, e.name) if isinstance(text, str)]
-    stated = next((e for e, text in texts if key in (_key_of_name(text), _key_of_name(name_and_unit(text)[0]))), None)
-    if stated:
+    if stated := _entry_with_name(record, key):
         is_value = isinstance(stated.value, str) and _key_of_name(stated.value) == key
         problem += f", and {wanted!r} {f'is the value of {stated.name!r}' if is_value else 'stands'} in {stated.place}"
         hint = "Name the channel by its number in the layout, from 0; nothing in the file gives this name to a channel"
     raise source.error(where, problem, hint, reason="channel_missing")
+
+
+def _entry_with_name(record: RawRecord, key: str) -> Entry | None:
+    """The entry whose name or value is the name of a channel, which no channel of the file has."""
+    texts = [(e, text) for e in record.entries for text in (e.value, e.name) if isinstance(text, str)]
+    return next((e for e, text in texts if key in (_key_of_name(text), _key_of_name(name_and_unit(text)[0]))), None)
+
+
+def _is_absent(record: RawRecord, wanted: str | int) -> bool:
+    """Whether nothing in the file has the name of a channel: no channel, no alias, no other content and no entry."""
+    if isinstance(wanted, int) or wanted in record.not_numbers:
+        return False
+    key = _key_of_name(wanted)
+    bare = [name for name, _ in names_and_units_in(record.names)]
+    labels = (*record.names, *bare, *(alias for aliases in record.aliases for alias in aliases))
+    return key not in map(_key_of_name, labels) and _entry_with_name(record, key) is None
 
 
 def _needs_no_name(record: RawRecord, i: int) -> bool:
@@ -270,10 +293,12 @@ class Assignments:
         Channels of the layout.
     source : Source
         The raw file.
+    is_passage : bool
+        Whether its records are of passages.
     """
 
-    def __init__(self, channels: Sequence[RawChannel], source: Source):
-        self.channels, self.source = channels, source
+    def __init__(self, channels: Sequence[RawChannel], source: Source, is_passage: bool = False):
+        self.channels, self.source, self.is_passage = channels, source, is_passage
         self._has_sensitivity = any(c.sensitivity is not None for c in channels)
         self._keyed: tuple[RawRecord, tuple] | None = None
         self._stated: tuple[Any, tuple] = (None, ())  # entries, which records may share, and what they state of units
@@ -349,5 +374,5 @@ class Assignments:
         """
         key = self._key(record)
         if key not in self._mappings or record.audio:
-            self._mappings[key] = channel_mappings(record, self.channels, where, self.source)
+            self._mappings[key] = channel_mappings(record, self.channels, where, self.source, self.is_passage)
         return self._mappings[key]

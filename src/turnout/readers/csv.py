@@ -47,7 +47,7 @@ from turnout.readers.csv_columns import seconds_per_number, time_column
 from turnout.readers.csv_header import Head, read_head
 from turnout.readers.csv_outer_rows import outer_row_remarks
 from turnout.readers.csv_rows import columns_in_memory, lazy_columns
-from turnout.readers.csv_words import check_valid, entries_of_words, holds_words
+from turnout.readers.csv_words import holds_words
 from turnout.readers.entries import Entry
 from turnout.readers.label_lines import has_labels, with_joined_labels
 from turnout.readers.lazy import Column, LazyColumn
@@ -69,6 +69,7 @@ from turnout.readers.stated_scales import entry_statements, scale_problem, scale
 from turnout.readers.stated_units import decoded_units
 from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
+from turnout.readers.word_columns import check_valid, entries_of_overloads, rarest_words
 
 
 def read_raw(source: Source) -> RawFile:
@@ -271,8 +272,7 @@ def _records(
         else np.asarray(columns[time]) * seconds_per_number(units[time], source)
     )
     words = {names[i] or str(i): np.asarray(c[:]) for i, c in enumerate(columns) if holds_words(c)}
-    for name, column in words.items():
-        check_valid(name, column, source)
+    check_valid(words, source)
     n_row = len(columns[0])
     spans = spans_of_records(numbers, n_row)
     n = len(spans)
@@ -316,10 +316,8 @@ def _records(
             time_label="" if time is None else _label(names, units, time),
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
-            entries=(
-                *entries,
-                *(entry for name, column in words.items() for entry in entries_of_words(name, column[a:b])),
-            ),
+            entries=(*entries, *entries_of_overloads({name: column[a:b] for name, column in words.items()})),
+            states={name: rarest_words(column[a:b]) for name, column in words.items()},
             counters={name: numbers_of_texts(column[a:b]) for name, column in words.items()},
         )
 

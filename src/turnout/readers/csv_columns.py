@@ -256,7 +256,12 @@ def names_and_units(lines: list[list[str]], cells: list[str]) -> Columns:
     """
     count, open_end = len(cells), not cells[-1]
     if any(len(line) == count + 1 and is_unit_name(line[0]) for line in lines):  # labels, and none before the rows
-        lines = [line[1:] if len(line) == count + 1 else line for line in lines]
+        is_labelled = [len(line) == count + 1 for line in lines]
+        lines = [
+            line[1:] if is_label else line
+            for is_label, line in zip(is_labelled, lines)
+            if not (is_label and is_unit_of_other(line[0]))  # of the time: "HUnit;s;s"
+        ]
     whole_lines = [line for line in lines if any(line) and len(line) >= count - open_end]
     lines = [(line + [""] * open_end)[:count] for line in whole_lines]
     if not lines:

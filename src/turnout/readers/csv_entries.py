@@ -135,18 +135,18 @@ def entries_of_lines(
         elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn and not _is_statement(match[1], text):
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
-        entries = [Entry(place, name.strip('"# '), value.strip('"')) for name, value in pairs]
+        entries = [Entry(place, name.strip('"# ').rstrip(": "), value.strip('"')) for name, value in pairs]
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
-            entries = [Entry(place, cells[0], cells[1:])]  # one for each column
+            entries = [Entry(place, cells[0].rstrip(": "), cells[1:])]  # one for each column
         elif len(cells) > 2 and _has_time_for_each(cells, names):
             entries = [
                 Entry(place, cells[0].strip(":= "), DECIMAL_COMMA.sub(r"\1.", cell)) for cell in cells[1:] if cell
             ]
         elif len(cells) > 2 and _has_value_for_each(cells, names):
-            entries = [Entry(place, cells[0], [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
+            entries = [Entry(place, cells[0].rstrip(": "), [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
         elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
-            entries = [Entry(place, cells[0], [cell.replace(",", ".") for cell in cells[1:]])]
+            entries = [Entry(place, cells[0].rstrip(": "), [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
         is_list = any(isinstance(entry.value, list) for entry in entries)
         is_settled = is_list or any(is_rate_name(e.name) or subject_of(e.name) == STRONG for e in entries)

@@ -39,6 +39,7 @@ from turnout.readers.scale_vocabulary import (
     scale_meaning,
 )
 from turnout.readers.source import CONDITIONS, SIMULATED_CONDITIONS
+from turnout.readers.stated_counts import is_block_name
 from turnout.readers.stated_quantities import quantity_of_text
 from turnout.readers.stated_units import known_unit
 from turnout.readers.time_texts import looks_dated
@@ -110,6 +111,8 @@ CHANGED = re.compile(
     r"|umgepolt|verpolt|prepolovan\w*|ompolet"
     r"|multipl(?:y|ied|ier)|multipliz\w*|divided|resampled|decimated|downsampled|integrated|differentiated|binary|voltage|volts|percent"
 )
+# Names of the way in which an oscilloscope records, where "raw" is none of averages or envelopes.
+TYPE_WORDS = frozenset("type mode acquisition acq waveform trace".split())
 INVERTED = re.compile(r"inv|invert\w*|flip\w*|negat\w*|revers\w*|raw")
 DENIED = re.compile(
     r"no|not|nicht|ikke|niet|none|nein|non|nej|ingen|off|false|0|normal|without|ohne|sans|uden|never|kein\w*"
@@ -121,8 +124,8 @@ CONVERTED = re.compile(
 AFFIRMED = frozenset("yes true ja oui si on 1".split())
 # Names that a format defines: start of the abscissa, state of the scaling, versions, numbers of dimensions.
 STANDARD_NAMES = frozenset(
-    ("x0", "tstart", "xstart", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major", "minor",
-     "writerversion", "readerversion", "netcdf4dimid", "netcdf4coordinates", "nidatatype", "nichannellength")
+    ("x0", "tstart", "xstart", "hoffset", "wfstartoffset", "niscalingstatus", "startoffset", "feature", "major",
+     "minor", "writerversion", "readerversion", "netcdf4dimid", "netcdf4coordinates", "nidatatype", "nichannellength")
 )  # fmt: skip
 NO_STATEMENT = frozenset(("", "-", "n/a", "na", "?", "unknown", "nan", "null", "undefined", "not set"))
 DATED = re.compile(r"\d{1,4}[-./]\s?\d{1,2}[-./]\s?\d{1,4}|\d{2}:\d{2}(?::\d{2})?|\d{1,2}[-. ][A-Za-z]{3}[-. ]\d{2,4}")
@@ -326,7 +329,12 @@ def _unit_of_name(name: str) -> str:
 
 def _of_number(name: str, number: str, unit: str, subject: int) -> Iterator[Candidate]:
     """Candidates of a bare number under a name."""
-    if _is_compared(name, number) or scale_meaning(name) not in ("", LEVELS) or is_fill_name(name):
+    if (
+        _is_compared(name, number)
+        or scale_meaning(name) not in ("", LEVELS)
+        or is_fill_name(name)
+        or is_block_name(name)
+    ):
         return  # by other modules
     if "_".join(words_of(name)) in CONDITIONS:
         return  # the condition itself: a speed, a temperature
@@ -365,7 +373,8 @@ def _of_state(name: str, text: str) -> Iterator[Candidate]:
         if sign == UNCLEAR and not is_changed and len(words) <= MAX_WORDS:
             yield Candidate(SCALE, text[:MAX_SIZE], True)
     if is_changed:
-        yield Candidate(SCALE, text[:MAX_SIZE])
+        is_type = words == ("raw",) and TYPE_WORDS.issuperset(names)
+        yield Candidate(SCALE, text[:MAX_SIZE], is_type)
 
 
 def _of_quantity(name: str, match: re.Match[str], subject: int, is_part: bool = False) -> Iterator[Candidate]:

@@ -51,7 +51,7 @@ class EntryCheck:
 
     def __init__(self, description: RawDescription, source: Source):
         self.source = source
-        self.checked = frozenset(name.strip().casefold() for name in description.checked_entries)
+        self.checked = frozenset(name.strip().rstrip(": ").casefold() for name in description.checked_entries)
         units = [c.unit for c in description.channels if c.quantity != IGNORED and c.unit]
         self._is_hammer_test = description.kind == "hammer"
         self._channels = [c for c in description.channels if c.quantity != IGNORED]

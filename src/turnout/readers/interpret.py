@@ -26,6 +26,7 @@ from turnout.readers.rate_agreement import ABSCISSA_REMEDY, check_unknown_step, 
 from turnout.readers.rate_vocabulary import CERTAIN
 from turnout.readers.record_borders import Measurement, border_errors
 from turnout.readers.sample_faults import (
+    absent_channels_error,
     count_missing,
     decisive_fault,
     faults_by_channel,
@@ -35,7 +36,7 @@ from turnout.readers.sample_faults import (
 from turnout.readers.simultaneous_records import simultaneous_errors
 from turnout.readers.source import COPY_AGAIN, MIN_SAMPLES, RawFile, RawRecord, Source
 from turnout.readers.start_times import check_order, is_plausible, start_errors, start_times, zone_errors
-from turnout.readers.stated_counts import missing_samples, surplus_samples, unfilled_buffer
+from turnout.readers.stated_counts import count_remarks, missing_samples, unfilled_buffer
 from turnout.readers.stated_zones import with_zone_of_layout
 from turnout.readers.thousands_marks import mark_errors
 from turnout.readers.time_axes import all_statements
@@ -90,14 +91,12 @@ def convert_records(
     starts = start_times(stamps, description.time_zone)
     order_errors = check_order(starts, source)
     start_of = dict(starts)
-    assignments, entry_check = Assignments(description.channels, source), EntryCheck(description, source)
+    assignments = Assignments(description.channels, source, description.kind == "passage")
+    entry_check = EntryCheck(description, source)
     n_total = sum(_lengths(raw))
     is_whole = all(isinstance(r, RawRecord) for r in raw.records)
     limit = max_duration if source.lazy and description.kind == "passage" else None
-    lengths = [len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples)]
-    conversion = _Conversion(
-        len(raw.records), min(lengths, default=0), assignments, entry_check, description, source, limit
-    )
+    conversion = _Conversion(len(raw.records), _lengths(raw), assignments, entry_check, description, source, limit)
     for k, record in enumerate(raw.records):
         try:
             if isinstance(record, ReadError):
@@ -144,10 +143,6 @@ def _lengths(raw: RawFile) -> list[int]:
     return [len(r.samples[0]) for r in raw.records if isinstance(r, RawRecord) and len(r.samples)]
 
 
-def _shortest(raw: RawFile) -> int:
-    return min(_lengths(raw), default=0)
-
-
 def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     """Errors about a raw file that need no layout: what ``convert_records`` would report or reject.
 
@@ -170,7 +165,7 @@ def errors_without_layout(raw: RawFile, source: Source) -> Iterator[ReadError]:
     yield from (
         []
         if first is None
-        else _surplus_remarks(first, _shortest(raw), len(raw.records), f"record 1 of {len(raw.records)}", source)
+        else count_remarks(first, _lengths(raw), len(raw.records), f"record 1 of {len(raw.records)}", source)
     )
     yield from lost_entry_errors(raw.records, source)
     records = [(k, record) for k, record in enumerate(raw.records) if isinstance(record, RawRecord)]
@@ -217,11 +212,11 @@ def _copy_or_correct(key: str, promised: int | None) -> str:
 class _Conversion:
     """What the ``n_record`` records of a file have in common.
 
-    The shortest has ``n_shortest`` samples. A record that is longer than ``max_duration`` [s] stays in the file.
+    Those that were read have ``lengths`` samples. A record that is longer than ``max_duration`` [s] stays in the file.
     """
 
     n_record: int
-    n_shortest: int
+    lengths: list[int]
     assignments: Assignments
     entry_check: EntryCheck
     description: RawDescription
@@ -293,8 +288,16 @@ class _Conversion:
         if description.kind == "hammer":
             of_marks += _word_remarks(record, checked, [*of_borders, *of_entries], where, source)
         if not description.n_samples:
-            of_marks += _surplus_remarks(record, self.n_shortest, self.n_record, where, source)
-        channel_errors = [*faults.values(), *([of_rate] if of_rate else []), *of_borders, *of_marks, *of_entries]
+            of_marks += count_remarks(record, self.lengths, self.n_record, where, source)
+        absent = absent_channels_error(channel_maps, description.channels, where, source)
+        channel_errors = [
+            *absent,
+            *faults.values(),
+            *([of_rate] if of_rate else []),
+            *of_borders,
+            *of_marks,
+            *of_entries,
+        ]
         if is_long:
             return LongRecording(block_reader.subset(usable), n_sample, **fields), channel_errors
         return Recording(samples=samples if not faults else samples[usable], **fields), channel_errors
@@ -336,7 +339,7 @@ def _word_remarks(
     No second one on a column that one of ``remarks`` quotes already.
     """
     for name, numbers in record.counters.items():
-        words = [str(entry.value) for entry in record.entries if entry.place == f"column {name!r}"]
+        words = record.states.get(name, ())
         is_quoted = any(repr(name) in str(remark) for remark in remarks)
         if not words or name.casefold() in checked or is_quoted or np.ptp(numbers) == 0:
             continue
@@ -345,16 +348,6 @@ def _word_remarks(
         problem = f"its words change: {n_changed} of {len(numbers)} rows have another one than most ({listed})"
         remedy = f"Find out whether they state a fault of a sensor; if not, write 'checked_entries: {name}'"
         yield source.error(f"{where}, column {name!r}", problem, f"{remedy} into the layout", reason="entry_unknown")
-
-
-def _surplus_remarks(
-    record: RawRecord, n_shortest: int, n_record: int, where: str, source: Source
-) -> Iterator[ReadError]:
-    """Remark on a stated number of samples that is less than that of the shortest record."""
-    problem, name = surplus_samples(record, n_shortest, n_record)
-    if problem:
-        remedy = f"Find out what the others are; if it counts something else, write 'checked_entries: {name}'"
-        yield source.error(where, problem, f"{remedy} into the layout", reason="entry_unknown")
 
 
 def _measurement(record: RawRecord, channel_maps: Sequence[ChannelMapping], kind: str, rate: float) -> Measurement:

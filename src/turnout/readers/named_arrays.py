@@ -61,6 +61,7 @@ from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
+from turnout.readers.word_columns import check_valid, entries_of_overloads
 
 
 def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None) -> RawFile:
@@ -316,16 +317,17 @@ def _raw_record(
         for name, value in facts.variables.items()
         if isinstance(value, np.ndarray) and value.dtype.kind in "mM" and value.shape == (len(samples[0]),)
     }
-    texts = {
-        name: numbers_of_texts(value)
+    words = {
+        name: value
         for name, value in facts.variables.items()
         if isinstance(value, np.ndarray) and value.shape == (len(samples[0]),) and are_texts(value)
     }
+    check_valid(words, facts.source)
     return RawRecord(
         names=tuple(names),
         samples=samples,
         clocks=tuple((f"variable {name!r}", seconds_since_first(value)) for name, value in clocks.items()),
-        entries=facts.entries,
+        entries=(*facts.entries, *entries_of_overloads(words)) if words else facts.entries,
         units=tuple(units),
         **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
         axis_starts=(
@@ -337,7 +339,7 @@ def _raw_record(
         time_label=facts.label_of(TIME_NAMES),
         undecided=_undecided_scales(names, facts),
         not_numbers=_not_numbers(facts.variables),
-        counters=texts,
+        counters={name: numbers_of_texts(value) for name, value in words.items()},
     )
 
 

@@ -38,6 +38,7 @@ from turnout.readers.stated_scales import entry_statements, scale_text, without_
 from turnout.readers.texts import decode_text
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
+from turnout.readers.word_columns import check_valid, entries_of_overloads
 
 ROWS_REMEDY = "Write one row for each sample and one column of numbers for each channel"
 MAX_LISTED = 6  # columns that a message names
@@ -83,7 +84,8 @@ def read_raw(source: Source) -> RawFile:
         kinds = ", ".join(f"{field.name!r} ({field.type})" for field in list(schema)[:MAX_LISTED])
         raise source.error("the columns", f"none holds one number in a row; there are {kinds}", ROWS_REMEDY, "empty")
     others = {name: x.dtype for name, x in columns.items() if x.dtype.kind not in "fiumM"}
-    texts = {name: numbers_of_texts(x) for name, x in columns.items() if isinstance(x, np.ndarray) and are_texts(x)}
+    words = {name: x for name, x in columns.items() if isinstance(x, np.ndarray) and are_texts(x)}
+    check_valid(words, source)
     not_numbers = {name: f"{kind_of(dtype)}, no real numbers" for name, dtype in others.items()}
     clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
     stamped = [name for name, x in columns.items() if x.dtype.kind == "M"]
@@ -106,7 +108,9 @@ def read_raw(source: Source) -> RawFile:
             RawRecord(
                 names=tuple(names),
                 samples=[columns[name] if rows else columns[name][span] for name in names],
-                entries=entries,
+                entries=(*entries, *entries_of_overloads({name: x[span] for name, x in words.items()}))
+                if words
+                else entries,
                 units=tuple(units[name] for name in names),
                 **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
                 axis_starts=(
@@ -120,7 +124,7 @@ def read_raw(source: Source) -> RawFile:
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
                 clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
                 not_numbers=not_numbers,
-                counters={name: numbers[span] for name, numbers in texts.items()},
+                counters={name: numbers_of_texts(x[span]) for name, x in words.items()},
             )
         )
     return RawFile(tuple(records) if n_row else (), facts.count(RECORD_COUNT_NAMES), remarks)

@@ -1,12 +1,13 @@
-"""Faults of the samples of a record: missing ones, blocks that occur twice, channels without a signal."""
+"""Faults of a record: absent channels, missing samples, blocks that occur twice, channels without a signal."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from turnout.counts import first_texts
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER, ChannelStatistics, channel_error
-from turnout.readers.channel_maps import ChannelMapping
+from turnout.readers.channel_maps import MAX_LISTED, ChannelMapping
 from turnout.readers.column_forms import is_count_or_time, rises_in_steps
 from turnout.readers.lazy import Column
 from turnout.readers.missing_codes import count_alone, missing_code
@@ -15,7 +16,8 @@ from turnout.readers.repeated_blocks import repeated_block
 from turnout.readers.scaled_copies import N_COMPARED, scaled_copies
 from turnout.readers.simultaneous_records import MAX_ROUNDING, add_shared, shared_channels
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
-from turnout.records import RawDescription
+from turnout.records import RawChannel, RawDescription
+from turnout.units import IGNORED
 
 MISSING_REMEDY = "Export the record again from the logger; if it is so there too, check the channel's cable and range"
 REPEAT_REMEDY = (
@@ -156,6 +158,38 @@ def repeat_error(samples: np.ndarray, where: str, source: Source) -> ReadError |
     start, copy, n = block
     problem = f"its samples {copy} to {copy + n - 1} repeat the samples {start} to {start + n - 1} to the last digit"
     return source.error(where, problem, REPEAT_REMEDY, reason="duplicate")
+
+
+def absent_channels_error(
+    mappings: Sequence[ChannelMapping], channels: Sequence[RawChannel], where: str, source: Source
+) -> list[ReadError]:
+    """One error about all channels of the layout that the file does not have and that were left out; none without one.
+
+    Parameters
+    ----------
+    mappings : sequence of ChannelMapping
+        Channels that are read.
+    channels : sequence of RawChannel
+        Channels of the layout.
+    where : str
+        The record, for the message.
+    source : Source
+        The raw file.
+
+    Returns
+    -------
+    list of ReadError
+    """
+    names = {mapping.channel.name for mapping in mappings}
+    absent = [str(c.source) for c in channels if c.quantity != IGNORED and c.name not in names]
+    if not absent:
+        return []
+    listed = first_texts([*map(repr, absent)], MAX_LISTED)
+    problem = f"the file has no channel {listed}; its {len(mappings)} other channels are used"
+    return [source.error(where, problem, ABSENT_REMEDY, reason="channel_missing")]
+
+
+ABSENT_REMEDY = "Nothing is to be done if another logger records them; else find out why this one did not"
 
 
 def decisive_fault(

@@ -66,7 +66,7 @@ CONVERTED = re.compile(r"[a-z]+2([a-z]+)2?")  # "lbf2N"
 OTHER_SCALE = re.compile(
     r"time|zeit|valid|number|^no$|^nr$|freq|rate|power|form|quality|load|sampl|decim|dynamic|posit|byte|pixel|colou?r|axis"
     r"|image|volt(?!s?$|age$)|speed|length|dist|full|range|cross|pad|limit|max|min|cover|peak|^q$|start|begin|mode|type"
-    r"|auto|cut|^x$|model"
+    r"|auto|cut|^[xh]$|model"
 )
 OTHER_OFFSET = re.compile(r"voltage|file|data|block|buffer|header|index")  # a bias, or a position in the file
 # What is drawn or shown at a scale: a map, a plot. Words for something that is switched off or sets itself.

@@ -230,6 +230,7 @@ class RawRecord:
     unit as it is written. ``clocks`` are further time axes (place, seconds). ``axis_starts`` are the times at which
     axes of time stamps begin, or the text of one that cannot be read. ``aliases`` are further names of the channels.
     ``counters`` are whole numbers that are no channels, one for each sample, by name: equal texts have equal numbers.
+    ``states`` are the different words of each column of words of a text file, by name, the rarest first.
     ``marked_numbers`` are cells with a mark that may be one for thousands, by the index of the channel.
     ``undecided`` are statements about the scale of channels, by index, of which nothing says whether it is applied;
     ``unit_conflicts`` are statements about units of channels that contradict each other, by index. ``not_numbers`` are
@@ -257,6 +258,7 @@ class RawRecord:
     aliases: tuple[tuple[str, ...], ...] = ()
     marked_numbers: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     counters: Mapping[str, np.ndarray] = field(default_factory=lambda: EMPTY_MAPPING)
+    states: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: EMPTY_MAPPING)
     undecided: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     unit_conflicts: Mapping[int, str] = field(default_factory=lambda: EMPTY_MAPPING)
     audio: str = ""

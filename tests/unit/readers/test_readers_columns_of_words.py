@@ -1,6 +1,9 @@
 """Columns of words beside the samples: alarms and digital inputs of loggers, states, marks at single samples."""
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from turnout.errors import ReadError
@@ -139,3 +142,39 @@ def test_words_between_blanks(tmp_path):
     result = read("a.txt", tmp_path, RawDescription(CHANNELS, rate=5000.0))
     np.testing.assert_array_equal([r.samples for r in result.recordings], [[FORCE, RAIL]])
     assert not result.errors
+
+
+def test_a_remark_on_words_quotes_the_rarest(tmp_path):
+    words = [f"step {k % 6}" for k in range(N)]
+    words[390] = "Sensorbruch"
+    _, (error,) = outcome(tmp_path, words, kind="hammer")
+    assert "('Sensorbruch', " in str(error)
+
+
+def write_table(tmp_path, extension, words):
+    path = tmp_path / f"a.{extension}"
+    if extension == "parquet":
+        pq.write_table(pa.table({"force": FORCE, "rail": RAIL, "State": words}), path)
+    elif extension == "npz":
+        np.savez(path, force=FORCE, rail=RAIL, State=np.array(words))
+    else:
+        with h5py.File(path, "w") as file:
+            file["force"], file["rail"], file["State"] = FORCE, RAIL, np.array([w.encode() for w in words])
+    return read(path.name, tmp_path, RawDescription(IN_UNITS, rate=5000.0, kind="hammer"))
+
+
+IN_UNITS = (RawChannel("force", "force", "force", "N"), RawChannel("rail", "rail", "acceleration", "m/s²"))
+
+
+@pytest.mark.parametrize("extension", ["parquet", "npz", "h5"])
+@pytest.mark.parametrize("word", ["OVR", "overload", "Überlast"])
+def test_an_overload_beside_the_samples_is_reported_in_any_format(word, extension, tmp_path):
+    result = write_table(tmp_path, extension, ["gut"] * 200 + [word] + ["gut"] * (N - 201))
+    assert [error.reason for error in result.errors] == ["entry_unknown"] and word in str(result.errors[0])
+    assert not write_table(tmp_path, extension, ["gut"] * N).errors
+
+
+@pytest.mark.parametrize("extension", ["parquet", "npz", "h5"])
+def test_a_word_that_says_that_samples_are_invalid_is_an_error_in_any_format(extension, tmp_path):
+    with pytest.raises(ReadError, match="'invalid' in row 201"):
+        write_table(tmp_path, extension, ["gut"] * 200 + ["invalid"] + ["gut"] * (N - 201))

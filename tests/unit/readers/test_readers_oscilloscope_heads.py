@@ -170,3 +170,31 @@ def test_the_unit_of_the_horizontal_axis_is_none_of_the_channels(tmp_path):
 def test_a_coupling_beside_a_range_is_no_offset(tmp_path):
     result = scope_text(tmp_path, ["CH1,hammer,DC,10V", "CH2,head,AC,5V", "CH1,CH2"])
     assert (len(result.recordings), result.errors) == (1, ())
+
+
+@pytest.mark.parametrize("unit", ['"VUnit","V","V"', '"Unit","V","V"'])
+def test_the_horizontal_axis_in_a_head_with_labels_and_rows_without_them(unit, tmp_path):
+    step = f"{1 / TRUE:.8g}"
+    head = ['"TraceName","CH1","CH2"', unit, f'"HResolution","{step}","{step}"', '"HOffset","-0.01","-0.01"',
+            '"HUnit","s","s"']  # fmt: skip
+    result = scope_text(tmp_path, head)
+    np.testing.assert_allclose([r.samples for r in result.recordings], [NOISE])
+    assert result.errors == () and names_and_units("a.csv", tmp_path)[-2:] == (("CH1", "V"), ("CH2", "V"))
+
+
+@pytest.mark.parametrize("name", ["VOffset", "Offset", "Y Offset"])
+def test_the_offset_of_another_axis_is_compared(name, tmp_path):
+    assert not scope_text(tmp_path, [f"{name},-0.01,-0.01", "CH1,CH2"]).recordings
+
+
+@pytest.mark.parametrize("lines", [["Type:,raw", "X Units:,second"], ["Type:,raw,raw"], ["Acq Mode,raw"]])
+def test_a_type_of_acquisition_is_a_remark(lines, tmp_path):
+    (error,) = scope_text(tmp_path, [*lines, "CH1,CH2"]).errors
+    assert error.reason == "entry_unknown"
+    name = lines[0].partition(",")[0].rstrip(":")
+    assert str(error).endswith(f"'checked_entries: {name}'.")
+
+
+@pytest.mark.parametrize("line", ["Data,raw", "Values,raw,raw"])
+def test_samples_that_are_called_raw_are_an_error(line, tmp_path):
+    assert not scope_text(tmp_path, [line, "CH1,CH2"]).recordings
