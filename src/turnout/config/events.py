@@ -272,6 +272,7 @@ def day_problem(text: str) -> tuple[str, str] | None:
     (True, (', which is no day of the calendar', 'Write a day that exists'), ('', 'Write YYYY-MM-DD'))
     """
     try:
+        _reject_week(text)
         date.fromisoformat(text)
     except ValueError:
         is_written_right = re.fullmatch(r"\d{4}-\d{2}-\d{2}", text, re.ASCII) is not None
@@ -308,8 +309,15 @@ def parse_utc(text: str) -> datetime:
     >>> parse_utc("2026-04-02t10:30z") == parse_utc("2026-04-02 10:30 UTC") == parse_utc("2026-04-02 10:30 +00:00")
     True
     """
+    _reject_week(text)
     time = datetime.fromisoformat(BLANK_BEFORE_OFFSET.sub("", UTC_MARK.sub("", text)))
     return time.replace(tzinfo=None) if time.utcoffset() == timedelta(0) else time
+
+
+def _reject_week(text: str) -> None:
+    """ValueError for a week of ISO 8601, which Python takes for its Monday: 2026-W20 is no day."""
+    if "W" in text.upper():
+        raise ValueError(f"{text!r} is a week")
 
 
 def now() -> datetime:

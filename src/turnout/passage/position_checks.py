@@ -131,8 +131,9 @@ def inconsistent_positions(
         if is_drifting[i]:
             text = f"{sensors[i].name}: its clock drifts, from {first:.0f} to {last:.0f} ms against the others"
         else:
+            shift = f"{mean_shift[i] / motion.speed * 1e3:.0f} ms against the others"
             text = (
-                f"{sensors[i].name}: its clock is off, {mean_shift[i] / motion.speed * 1e3:.0f} ms against the others"
+                f"{sensors[i].name}: records the train {shift}: its clock is off, or its position or channel is wrong"
             )
         findings.append(Rejection("clock_drift", float(mean_shift[i]), MAX_POSITION_SHIFT, text, sensors[i].name))
         keep[i] = False

@@ -34,7 +34,7 @@ REMEDIES = {
     "spikes": "Nothing: they were replaced. Where they come with many trains, look at the converter or radio link",
     "mains_hum": "Nothing: it was subtracted. Where it is strong, look at shields and earthing",
     "channels_swapped": "Exchange the two channels in the layout, or at the logger",
-    "clock_drift": "Synchronise the loggers, or correct the sensor's position in the layout",
+    "clock_drift": "Synchronise the loggers, or correct the sensor's position or channel in the layout",
     "two_trains": "Nothing: the passage is used as far as it is sound",
     "train_cut_off": "Let the logger start earlier or run longer",
 }

@@ -10,7 +10,7 @@ from statistics import median
 from turnout.config import TurnoutConfig
 from turnout.config.campaign_notes import COLUMNS
 from turnout.config.csv_table import TableError, read_csv
-from turnout.config.events import parse_utc
+from turnout.config.events import day_problem, parse_utc
 from turnout.errors import ReadError
 from turnout.records import Unit
 from turnout.workflow.notes import start_of
@@ -119,10 +119,7 @@ def is_future(moment: datetime) -> bool:
 
 
 def _day(text: str) -> str | None:
-    try:
-        return date.fromisoformat(text).isoformat()
-    except ValueError:
-        return None
+    return None if day_problem(text) else date.fromisoformat(text).isoformat()
 
 
 def _trains(
