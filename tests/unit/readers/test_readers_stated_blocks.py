@@ -43,7 +43,7 @@ def test_blocks_that_the_samples_fill_are_no_remark(lines, tmp_path):
     assert not errors_of(tmp_path, lines)
 
 
-def test_blocks_in_a_file_with_a_damaged_record_are_no_remark(tmp_path):
+def test_blocks_are_those_of_all_records_together(tmp_path):
     head = "Blocks,2\nBlock size,400\nrecord,force [N],rail [m/s²]\n"
     rows = [f"{1 if k < 400 else 2},{a:.4f},{b:.4f}" for k, (a, b) in enumerate([*SAMPLES, *SAMPLES[::-1]])]
     (tmp_path / "a.csv").write_text(head + "\n".join(rows) + "\n", "utf-8")
