@@ -69,7 +69,7 @@ from turnout.readers.stated_scales import entry_statements, scale_problem, scale
 from turnout.readers.stated_units import decoded_units
 from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
-from turnout.readers.word_columns import check_valid, entries_of_overloads, rarest_words
+from turnout.readers.word_columns import check_valid, entries_of_words, rarest_words
 
 
 def read_raw(source: Source) -> RawFile:
@@ -316,7 +316,7 @@ def _records(
             time_label="" if time is None else _label(names, units, time),
             is_time_in_seconds=time is not None and bool(units[time].strip()),
             clocks=tuple((f"column {_label(names, units, i)!r}", seconds[a:b]) for i, seconds in clocks.items()),
-            entries=(*entries, *entries_of_overloads({name: column[a:b] for name, column in words.items()})),
+            entries=(*entries, *entries_of_words({name: column[a:b] for name, column in words.items()})),
             states={name: rarest_words(column[a:b]) for name, column in words.items()},
             counters={name: numbers_of_texts(column[a:b]) for name, column in words.items()},
         )

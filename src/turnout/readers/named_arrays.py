@@ -61,7 +61,7 @@ from turnout.readers.start_times import start_fields
 from turnout.readers.stated_scales import scale_problem, scale_statements, without_drawings
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
-from turnout.readers.word_columns import check_valid, entries_of_overloads
+from turnout.readers.word_columns import check_valid, entries_of_words
 
 
 def raw_file(variables: Mapping, source: Source, parent: Metadata | None = None) -> RawFile:
@@ -327,7 +327,7 @@ def _raw_record(
         names=tuple(names),
         samples=samples,
         clocks=tuple((f"variable {name!r}", seconds_since_first(value)) for name, value in clocks.items()),
-        entries=(*facts.entries, *entries_of_overloads(words)) if words else facts.entries,
+        entries=(*facts.entries, *entries_of_words(words)) if words else facts.entries,
         units=tuple(units),
         **start_fields(facts.record_value(START_NAMES, k, n), declared=facts.label_of(START_NAMES)),
         axis_starts=(

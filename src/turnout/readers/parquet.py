@@ -38,7 +38,7 @@ from turnout.readers.stated_scales import entry_statements, scale_text, without_
 from turnout.readers.texts import decode_text
 from turnout.readers.time_texts import stated_time
 from turnout.readers.timing import seconds_since_first
-from turnout.readers.word_columns import check_valid, entries_of_overloads
+from turnout.readers.word_columns import check_valid, entries_of_words
 
 ROWS_REMEDY = "Write one row for each sample and one column of numbers for each channel"
 MAX_LISTED = 6  # columns that a message names
@@ -108,7 +108,7 @@ def read_raw(source: Source) -> RawFile:
             RawRecord(
                 names=tuple(names),
                 samples=[columns[name] if rows else columns[name][span] for name in names],
-                entries=(*entries, *entries_of_overloads({name: x[span] for name, x in words.items()}))
+                entries=(*entries, *entries_of_words({name: x[span] for name, x in words.items()}))
                 if words
                 else entries,
                 units=tuple(units[name] for name in names),

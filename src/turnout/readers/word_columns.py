@@ -1,5 +1,6 @@
 """Words beside the samples of a record, in any format: states of a logger, overloads, samples that are invalid."""
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
@@ -26,30 +27,33 @@ INVALID = frozenset(
 FLAGS = INVALID | frozenset("true false yes no on off ja nein oui non valid gültig gueltig valide gyldig".split())
 
 
-def entries_of_overloads(columns: Mapping[str, np.ndarray]) -> tuple[Entry, ...]:
-    """Entries of the words of columns by which a logger says that a channel left its range.
+def entries_of_words(columns: Mapping[str, np.ndarray]) -> Iterator[Entry]:
+    """Entries of the words of columns, by which a logger may say what it did to the samples, or that it was overloaded.
 
-    A word of a state is no entry: "step 4" states no step of the samples.
+    One of several words with a number is the name of a state: "step 4" states no step of the samples.
 
     Parameters
     ----------
     columns : mapping of str to (n,) array of str, bytes or object
         Texts by the name of their column, None where one is empty.
 
-    Returns
-    -------
-    tuple of Entry
-        One for each word of an overload.
+    Yields
+    ------
+    Entry
+        One for each word of an overload, and then for the rarest others.
 
     Examples
     --------
-    >>> words = np.array(["run", "ok", "OVR", "ok"])
-    >>> [entry.value for entry in entries_of_overloads({"State": words})]
-    ['overload: OVR']
+    >>> words = np.array(["run", "step 4", "run", "OVR", "run"])
+    >>> [entry.value for entry in entries_of_words({"State": words})]
+    ['overload: OVR', 'run']
     """
-    texts = [(name, word) for name, column in columns.items() for word in rarest_words(column)]
-    texts = [(name, f"overload: {word}" if word.casefold() in OVERLOADS else word) for name, word in texts]
-    return tuple(Entry(f"column {name!r}", name, text) for name, text in texts if is_of_overload(text))
+    for name, column in columns.items():
+        words = rarest_words(column)
+        texts = [f"overload: {word}" if word.casefold() in OVERLOADS else word for word in words]
+        texts = [text for text in texts if len(words) == 1 or is_of_overload(text) or not re.search(r"\d", text)]
+        texts.sort(key=lambda text: not is_of_overload(text))
+        yield from (Entry(f"column {name!r}", name, text) for text in texts[:MAX_WORDS])
 
 
 def rarest_words(column: np.ndarray) -> tuple[str, ...]:

@@ -178,3 +178,13 @@ def test_an_overload_beside_the_samples_is_reported_in_any_format(word, extensio
 def test_a_word_that_says_that_samples_are_invalid_is_an_error_in_any_format(extension, tmp_path):
     with pytest.raises(ReadError, match="'invalid' in row 201"):
         write_table(tmp_path, extension, ["gut"] * 200 + ["invalid"] + ["gut"] * (N - 201))
+
+
+@pytest.mark.parametrize("extension", ["parquet", "npz", "h5", "csv"])
+@pytest.mark.parametrize("words", [["inverted"] * N, ["raw"] * N, ["inverted"] * 300 + ["off line"] * 100])
+def test_words_beside_the_samples_may_state_what_was_done_to_them(words, extension, tmp_path):
+    if extension == "csv":
+        recordings, errors = outcome(tmp_path, words, kind="hammer")
+        assert not recordings and errors[0].reason == "scale_unknown"
+    else:  # a column that is no channel: a remark
+        assert "entry_unknown" in [error.reason for error in write_table(tmp_path, extension, words).errors]
