@@ -17,10 +17,9 @@ import numpy as np
 from turnout.config.events import day_problem
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import ChangeEffect, Event, StateParameter, VisitInformation
-from turnout.mismatch.calibrated.answers_of_change import free_shape
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import BEFORE_ALL
-from turnout.mismatch.calibrated.model_answer import NAMES, group_of, position_of
+from turnout.mismatch.calibrated.model_answer import NAMES, free_shape, group_of, position_of
 from turnout.mismatch.calibrated.stiffness_under_load import LAWS
 from turnout.stages.accepted_effects import SINCE
 from turnout.stages.visit_time import years_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,14 +78,29 @@ def events_of(
             continue
         at = None if event.section is None else positions[event.section]
         opened = by_day.setdefault(event.first_day_after.toordinal(), {})
-        opened |= {
-            p.name: p.sd
-            for p in parameters
-            if p.group in groups and (at is None or p.position is None or abs(p.position - at) <= EVENT_REACH)
-        }
+        opened |= {p.name: p.sd for p in parameters if p.group in groups and (at is None or _is_near(p, at))}
         if at is None:
             common = {*OPENED_COMMON.get(event.kind, ()), *(g for r in further for g in COMMON_OF_RESONANCE[r])}
             opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
     events = [Event(day / DAYS_PER_YEAR, opened) for day, opened in sorted(by_day.items())]
     candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []
-    return events + change_events(changes, parameters, candidates, visits_used)
+    accepted = change_events(changes, parameters, candidates, visits_used)
+    return [*events, *accepted, *_repairs(events, accepted)]
+
+
+def _is_near(parameter: StateParameter, at: float) -> bool:
+    """Whether work on the section at a position [m] may touch what a parameter describes, or its position is not known."""
+    start = parameter.position if parameter.start is None else parameter.start
+    end = parameter.position if parameter.end is None else parameter.end
+    return start is None or end is None or start - EVENT_REACH <= at <= end + EVENT_REACH
+
+
+def _repairs(works: Sequence[Event], accepted: Sequence[Event]) -> list[Event]:
+    """Process noise of later work on what an accepted change has changed: the work may have ended it."""
+    shapes = {tuple(sorted(e.direction.items())): e for e in sorted(accepted, key=lambda e: e.time)}  # of each the last
+    return [
+        replace(last, time=work.time)
+        for last in shapes.values()
+        for work in works
+        if work.time > last.time and work.opened.keys() & last.direction.keys()
+    ]

@@ -1,8 +1,10 @@
 """The calibrated model contains an accepted change from its onset on; a withdrawn change leaves no trace."""
 
 import shutil
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -35,7 +37,9 @@ from turnout.stages.accepted_changes import (
 )
 from turnout.stages.calibrated_model import calibrate_turnout
 from turnout.stages.change_diagnosis import change_unit
+from turnout.stages.recorded_work import events_of
 from turnout.stages.track_files import track_of
+from turnout.stages.visit_time import years_of
 from turnout.workflow.scan import scan
 
 N_SUPPORT, SD, STEP = 5, 0.05, 0.5
@@ -229,3 +233,25 @@ def test_the_nightly_run_reports_no_change_after_the_acceptance_and_the_same_aft
     assert withdrawn.answers == model.answers
     shutil.rmtree("work")
     assert change_of_nightly_run() == before
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_estimate_follows_the_repair_of_an_accepted_change(tmp_path, seed):
+    """Without this no visit after the repair was used, for ever: the belief still had the accepted size."""
+    (tmp_path / "events.csv").write_text("turnout,section,date,kind\nt1,,2001-08-01,tamping\n")
+    turnout = SimpleNamespace(folder=tmp_path, id="t1", sections=())
+    start = years_of("2000-01-01")
+    for present in (0.0, -1.0):  # after the work: repaired, or not
+        visits = [replace(v, time=start + v.time) for v in history_of((0, -1, -1, -1, *[present] * 3), seed)]
+        change = AcceptedChange("local_ballast", 1.2, 1.2, visits[0].time, visits[1].time)
+        history = estimate_history(PARAMETERS, visits, events_of(turnout, PARAMETERS, [change], visits))
+        assert all(s.is_used for s in history.steps)
+        intact = estimate_history(PARAMETERS, visits[:1], [])
+        assert history.belief.mean[2] - intact.belief.mean[2] == pytest.approx(present, abs=0.25)
+        assert answer_of_events(turnout, visits, change).verdict == "none"
+
+
+def answer_of_events(turnout, visits, change):
+    events = events_of(turnout, PARAMETERS, [change], visits)
+    candidates = further_candidates([change], PARAMETERS, CANDIDATES)
+    return change_answer(PARAMETERS, visits, events, candidates, 12.0, 6.0, True)

@@ -11,13 +11,14 @@ from turnout.mismatch.calibrated.belief import Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, evidence_from_first
-from turnout.mismatch.calibrated.history import Event, History, estimate_history
+from turnout.mismatch.calibrated.history import BEFORE_ALL, Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
 from turnout.mismatch.calibrated.model_answer import (
     FILE,
     NAMES,
     LeadingEffect,
     ModelAnswer,
+    free_shape,
     group_of,
     is_explained,
     least_size,
@@ -25,6 +26,7 @@ from turnout.mismatch.calibrated.model_answer import (
     position_of,
     with_rivals,
 )
+from turnout.mismatch.calibrated.repairs import agrees_with_file, newest_work, repair_events
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 
 INTOLERABLE = {"depth": CALIBRATION.worn_depth}
@@ -73,6 +75,8 @@ def file_answer(
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
     ]
+    if order and (repair := _repair_of(steps[order[0]], float(sizes[order[0]]), parameters, visits, events, steps)):
+        return file_answer(parameters, visits, [*events, *repair], visit, candidates, threshold, margin, surface)
     if not order or gains[order[0]] < least:
         deviation = _deviation_answer(parameters, visits, events, history, visit, steps, margin)
         return _at_dip(deviation, history, surface)
@@ -88,6 +92,57 @@ def file_answer(
         names = names_of_softer_ballast(parameters, visits, events, steps[first], stated.size, margin)
     rivals = [name_of(steps[k], by_name) for k in order if gains[k] > gains[first] - margin]
     return stated.answer(visit, FILE, with_rivals(names, stated, rivals))
+
+
+def _repair_of(
+    effect: ChangeEffect,
+    size: float,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+) -> list[Event]:
+    """Noise in place of an effect of the first visit that recorded work has ended; [] where it lasts, or once there."""
+    is_known = any(e.time == BEFORE_ALL and e.direction == effect.direction for e in events)
+    work = _work_on(effect, visits, events)
+    if is_known or work is None or not _is_repaired(effect, parameters, visits, events):
+        return []
+    return repair_events(free_shape(effect, parameters, candidates), size, [BEFORE_ALL, work])
+
+
+def _work_on(effect: ChangeEffect, visits: Sequence[VisitInformation], events: Sequence[Event]) -> float | None:
+    """Time of the newest recorded work on an effect after the first of these visits and up to the last."""
+    return newest_work(effect, events, visits[0].time, visits[-1].time) if visits else None
+
+
+def _is_repaired(
+    effect: ChangeEffect,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+) -> bool:
+    """Whether the visits since recorded work on an effect agree with the file."""
+    work = _work_on(effect, visits, events)
+    later = [v for v in visits if work is not None and v.time >= work]
+    return bool(later) and agrees_with_file(effect, parameters, later, events)
+
+
+def _first_visit_is_outdated(
+    at: StateParameter,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+) -> bool:
+    """Whether the visits since recorded work on the parameter ``at`` are what the file expects."""
+    work = _work_on(ChangeEffect(at.name, {at.name: 1.0}, at.sd), visits, events)
+    later = [v for v in visits if work is not None and v.time >= work]
+    return bool(later) and estimate_history(parameters, later, events, accepted=None).steps[0].innovation.is_expected
+
+
+def _effect_of(deviation: Deviation, parameters: Sequence[StateParameter]) -> ChangeEffect:
+    """The deviation as an effect: all of its values change alike."""
+    first = next(p for p in parameters if p.name == deviation.names[0])
+    return ChangeEffect(", ".join(deviation.names), dict.fromkeys(deviation.names, 1.0), change_sd(first, parameters))
 
 
 def _at_dip(answer: ModelAnswer, history: History, surface: Sequence[ChangeEffect]) -> ModelAnswer:
@@ -126,19 +181,23 @@ def _deviation_answer(
     groups = {by_name[c.name].group for c in candidates if c.name in by_name}
     least = {g: size for g, size in CALIBRATION.least_sizes if g in groups}
     deviations = deviations_from_file(history, parameters, least, intolerable=INTOLERABLE)
-    if not deviations:
+    present = (d for d in deviations if not _is_repaired(_effect_of(d, parameters), parameters, visits, events))
+    first: Deviation | None = next(present, None)
+    if first is None:
         jump = history.steps[0].innovation if history.steps else None
-        if jump is None or jump.is_expected:
+        if (
+            jump is None
+            or jump.is_expected
+            or _first_visit_is_outdated(by_name[jump.parameter], parameters, visits, events)
+        ):
             return ModelAnswer(visit, FILE, "none")
         at = by_name[jump.parameter]
         return ModelAnswer(visit, FILE, "unknown", (), at.name, at.group, position_of(at.name, at))
-    first: Deviation = deviations[0]
     middle = None if first.positions is None else 0.5 * sum(first.positions)
     position = middle if middle is not None else position_of(first.names[0], by_name[first.names[0]])
     names: tuple[str, ...] = (NAMES[first.group],)
     if names == ("local_ballast",) and first.size < 0.0:
-        run = [by_name[name] for name in first.names]
-        effect = ChangeEffect(", ".join(first.names), dict.fromkeys(first.names, 1.0), change_sd(run[0], parameters))
+        effect = _effect_of(first, parameters)
         names = tuple(names_of_softer_ballast(parameters, visits, events, effect, (first.size, first.sd), margin))
     return ModelAnswer(
         visit, FILE, "named" if len(names) == 1 else "a_or_b", names, ", ".join(first.names), first.group,

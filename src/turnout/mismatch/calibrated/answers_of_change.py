@@ -20,13 +20,14 @@ from turnout.mismatch.calibrated.model_answer import (
     NAMES,
     LeadingEffect,
     ModelAnswer,
-    group_of,
+    free_shape,
     is_explained,
     least_size,
     name_of,
     position_of,
     with_rivals,
 )
+from turnout.mismatch.calibrated.repairs import agrees_with_file, newest_work, repair_events, size_after_work
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
@@ -88,8 +89,11 @@ def stretch_candidates(parameters: Sequence[StateParameter]) -> list[ChangeEffec
         Named by the group, the first and last position, and the share of the dampers.
     """
     candidates = []
-    for group in STRETCH_GROUPS:
-        along = [p for p in parameters if p.may_change and p.group == group and p.position is not None]
+    routes = dict.fromkeys(p.route for p in parameters)
+    for group, route in ((g, r) for g in STRETCH_GROUPS for r in routes):
+        along = [
+            p for p in parameters if p.may_change and (p.group, p.route) == (group, route) and p.position is not None
+        ]
         along.sort(key=_order)
         for n in range(2, CALIBRATION.max_stretch + 1):
             for k in range(len(along) - n + 1):
@@ -107,14 +111,11 @@ def _order(parameter: StateParameter) -> int:
 def _stretch(
     group: str, run: Sequence[StateParameter], share: float, parameters: Sequence[StateParameter]
 ) -> list[ChangeEffect]:
-    dampers = {f"{group}_damper@" + p.name.partition("@")[2] for p in run}
-    direction = {p.name: 1.0 for p in run}
-    direction |= {
-        p.name: share for p in parameters if p.group == f"{group}_damper" and p.name.split(" ")[-1] in dampers
-    }
+    dampers = {p.name.replace(f"{group}@", f"{group}_damper@") for p in run}
+    direction = {p.name: 1.0 for p in run} | {p.name: share for p in parameters if p.name in dampers}
     first, last = run[0].position, run[-1].position
     assert first is not None and last is not None
-    where = run[0].name if len(run) == 1 else f"{group}@{first:.2f} to {last:.2f}"
+    where = run[0].name if len(run) == 1 else f"{run[0].name} to {last:.2f}"
     name, sd = f"{where}, dampers {share:g}", change_sd(run[0], parameters)
     return [ChangeEffect(name, direction, sd, grows, group, 0.5 * (first + last)) for grows in (False, True)]
 
@@ -180,21 +181,28 @@ def change_answer(
             parameters, visits, events, candidates, threshold, margin, True, with_trains, surface
         )
     leader = relevant[0]
+    present, repair = _after_work(leader, parameters, visits, events, candidates, levels)
+    if repair:
+        return change_answer(
+            parameters, visits, [*events, *repair], candidates, threshold, margin, is_alarmed, with_trains, surface
+        )
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     without_loads = parameters, visits
     if is_under_load(leader.effect):
         parameters, visits = with_loads
         history = _history_of_changes(parameters, visits, events, levels)
-    if ended := visits_of_ended_change(history, leader.effect, margin):
+    if present is None and (ended := visits_of_ended_change(history, leader.effect, margin)):
         parameters, visits = without_loads[0], _without(ended, without_loads[1])
         with_trains = with_trains and (with_trains[0], _without(ended, with_trains[1]))
         return change_answer(
             parameters, visits, events, candidates, threshold, margin, is_alarmed, with_trains, surface
         )
     courses = courses_of(history, leader.effect)
-    sizes = (leader.size if leader.effect.grows else courses.last_size, courses.last_size)
+    grows = leader.effect.grows and present is None
+    sizes = (leader.size if grows else present or courses.last_size, present or courses.last_size)
     size, total = (_with_model_error(leader.effect, s) for s in sizes)
-    stated = LeadingEffect.of(leader.effect, by_name, size, gain - penalty, courses.onset_interval())
+    effect = replace(leader.effect, grows=grows)
+    stated = LeadingEffect.of(effect, by_name, size, gain - penalty, courses.onset_interval())
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
     with_change = _history_of_changes(parameters, visits, opened, levels)
     explained = next(s.innovation for s in with_change.steps if s.visit == leader.onset)
@@ -210,6 +218,46 @@ def change_answer(
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
     return replace(answer, changed=tuple(leader.effect.direction), total=total[0], total_sd=total[1], ends=ends)
+
+
+def _after_work(
+    leader: OnsetEvidence,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+    candidates: Sequence[ChangeEffect],
+    levels: Mapping[str, float],
+) -> tuple[tuple[float, float] | None, list[Event]]:
+    """Size of a change that lasts after recorded work on it (None without work), and the noise of one that does not.
+
+    A change between the visits before and after the work is the work itself, where the later visits agree with the
+    file.
+    """
+    if is_under_load(leader.effect):
+        return None, []
+    first = int(np.argmax(leader.gains))
+    since, onset, last = (float(leader.times[k]) for k in (first, first + 1, -1))
+    shapes = free_shape(leader.effect, parameters, candidates)
+    size = leader.size[0] * ((last - since) if leader.effect.grows else 1.0)
+    work = newest_work(leader.effect, events, since, onset)
+    later = [v for v in visits if v.time >= onset]
+    if work is not None and agrees_with_file(leader.effect, parameters, later, events):
+        return None, _new_events(repair_events(shapes, size, [work]), events)
+    work = newest_work(leader.effect, events, onset, last)
+    if work is None:
+        return None, []
+    others = [v for v in visits if not since < v.time < work]
+    present = size_after_work(_history_of_changes(parameters, others, events, levels), leader.effect, since)
+    if present is not None and present[0] * leader.size[0] > 0.0:
+        return present, []
+    times = [*(v.time for v in visits if since < v.time < work), work]
+    return None, _new_events(repair_events(shapes, size, times), events)
+
+
+def _new_events(repair: list[Event], events: Sequence[Event]) -> list[Event]:
+    """The events, [] if the first of them is there already: what its noise does not explain is stated."""
+    known = [(e.time, e.direction) for e in events]
+    return [] if (repair[0].time, repair[0].direction) in known else repair
 
 
 def _without(ended: Collection[str], visits: Sequence[VisitInformation]) -> list[VisitInformation]:
@@ -295,37 +343,6 @@ def _events_of_change(
         return [Event(float(times[first + 1]), {}, *d) for d in directions]
     steps = list(zip(times[first:-1], times[first + 1 :]))
     return [Event(float(now), {}, d, sd * float(now - before)) for before, now in steps for d, sd in directions]
-
-
-def free_shape(
-    effect: ChangeEffect, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
-) -> list[tuple[Mapping[str, float], float]]:
-    """Directions of an effect with their standard deviations. A dip of the surface may have any shape.
-
-    Wear lowers a nose unevenly: beside the dip, all dips and numbers of the file's surface within
-    ``CALIBRATION.nose_reach`` may change.
-
-    Parameters
-    ----------
-    effect : ChangeEffect
-    parameters : sequence of StateParameter
-    candidates : sequence of ChangeEffect
-
-    Returns
-    -------
-    list of (mapping, float)
-        Parameter -> change per unit of size, and standard deviation of the size.
-    """
-    by_name = {p.name: p for p in parameters}
-    at = position_of(effect.name, by_name.get(effect.name))
-    directions: list[tuple[Mapping[str, float], float]] = [(effect.direction, effect.sd)]
-    if group_of(effect, by_name) not in ("dip", "depth") or at is None:
-        return directions
-    dips = [c for c in candidates if group_of(c, by_name) == "dip" and c.grows == effect.grows]
-    numbers = [p for p in parameters if p.group in ("surface", "depth")]
-    near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
-    near += [(position_of(p.name, p), ({p.name: 1.0}, change_sd(p, parameters))) for p in numbers]
-    return directions + [d for x, d in near if x is not None and abs(x - at) <= CALIBRATION.nose_reach]
 
 
 def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:

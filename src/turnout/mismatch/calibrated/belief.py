@@ -21,6 +21,7 @@ class StateParameter:
     Parameters of one ``group`` are alike, at different ``position`` [m] along the track; ``index`` numbers adjacent
     ones. ``may_change``: whether a change of it may be stated; not of supports that absorb what lies beyond them.
     ``is_beyond_sensors``: a support beyond the outer sensors and impacts, where the error of the model is larger.
+    Components are adjacent on one ``route`` alone. A wave describes the stretch from ``start`` to ``end`` [m].
     """
 
     name: str
@@ -34,6 +35,9 @@ class StateParameter:
     visit_sd: float = 0.0
     may_change: bool = True
     is_beyond_sensors: bool = False
+    route: str = "main"
+    start: float | None = None
+    end: float | None = None
 
     def __post_init__(self) -> None:
         if not (self.sd > 0.0 and self.walk_sd >= 0.0 and self.visit_sd >= 0.0 and np.isfinite(self.mean)):

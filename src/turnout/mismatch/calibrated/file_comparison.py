@@ -150,17 +150,18 @@ def deviations_from_file(
 
 
 def _runs(members: Sequence[int], parameters: Sequence[StateParameter]) -> list[list[int]]:
-    """All runs of adjacent components: single ones, and those whose indices follow each other."""
-    indexed = sorted((k for k in members if parameters[k].index is not None), key=lambda k: parameters[k].index or 0)
+    """All runs of adjacent components: single ones, and those of a route whose indices follow each other."""
     runs = [[k] for k in members if parameters[k].index is None]
-    for first in range(len(indexed)):
-        for last in range(first, len(indexed)):
-            if (
-                last > first
-                and (parameters[indexed[last]].index or 0) != (parameters[indexed[last - 1]].index or 0) + 1
-            ):
-                break
-            runs.append(indexed[first : last + 1])
+    by_route: dict[str, list[int]] = {}
+    for k in sorted((k for k in members if parameters[k].index is not None), key=lambda k: parameters[k].index or 0):
+        by_route.setdefault(parameters[k].route, []).append(k)
+    for indexed in by_route.values():
+        for first in range(len(indexed)):
+            for last in range(first, len(indexed)):
+                number, before = (parameters[indexed[j]].index or 0 for j in (last, max(last - 1, first)))
+                if last > first and number != before + 1:
+                    break
+                runs.append(indexed[first : last + 1])
     return runs
 
 

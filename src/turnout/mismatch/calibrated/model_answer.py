@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from turnout.mismatch.calibrated.belief import Innovation, StateParameter
-from turnout.mismatch.calibrated.change import ChangeEffect
+from turnout.mismatch.calibrated.change import ChangeEffect, change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 
 CHANGE, FILE = QUESTIONS = ("change", "file")
@@ -283,3 +283,34 @@ def least_size(effect: ChangeEffect, by_name: Mapping[str, StateParameter]) -> f
     """
     group = group_of(effect, by_name)
     return CALIBRATION.least_dip if group == "dip" else dict(CALIBRATION.least_sizes)[group]
+
+
+def free_shape(
+    effect: ChangeEffect, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
+) -> list[tuple[Mapping[str, float], float]]:
+    """Directions of an effect with their standard deviations. A dip of the surface may have any shape.
+
+    Wear lowers a nose unevenly: beside the dip, all dips and numbers of the file's surface within
+    ``CALIBRATION.nose_reach`` may change.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    parameters : sequence of StateParameter
+    candidates : sequence of ChangeEffect
+
+    Returns
+    -------
+    list of (mapping, float)
+        Parameter -> change per unit of size, and standard deviation of the size.
+    """
+    by_name = {p.name: p for p in parameters}
+    at = position_of(effect.name, by_name.get(effect.name))
+    directions: list[tuple[Mapping[str, float], float]] = [(effect.direction, effect.sd)]
+    if group_of(effect, by_name) not in ("dip", "depth") or at is None:
+        return directions
+    dips = [c for c in candidates if group_of(c, by_name) == "dip" and c.grows == effect.grows]
+    numbers = [p for p in parameters if p.group in ("surface", "depth")]
+    near = [(position_of(c.name, None), (c.direction, c.sd)) for c in dips]
+    near += [(position_of(p.name, p), ({p.name: 1.0}, change_sd(p, parameters))) for p in numbers]
+    return directions + [d for x, d in near if x is not None and abs(x - at) <= CALIBRATION.nose_reach]

@@ -59,6 +59,7 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     used: Counter[str] = Counter()
     for nuisance in _shared_nuisances(case):
         name, group, position, index = nuisance.name, nuisance.group, None, None
+        start = end = None
         if nuisance.index is not None:
             position = float(support[nuisance.index])
             index = int(np.argmin(np.abs(whole - position)))
@@ -70,10 +71,12 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
             position = float(castings[int(number)].piece.start)
             name = f"{tag}@{position:.2f}"
         elif nuisance.group == "wave" and waves is not None:  # an amplitude has a meaning on this stretch alone
-            name = f"{name}@{waves.start:.2f}-{waves.end:.2f}"
+            start, end = float(waves.start), float(waves.end)
+            name = f"{name}@{start:.2f}-{end:.2f}"
         elif nuisance.group == "surface":
             name = nuisance.meaning.removesuffix(" less its file's")
             group = "depth" if name.startswith("ln depth of") else group
+            position = position_of(name, None)
         name = name if route == "main" else f"{route} {name}"
         used[name] += 1
         name = name if used[name] == 1 else f"{name} #{used[name]}"
@@ -81,7 +84,7 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
         is_beyond = index is not None and position is not None and not low <= position <= high
         parameters[nuisance.name] = StateParameter(
             name, nuisance.mean, nuisance.sd, 0.0, group, index, position, nuisance.unit,
-            may_change=not is_outer, is_beyond_sensors=is_beyond,
+            may_change=not is_outer, is_beyond_sensors=is_beyond, route=route, start=start, end=end,
         )  # fmt: skip
     every = tuple(parameters.values())
     return {

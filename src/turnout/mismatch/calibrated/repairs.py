@@ -1,0 +1,102 @@
+"""Effects that recorded work has ended: what the visits before it show is no longer so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from turnout.mismatch.calibrated.belief import StateParameter
+from turnout.mismatch.calibrated.change import ChangeEffect, compare_onsets
+from turnout.mismatch.calibrated.file_comparison import evidence_from_first
+from turnout.mismatch.calibrated.history import Event, History, estimate_history
+from turnout.mismatch.calibrated.information import VisitInformation
+
+Shapes = Sequence[tuple[Mapping[str, float], float]]  # directions with their standard deviations, as ``free_shape``
+
+
+def newest_work(effect: ChangeEffect, events: Iterable[Event], after: float, until: float) -> float | None:
+    """Time of the newest recorded work on a parameter of an effect, ``after`` < time <= ``until``.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    events : iterable of Event
+        Accepted changes, which open directions, are no work.
+    after, until : float
+        [years]
+
+    Returns
+    -------
+    float or None
+        [years]
+    """
+    return max((e.time for e in events if after < e.time <= until and e.opened.keys() & effect.direction), default=None)
+
+
+def agrees_with_file(
+    effect: ChangeEffect,
+    parameters: Sequence[StateParameter],
+    visits: Sequence[VisitInformation],
+    events: Sequence[Event],
+) -> bool:
+    """Whether an effect is less probable than not at these visits, which the file alone precedes.
+
+    Parameters
+    ----------
+    effect : ChangeEffect
+    parameters : sequence of StateParameter
+    visits : sequence of VisitInformation
+        At least one.
+    events : sequence of Event
+
+    Returns
+    -------
+    bool
+    """
+    history = estimate_history(parameters, visits, events, accepted=None)
+    return bool(evidence_from_first(history, [effect])[0][0] <= 0.0)
+
+
+def size_after_work(history: History, effect: ChangeEffect, since: float) -> tuple[float, float] | None:
+    """Size of a change after recorded work, None where it is less probable than not.
+
+    Parameters
+    ----------
+    history : History
+        As for ``compare_onsets``, without the visits between the change and the work.
+    effect : ChangeEffect
+        Whether it grows makes no difference.
+    since : float
+        Time of the last visit without it. [years]
+
+    Returns
+    -------
+    (float, float) or None
+        Size and its standard deviation.
+    """
+    step = ChangeEffect(effect.name, effect.direction, effect.sd, False, effect.group, effect.position)
+    (evidence,) = compare_onsets(history, [step])
+    k = int(np.flatnonzero(evidence.times == since)[0])
+    return (float(evidence.sizes[k]), float(evidence.size_sds[k])) if evidence.gains[k] > 0.0 else None
+
+
+def repair_events(shapes: Shapes, size: float, times: Iterable[float]) -> list[Event]:
+    """Process noise in place of an effect that has ended: at these times it may take any size.
+
+    Parameters
+    ----------
+    shapes : sequence of (mapping, float)
+        The first is that of the effect.
+    size : float
+        Of the effect.
+    times : iterable of float
+        [years]
+
+    Returns
+    -------
+    list of Event
+    """
+    (direction, sd), *others = shapes
+    wide = [(direction, max(sd, abs(size))), *others]
+    return [Event(t, {}, dict(d), s) for t in times for d, s in wide]

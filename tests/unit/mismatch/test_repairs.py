@@ -1,0 +1,73 @@
+"""Recorded work ends an effect: the repair is no defect, and what it has ended is not stated any more."""
+
+import numpy as np
+import pytest
+
+from turnout.mismatch.calibrated import (
+    Event,
+    GroupInformation,
+    StateParameter,
+    VisitInformation,
+    answers_after_visits,
+    change_candidates,
+)
+
+N_SUPPORT, SD, STEP, WORK_BEFORE = 5, 0.05, 0.5, 4
+SIZE = -1.2  # twelve times the scatter of the file: a sleeper with 0.3 of its ballast stiffness
+PARAMETERS = [StateParameter(f"ballast@{0.6 * k:.2f}", 0.0, 0.1, 0.03, "ballast", k, 0.6 * k) for k in range(N_SUPPORT)]
+NAMES = tuple(p.name for p in PARAMETERS)
+CANDIDATES = change_candidates(PARAMETERS)
+
+
+def answers(sizes, seed, work_sd=0.1, at=2, elsewhere=()):
+    """Answers to both questions after the last visit; ``elsewhere`` are sizes at the last support."""
+    rng = np.random.default_rng(seed)
+    rows = np.array([[0.6 ** abs(i - j) for j in range(N_SUPPORT)] for i in range(6)])
+    intact, visits = rng.normal(0.0, 0.1, N_SUPPORT), []
+    for v, size in enumerate(sizes):
+        x = intact + size * np.eye(N_SUPPORT)[at] + (elsewhere[v] * np.eye(N_SUPPORT)[-1] if elsewhere else 0.0)
+        y = rows @ x + rng.normal(0.0, SD, len(rows))
+        group = GroupInformation("A: impacts at 1.20 m", 1, NAMES, rows.T @ rows / SD**2, rows.T @ y / SD**2)
+        visits.append(VisitInformation(f"v{v}", STEP * v, (group,)))
+    work = Event(STEP * (WORK_BEFORE - 0.5), dict.fromkeys(NAMES, work_sd))
+    return answers_after_visits(PARAMETERS, visits, [work], CANDIDATES, 12.0, 6.0, len(visits))
+
+
+@pytest.mark.parametrize("work_sd", [0.1, 0.5])
+@pytest.mark.parametrize("n_after", [1, 4])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_change_that_recorded_work_has_ended_is_not_stated(seed, n_after, work_sd):
+    """Where the file is unsure of a value, as of the depth of a nose, it was stated for ever after the repair."""
+    change, against_file = answers((0, 0, SIZE, SIZE, *[0] * n_after), seed, work_sd)
+    assert (change.verdict, against_file.verdict) == ("none", "none")
+
+
+@pytest.mark.parametrize("n_after", [2, 4])
+@pytest.mark.parametrize("size", [-0.5, SIZE])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_repair_of_what_the_first_visit_shows_is_no_change_and_leaves_no_difference(seed, size, n_after):
+    """Formerly 14 of these 20 had a wrong answer: ballast "stiffer" since the work, or "softer" than in the file."""
+    change, against_file = answers((*[size] * WORK_BEFORE, *[0] * n_after), seed)
+    assert (change.verdict, against_file.verdict) == ("none", "none")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_defect_that_work_has_not_ended_is_stated_with_its_present_size(seed):
+    """Without this the size was that of before the work."""
+    for present in (SIZE, 0.5 * SIZE):
+        change, _ = answers((0, 0, SIZE, SIZE, *[present] * 3), seed)
+        assert "local_ballast" in change.names and change.position == pytest.approx(1.2)
+        assert change.total == pytest.approx(present, abs=4.0 * change.total_sd) and change.total_sd < 0.2
+        assert change.onset[1] <= 2 * STEP
+    _, against_file = answers([SIZE] * 7, seed)
+    assert "local_ballast" in against_file.names and against_file.size == pytest.approx(SIZE, abs=0.35)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_change_at_or_after_the_work_and_one_elsewhere_are_stated(seed):
+    for first in (WORK_BEFORE, WORK_BEFORE + 1):
+        change, _ = answers([SIZE * (v >= first) for v in range(7)], seed)
+        assert "local_ballast" in change.names and change.position == pytest.approx(1.2)
+    for sizes in ((0, 0, SIZE, SIZE, 0, 0, 0), (*[SIZE] * WORK_BEFORE, 0, 0, 0)):
+        change, _ = answers(sizes, seed, elsewhere=[0.0] * 5 + [SIZE] * 2)
+        assert "local_ballast" in change.names and change.position == pytest.approx(2.4)
