@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 BASELINE = TrendSettings()  # of which the page states what a baseline needs
 # One row per section: that of the newest model, accepted or not.
 NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
+COMMON_PARAMETERS = "(ballast_stiffness|pad_stiffness|sleeper_mass)"  # of the calibrated model, of all supports
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 # Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
 HISTORY = "mode_scatter_read"
@@ -110,9 +111,16 @@ ROWS = {
     )
     + " order by position_m, term",
     "calibrated": f"""
-        select turnout_id, visit, found_at_utc, parameter, position_m, value, sd, prior_sd, n_visits, n_recordings
+        select turnout_id, finding_id, visit, found_at_utc, parameter, position_m, value, sd, prior_sd, n_visits,
+            n_recordings
         from twin_states anti join superseded on finding_id = old_id
-        where {ID_GIVEN} and position_m is not null order by found_at_utc, parameter_no""",
+        where {ID_GIVEN} and (position_m is not null or regexp_matches(parameter, '{COMMON_PARAMETERS}$'))
+            and found_at_utc >= coalesce((
+                select max(event_at_utc) from events e
+                where e.turnout_id = twin_states.turnout_id and kind = 'renewal' and section_id is null
+                    and event_at_utc < :today + interval 1 day
+            ), '-infinity'::timestamp)
+        order by found_at_utc, parameter_no""",
     "worklist": f"select * from {whole_list(':today')} where {ID_GIVEN} order by rank",
 }
 TURNOUTS = f"""

@@ -89,7 +89,7 @@ def events_of(
 
 
 def _is_near(parameter: StateParameter, at: float) -> bool:
-    """Whether work on the section at a position [m] may touch what a parameter describes, or its position is not known."""
+    """Whether work on the section at a position [m] may touch what a parameter describes, or this has no position."""
     start = parameter.position if parameter.start is None else parameter.start
     end = parameter.position if parameter.end is None else parameter.end
     return start is None or end is None or start - EVENT_REACH <= at <= end + EVENT_REACH

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from tests.unit.report.test_turnout_page import page
 
-from turnout.report.panels.calibrated_model import KINDS, along_track_panels, calibrated_panels, narrowing_panel
+from turnout.report.panels.calibrated_model import (
+    KINDS,
+    along_track_panels,
+    calibrated_panels,
+    depth_panels,
+    narrowing_panel,
+)
 
 
 def state(parameter, position, value, sd, n_visits=2, day=1):
@@ -51,9 +57,9 @@ def test_the_page_states_the_number_of_used_visits_and_the_meaning_of_red():
     later = [state(f"pad@{0.6 * k:.2f}", 0.6 * k, 0.0, 0.05, n_visits=2, day=3) for k in range(4)]
     unchanged = [{**row, "n_visits": 1} for row in STATES]
     text = page(calibrated=[*FIRST, *unchanged, *later])
-    assert "from the 2 visits without an open finding or an unexpected change (1 left out)" in text
+    assert "from 2 visits (1 left out: an open finding, an unexpected change, or fitted with another version" in text
     assert "Red: the whole interval is outside." in text and "all visits" not in text
-    assert "from the 1 visit without an open finding or an unexpected change; shaded" in page(calibrated=FIRST)
+    assert "from 1 visit; shaded" in page(calibrated=FIRST)
 
 
 def test_each_kind_of_parameter_has_a_line_of_its_own_look(repository):
@@ -67,3 +73,34 @@ def test_each_kind_of_parameter_has_a_line_of_its_own_look(repository):
     css = (repository / "src" / "turnout" / "report" / "templates" / "page.css").read_text(encoding="utf-8")
     looks = [css.partition(f".curve.kind-{kind}{{")[2].partition("}")[0] for kind in KINDS]
     assert len(set(looks)) == len(KINDS)
+
+
+def test_components_that_the_track_file_has_no_more_are_not_shown():
+    """New sleepers 0.1 m off the old ones: formerly both were shown. A part that was not measured since stays."""
+    moved = [state(f"pad@{0.6 * k + 0.1:.2f}", 0.6 * k + 0.1, 0.0, 0.05, day=3) for k in range(4)]
+    beyond = [state("pad@9.00", 9.0, 0.0, 0.05), state("pad@9.60", 9.6, 0.0, 0.05)]
+    other_route = state("diverging pad@1.20", 1.2, 0.0, 0.05)
+    silent = [state(f"gain_A{k}", 0.6 * k, 0.0, 0.05, day=1 if k == 1 else 3) for k in range(3)]  # one for a day
+    svg = along_track_panels([*STATES, *beyond, other_route, *moved, *silent])
+    shown = re.findall(r"((?:\w+ )?(?:pad@|gain_A)[\d.]+):", svg)
+    assert sorted(shown) == [
+        "diverging pad@1.20", "gain_A0", "gain_A1", "gain_A2", "pad@0.10", "pad@0.70", "pad@1.30", "pad@1.90",
+        "pad@9.00", "pad@9.60",
+    ]  # fmt: skip
+
+
+def test_the_factor_of_all_supports_is_stated_beside_that_of_each():
+    """With all pads softer by half each support was shown at the value of the file."""
+    svg = along_track_panels([*STATES, state("pad_stiffness", None, np.log(0.5), 0.05, day=2)])
+    assert "multiply by 0.5 (0.453 to 0.551, 95 %), common to all" in re.sub(r"</text><text[^>]*>", " ", svg)
+    assert "multiply" not in along_track_panels(STATES)
+    assert narrowing_panel([*FIRST, *STATES, state("pad_stiffness", None, 0.0, 0.9, 1)]).count("pad: 0.50") == 1
+
+
+def test_the_depth_of_a_nose_is_shown_after_each_visit():
+    """The main value of a crossing was in no panel."""
+    nose = [state("ln depth of the kink at 5.24 m", 5.24, 0.1 * day, 0.05, day, day) for day in (1, 2, 3)]
+    svg = depth_panels([*STATES, *nose])
+    assert svg.count('<svg class="chart"') == 1 and "depth of the kink at 5.24 m over file, after each visit" in svg
+    assert "1.22 (1.11 to 1.35, 95 %), visit 2026-05-02" in svg and depth_panels(STATES) == ""
+    assert svg in calibrated_panels([*STATES, *nose])
