@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.cli.options import (
@@ -29,6 +30,7 @@ from turnout.number_text import evidence_in_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from turnout.config import Configuration
     from turnout.mismatch.calibrated import Deviation, ModelAnswer, OnsetEvidence, StateParameter
     from turnout.stages.calibrated_model import CalibratedModel
 
@@ -73,12 +75,30 @@ def run(args: argparse.Namespace) -> int:
     from turnout.stages.track_files import improbable_entries
 
     check_work_folder(args)
-    turnout = load_configuration(args.configuration).turnout(args.turnout)
-    add_warnings(args, improbable_entries(turnout, args.track))
+    configuration = load_configuration(args.configuration)
+    turnout = configuration.turnout(args.turnout)
+    add_warnings(args, [*events_in_doubt(configuration, turnout.id), *improbable_entries(turnout, args.track)])
     model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)
     add_result(args, answer_rows(model))
     print("\n".join(model_text(args.turnout, model, args.all)))
     return 0
+
+
+def events_in_doubt(configuration: Configuration, turnout_id: str) -> list[str]:
+    """Rows of events.csv that may be of a turnout and do not count, or have a date that cannot be right.
+
+    Parameters
+    ----------
+    configuration : Configuration
+    turnout_id : str
+
+    Returns
+    -------
+    list of str
+        Their warnings, also of a similar id that no turnout has.
+    """
+    rows = (w for w in configuration.warnings if Path(w.path).name == "events.csv")
+    return [str(w) for w in rows if turnout_id in w.turnouts or repr(turnout_id) in str(w)]
 
 
 def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) -> Iterator[str]:

@@ -112,10 +112,12 @@ def read_events(
             _note_turnout(cells, errors[n_before:])
             continue
         events.append(event)
+        n_warnings = len(warnings)
         unknown_turnouts = turnout_problems(cells, turnout_ids, variants)
         warnings += [cells.place(name, line, column).error(*problem) for column, *problem in unknown_turnouts]
         if problem := date_problem(event):
             warnings.append(cells.place(name, line, "date").error(*problem))
+        _note_turnout(cells, warnings[n_warnings:])
     return sorted(events, key=lambda e: (e.at, e.turnout, e.section or "", e.kind)), errors, warnings
 
 

@@ -15,7 +15,7 @@ import pytest
 import small_turnout as small
 
 from turnout.cli.main import main
-from turnout.cli.twin import model_text
+from turnout.cli.twin import events_in_doubt, model_text
 from turnout.config import load_configuration, with_raw
 from turnout.constants import DAYS_PER_YEAR
 from turnout.errors import SimulationError
@@ -428,6 +428,16 @@ def test_work_in_the_evening_of_a_day_of_measurement_lies_after_it(turnout):
     assert list(since_renewal(t1, dict.fromkeys(DAYS))) == list(DAYS[2:])
     write_events(f"t1,,{DAYS[1]}T01:00,renewal,,\n")
     assert list(since_renewal(t1, dict.fromkeys(DAYS))) == list(DAYS[1:])
+
+
+def test_rows_of_events_that_do_not_count_are_stated_with_the_model(turnout):
+    """A misspelt section or turnout, and a date far ahead: formerly the work was left out without a word."""
+    write_events(
+        "t1,A9,2026-01-10,tamping,,\nT1,,2026-01-11,tamping,,\nt1,,2099-01-11,tamping,,\nt9,,2026-01-11,tamping,,\n"
+        "t1,A,2026-01-12,tamping,,\nt1,A,2026-01-12,tamping,,\n"
+    )
+    doubts = events_in_doubt(load_configuration("config"), "t1")
+    assert [re.search(r"line (\d)", d)[1] for d in doubts] == ["2", "3", "4"]  # the last row repeats one that counts
 
 
 def test_resonances_that_a_row_resets_beside_those_of_its_kind_are_uncertain_too(turnout):
