@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BASELINE = TrendSettings()  # of which the page states what a baseline needs
 # One row per section: that of the newest model, accepted or not.
 NEWEST_MODEL = "qualify row_number() over (partition by section_id order by measured_at_utc desc, model_id) = 1"
-COMMON_PARAMETERS = "(ballast_stiffness|pad_stiffness|sleeper_mass)"  # of the calibrated model, of all supports
+COMMON_PARAMETERS = "(ballast|pad)_stiffness"  # of the calibrated model, of all supports
 ID_GIVEN = "turnout_id in (select unnest($turnouts))"
 # Scatter between the campaigns of each section, which needs all campaigns of the fleet: read once, for all turnouts.
 HISTORY = "mode_scatter_read"

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from turnout.constants import Z95
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
 from turnout.mismatch.calibrated.change_course import courses_of, visits_of_ended_change
@@ -27,7 +28,7 @@ from turnout.mismatch.calibrated.model_answer import (
     position_of,
     with_rivals,
 )
-from turnout.mismatch.calibrated.repairs import agrees_with_file, newest_work, repair_events, size_after_work
+from turnout.mismatch.calibrated.repairs import agrees_with_file, lasts_after_work, newest_work, repair_events
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
@@ -186,18 +187,21 @@ def change_answer(
         return change_answer(
             parameters, visits, [*events, *repair], candidates, threshold, margin, is_alarmed, with_trains, surface
         )
+    lasts = present is not None
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     without_loads = parameters, visits
     if is_under_load(leader.effect):
         parameters, visits = with_loads
         history = _history_of_changes(parameters, visits, events, levels)
-    if present is None and (ended := visits_of_ended_change(history, leader.effect, margin)):
+    if not lasts and (ended := visits_of_ended_change(history, leader.effect, margin)):
         parameters, visits = without_loads[0], _without(ended, without_loads[1])
         with_trains = with_trains and (with_trains[0], _without(ended, with_trains[1]))
         return change_answer(
             parameters, visits, events, candidates, threshold, margin, is_alarmed, with_trains, surface
         )
     courses = courses_of(history, leader.effect)
+    if present is not None and abs(present[0] - courses.last_size[0]) <= Z95 * present[1]:
+        present = None  # the work has not changed it
     grows = leader.effect.grows and present is None
     sizes = (leader.size if grows else present or courses.last_size, present or courses.last_size)
     size, total = (_with_model_error(leader.effect, s) for s in sizes)
@@ -247,9 +251,10 @@ def _after_work(
     if work is None:
         return None, []
     others = [v for v in visits if not since < v.time < work]
-    present = size_after_work(_history_of_changes(parameters, others, events, levels), leader.effect, since)
-    if present is not None and present[0] * leader.size[0] > 0.0:
-        return present, []
+    without = _history_of_changes(parameters, others, events, levels)
+    before = _history_of_changes(parameters, [v for v in visits if v.time < work], events, levels)
+    if lasts_after_work(without, leader.effect, since, courses_of(before, leader.effect).last_size):
+        return courses_of(without, leader.effect).last_size, []
     times = [*(v.time for v in visits if since < v.time < work), work]
     return None, _new_events(repair_events(shapes, size, times), events)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,8 +59,8 @@ def agrees_with_file(
     return bool(evidence_from_first(history, [effect])[0][0] <= 0.0)
 
 
-def size_after_work(history: History, effect: ChangeEffect, since: float) -> tuple[float, float] | None:
-    """Size of a change after recorded work, None where it is less probable than not.
+def lasts_after_work(history: History, effect: ChangeEffect, since: float, size: tuple[float, float]) -> bool:
+    """Whether a change is more probable than not after recorded work, either of any size or of that before the work.
 
     Parameters
     ----------
@@ -69,16 +70,25 @@ def size_after_work(history: History, effect: ChangeEffect, since: float) -> tup
         Whether it grows makes no difference.
     since : float
         Time of the last visit without it. [years]
+    size : (float, float)
+        Before the work, with its standard deviation.
 
     Returns
     -------
-    (float, float) or None
-        Size and its standard deviation.
+    bool
     """
-    step = ChangeEffect(effect.name, effect.direction, effect.sd, False, effect.group, effect.position)
-    (evidence,) = compare_onsets(history, [step])
+    (evidence,) = compare_onsets(history, [replace(effect, grows=False)])
     k = int(np.flatnonzero(evidence.times == since)[0])
-    return (float(evidence.sizes[k]), float(evidence.size_sds[k])) if evidence.gains[k] > 0.0 else None
+    information = evidence.size_sds[k] ** -2 - effect.sd**-2
+    if information <= 0.0:  # nothing is known after the work
+        return True
+    value, variance = evidence.sizes[k] / (evidence.size_sds[k] ** 2 * information), 1.0 / information
+    with_noise = variance + size[1] ** 2
+    of_same_size = 0.5 * (
+        value**2 / variance - (value - size[0]) ** 2 / with_noise - float(np.log(with_noise / variance))
+    )
+    has_sign = bool(value * size[0] > 0.0)
+    return has_sign and max(float(evidence.gains[k]), float(of_same_size)) > 0.0
 
 
 def repair_events(shapes: Shapes, size: float, times: Iterable[float]) -> list[Event]:

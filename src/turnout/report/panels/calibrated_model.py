@@ -30,8 +30,8 @@ KINDS = {
 }
 MIN_POINTS = 2  # a kind with fewer positions is left out
 # Kind -> the parameter that all its components share, by which the value of each is multiplied
-COMMON = {"ballast": "ballast_stiffness", "pad": "pad_stiffness", "sleeper": "sleeper_mass"}
-TRACK_KINDS = (*COMMON, "cast_bending")
+COMMON = {"ballast": "ballast_stiffness", "pad": "pad_stiffness"}  # not that of masses, which has errors beyond its sd
+TRACK_KINDS = ("ballast", "pad", "sleeper", "cast_bending")
 HALF_BAY = 0.3  # m beyond the outer components of a visit, where no other one fits
 SERIES = {"cast_bending": "casting", "gain": "sensor gain", "seat": "sensor position"}  # others by their kind
 DEPTH = "ln depth of "  # begin of the name of the depth of a nose or a joint, behind its route
