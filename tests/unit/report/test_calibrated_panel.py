@@ -3,6 +3,7 @@
 import re
 from datetime import datetime
 
+import duckdb
 import numpy as np
 import pytest
 from tests.unit.report.test_turnout_page import page
@@ -14,6 +15,7 @@ from turnout.report.panels.calibrated_model import (
     depth_panels,
     narrowing_panel,
 )
+from turnout.report.source import ROWS
 
 
 def state(parameter, position, value, sd, n_visits=2, day=1):
@@ -104,3 +106,23 @@ def test_the_depth_of_a_nose_is_shown_after_each_visit():
     assert svg.count('<svg class="chart"') == 1 and "depth of the kink at 5.24 m over file, after each visit" in svg
     assert "1.22 (1.11 to 1.35, 95 %), visit 2026-05-02" in svg and depth_panels(STATES) == ""
     assert svg in calibrated_panels([*STATES, *nose])
+
+
+@pytest.mark.parametrize(("section", "shown"), [("null", ["pad@18.00", "pad_stiffness"]), ("'t/A'", ["pad@18.00"] * 2)])
+def test_states_from_before_a_renewal_are_not_read(section, shown):
+    """A planned renewal has not happened, and that of a section is not one of the turnout. Waves are not drawn."""
+    con = duckdb.connect()
+    con.execute("create table superseded (old_id varchar)")
+    con.execute("create table events (turnout_id varchar, section_id varchar, kind varchar, event_at_utc timestamp)")
+    con.execute(f"""insert into events values
+        ('t', {section}, 'renewal', '2026-05-02'), ('t', null, 'renewal', '2027-01-01'),
+        ('t', null, 'tamping', '2026-05-20'), ('other', null, 'renewal', '2026-05-20')""")
+    con.execute("""create table twin_states as select * from (values
+        ('t', 'f1', '2026-05-01', timestamp '2026-05-01 12:00', 0, 'pad@18.00', 18.0, 0.0, 0.1, 0.1, 1, 4),
+        ('t', 'f2', '2026-05-03', timestamp '2026-05-03 12:00', 0, 'pad@18.00', 18.0, 0.0, 0.1, 0.1, 1, 4),
+        ('t', 'f2', '2026-05-03', timestamp '2026-05-03 12:00', 1, 'pad_stiffness', null, 0.0, 0.1, 0.1, 1, 4),
+        ('t', 'f2', '2026-05-03', timestamp '2026-05-03 12:00', 2, 'cos_wave_3@0.00-9.00', null, 0.0, 0.1, 0.1, 1, 4)
+        ) as t(turnout_id, finding_id, visit, found_at_utc, parameter_no, parameter, position_m, value, sd, prior_sd,
+            n_visits, n_recordings)""")
+    rows = con.execute(ROWS["calibrated"].replace(":today", "date '2026-06-01'"), {"turnouts": ["t"]}).fetchall()
+    assert [row[4] for row in rows][: len(shown)] == shown and len(rows) == (2 if section == "null" else 3)

@@ -230,7 +230,7 @@ def _depth_panel(name: str, states: States, width: int) -> str:
     ends = np.array([time[0] - margin, time[-1] + margin])
     words = f"{name.replace('ln ', '', 1)} over file"
     chart = Chart(
-        Axis(*ends, "", "time"),
+        Axis(float(ends[0]), float(ends[1]), "", "time"),
         Axis(0.9 * min(low.min(), prior_low.min()), 1.05 * max(high.max(), prior_high.max()), "depth over file"),
         f"{words}, after each visit",
         width=width,
