@@ -261,8 +261,8 @@ def _after_work(
 
 def _new_events(repair: list[Event], events: Sequence[Event]) -> list[Event]:
     """The events, [] if the first of them is there already: what its noise does not explain is stated."""
-    known = [(e.time, e.direction) for e in events]
-    return [] if (repair[0].time, repair[0].direction) in known else repair
+    is_there = any((e.time, e.direction) == (repair[0].time, repair[0].direction) for e in events)
+    return [] if is_there else repair
 
 
 def _without(ended: Collection[str], visits: Sequence[VisitInformation]) -> list[VisitInformation]:
