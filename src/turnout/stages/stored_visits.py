@@ -323,7 +323,7 @@ def _fit_again(case: TrackCase, fit: Fit, may_be_large: Collection[str], partner
         if n.name in may_be_large and abs(fit.values[n.name] - n.mean) > CALIBRATION.finding_sds * n.sd
     ]
     try:
-        return fit_again(case, fit, {*springs, *(partners[n] for n in springs if n in partners)})
+        return fit_again(case, fit, springs, partners)
     except SimulationError:
         return fit
 

@@ -47,7 +47,7 @@ class Nose(Case):
 def fits_of(case):
     """All recordings linear about the fit of the short train, and the same fit continued with all of them."""
     case, linear = with_reserved_passages(case, fit_jointly(case))
-    return case, linear, fit_again(case, linear, ())
+    return case, linear, fit_again(case, linear, (), {})
 
 
 def maximum(case, fit):
@@ -95,7 +95,7 @@ def test_a_value_far_beyond_its_prior_keeps_its_wide_prior():
     """A depth of six standard deviations by a wide prior: with the prior of the file it would be smaller."""
     surface = Kink(0.0, AS_FILED.depth * np.exp(2.4) - AS_FILED.depth, 0.7)
     case, linear, narrow = fits_of(Nose(0, surface))
-    wide = fit_again(case, linear, {"depth"})
+    wide = fit_again(case, linear, {"depth"}, {})
     assert abs(wide.values["depth"] - 2.4) < abs(narrow.values["depth"] - 2.4)
 
 
@@ -115,7 +115,7 @@ def test_a_visit_continues_its_fit_with_wide_priors_for_large_values(monkeypatch
     monkeypatch.setattr(stored_visits, "fit_again", lambda *given: calls.append(given) or "continued")
     springs, partners = ["pad_3", "ballast_3"], {"pad_3": "pad_damper_3", "ballast_3": "ballast_damper_3"}
     assert stored_visits._fit_again(case, fit, springs, partners) == "continued"
-    assert calls == [(case, fit, {"pad_3", "pad_damper_3"})]
+    assert calls == [(case, fit, ["pad_3"], partners)]
 
     def failing(*_):
         raise SimulationError("no passage")

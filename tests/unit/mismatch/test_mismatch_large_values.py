@@ -5,7 +5,12 @@ import pytest
 from scipy import stats
 
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.large_values import evidence_of_large_values, fit_large_values, with_wide_priors
+from turnout.mismatch.engine.large_values import (
+    evidence_far_from_fit,
+    evidence_of_large_values,
+    fit_large_values,
+    with_wide_priors,
+)
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -120,6 +125,17 @@ def test_wide_priors_leave_the_case_and_the_other_values_as_they_are():
     assert wide.nuisances[:2] == case.nuisances[:2] and case.nuisances[2].sd == PRIOR
 
 
+def test_the_partner_of_a_large_value_may_change_as_much_as_that_value():
+    """sqrt(0.1² + (5 · 0.1)²) and not 5 · 0.2: the partner of a spring is a damper, with a wider prior of its own."""
+    case = Springs(np.zeros(N))
+    case.nuisances = tuple(Nuisance(n.name, "-", 0.0, 0.2 if n.name == "k3" else 0.1, bounds=(-0.6, 0.6), group="k")
+                           for n in case.nuisances)  # fmt: skip
+    wide = with_wide_priors(case, ["k2"], WIDE, {"k2": "k3", "k4": "k5"})
+    assert wide.nuisances[3].sd == pytest.approx(np.hypot(0.2, 0.5))
+    assert wide.nuisances[3].bounds == pytest.approx((-0.6 * np.hypot(1.0, 2.5), 0.6 * np.hypot(1.0, 2.5)))
+    assert wide.nuisances[5] == case.nuisances[5]
+
+
 class TwoValleys(Springs):
     """Beyond 0.6 the response of the third spring first falls, and agrees with the data only at 1.3 and more."""
 
@@ -136,3 +152,62 @@ def test_a_large_value_behind_a_barrier_is_found_from_a_separate_start():
     search, base = base_of(case)
     fit = fit_large_values(search, base, NAMES, WIDE)
     assert fit.values["k2"] == pytest.approx(1.4, abs=0.1)
+
+
+class Cubes(Springs):
+    """Hammer tests that show nothing of a small deviation: they respond to its cube."""
+
+    def response(self, x):
+        return MIXING @ (x if self.power == 0.0 else x**3)
+
+    def is_hammer_test(self, observation):
+        return True
+
+
+@pytest.mark.parametrize("size", [-1.4, 1.4])
+def test_a_large_value_of_which_a_small_deviation_shows_nothing_is_found(size):
+    """The sleeper of a pad with six times its stiffness moves with the rail; twice the stiffness changes little."""
+    truth = np.zeros(N)
+    truth[3] = size
+    case = Cubes(truth)
+    search, base = base_of(case)
+    assert max(evidence_of_large_values(case, base, NAMES, WIDE).values(), default=0.0) < np.log(N)  # the precondition
+    fit = fit_large_values(search, base, NAMES, WIDE)
+    others = [abs(fit.values[n]) for j, n in enumerate(NAMES) if j != 3]
+    assert fit.values["k3"] == pytest.approx(size, abs=0.05) and max(others) < PRIOR
+
+
+def test_the_evidence_far_from_the_fit_is_that_of_the_best_fit_with_the_value_held_there():
+    """A linear model, solved by least squares with the held value taken to the right-hand side."""
+    case = Cubes([0.0, 0.0, 0.9, 0.1, 0.0, 0.05, 0.0], power=0.0)
+    _, fit = base_of(case)
+    y = case.observations[0].data / NOISE
+    gains = evidence_far_from_fit(case, fit, NAMES, WIDE, ["k5"])
+    assert set(gains) == set(NAMES) - {"k5"}
+    sd = np.where(np.arange(N) == 5, WIDE, 1.0) * PRIOR
+    stacked, right = np.vstack([MIXING / NOISE, np.diag(1.0 / sd)]), np.concatenate([y, np.zeros(N)])
+
+    def cost(held=None, value=0.0):
+        free = [j for j in range(N) if j != held]
+        rest = right - (stacked[:, held] * value if held is not None else 0.0)
+        rest[y.size + np.arange(N)[[j == held for j in range(N)]]] = 0.0  # its own prior is the wide one
+        left = rest - stacked[:, free] @ np.linalg.lstsq(stacked[:, free], rest, rcond=None)[0]
+        return left @ left + (0.0 if held is None else (value / (WIDE * PRIOR)) ** 2)
+
+    sizes = [s * sign * WIDE * PRIOR for s in THRESHOLDS.large_start_sds for sign in (1.0, -1.0)]
+    for j, name in enumerate(NAMES):
+        if name != "k5":
+            expected = 0.5 * (cost() - min(cost(j, size) for size in sizes)) - np.log(WIDE)
+            assert gains[name] == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_usual_scatter_has_no_large_value_far_from_the_fit_either():
+    rng = np.random.default_rng(4)
+    for seed in range(20):
+        search, base = base_of(Cubes(PRIOR * rng.normal(size=N), seed=seed))
+        assert fit_large_values(search, base, NAMES, WIDE) is base
+
+
+def test_without_hammer_tests_there_is_no_evidence_far_from_the_fit():
+    case = Springs(np.zeros(N))
+    assert evidence_far_from_fit(case, base_of(case)[1], NAMES, WIDE) == {}

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.errors import SimulationError
-from turnout.mismatch.engine.joint_problem import cost_at
+from turnout.mismatch.engine.joint_problem import JointProblem, cost_at
 from turnout.mismatch.engine.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def fit_large_values(
     widening : float
         Wide prior standard deviation of such a value, over its own.
     partners : mapping or None
-        Nuisance -> another that changes with it, as a damper with its spring: it has a wide prior as well.
+        Nuisance -> another that changes with it, as a damper with its spring: see ``with_wide_priors``.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def fit_large_values(
     penalty, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.large_value_lead, partners or {}
     large: tuple[str, ...] = ()
     for _ in range(THRESHOLDS.max_large_values):
-        gains = evidence_of_large_values(search.case, fit, names, widening, _with_partners(large, partners))
+        gains = _evidence_near_and_far(search.case, fit, names, widening, large, partners)
         promising = sorted((n for n, g in gains.items() if g > penalty), key=lambda n: -gains[n])
         fits = {}
         for name in promising[: THRESHOLDS.n_large_starts]:
@@ -71,22 +71,32 @@ def fit_large_values(
     return fit
 
 
-def with_wide_priors(case: Case, names: Collection[str], widening: float) -> Case:
-    """The case with wide priors and bounds of some nuisances.
+def with_wide_priors(
+    case: Case, names: Collection[str], widening: float, partners: Mapping[str, str] | None = None
+) -> Case:
+    r"""The case with wide priors and bounds of some nuisances.
+
+    The partner of one may change as much as that one, :math:`\sqrt{s_p^2 + w^2 s^2}`. A damper that could change more
+    than its spring would stand for a stiff spring, with twenty times its damping.
 
     Parameters
     ----------
     case : Case
     names : collection of str
     widening : float
-        Factor on standard deviations and bounds.
+        Factor w on standard deviations and bounds.
+    partners : mapping or None
+        Nuisance -> its partner.
 
     Returns
     -------
     Case
     """
-    wide = copy(case)
-    wide.nuisances = tuple(_with_wide_prior(n, widening) if n.name in names else n for n in case.nuisances)
+    partners, wide = partners or {}, copy(case)
+    sds = {partners[n.name]: widening * n.sd for n in case.nuisances if n.name in names and n.name in partners}
+    factors = {n.name: float(np.hypot(n.sd, sds[n.name])) / n.sd for n in case.nuisances if n.name in sds}
+    factors |= dict.fromkeys(names, widening)
+    wide.nuisances = tuple(_with_wide_prior(n, factors[n.name]) if n.name in factors else n for n in case.nuisances)
     return wide
 
 
@@ -96,7 +106,12 @@ def _with_wide_prior(nuisance: Nuisance, widening: float) -> Nuisance:
 
 
 def evidence_of_large_values(
-    case: Case, fit: Fit, names: Collection[str], widening: float, large: Collection[str] = ()
+    case: Case,
+    fit: Fit,
+    names: Collection[str],
+    widening: float,
+    large: Collection[str] = (),
+    partners: Mapping[str, str] | None = None,
 ) -> dict[str, float]:
     r"""Evidence that a single value has a wide prior, if the model were linear about the fit.
 
@@ -115,13 +130,15 @@ def evidence_of_large_values(
         w.
     large : collection of str
         Those that have wide priors already. They have no entry.
+    partners : mapping or None
+        As ``with_wide_priors``.
 
     Returns
     -------
     dict
         Name -> evidence [nats].
     """
-    wide = with_wide_priors(case, large, widening)
+    wide = with_wide_priors(case, large, widening, partners)
     precision, score = _posterior(wide, fit)
     covariance = np.linalg.inv(precision)
     mean = covariance @ score
@@ -135,6 +152,93 @@ def evidence_of_large_values(
         near, far = v + n.sd**2, v + (widening * n.sd) ** 2
         gains[n.name] = float(0.5 * (distance**2 / near - distance**2 / far) - 0.5 * np.log(far / near))
     return gains
+
+
+def evidence_far_from_fit(
+    case: Case,
+    fit: Fit,
+    names: Collection[str],
+    widening: float,
+    large: Collection[str] = (),
+    partners: Mapping[str, str] | None = None,
+) -> dict[str, float]:
+    r"""Evidence of hammer tests that a value has a wide prior, at the values where fits with a large value start.
+
+    A stiff pad changes receptances little at first, and much where its sleeper moves with the rail. So the value itself
+    is not linear here: the data are predicted with it, and all others follow linearly. With residual r, derivatives J
+    and precision P of the prior, all about the fit with value k moved, the cost that remains is
+
+    .. math:: c_k = r^T W r + (\eta - m)^T P (\eta - m) - b^T A^{-1} b + \frac{(A^{-1} b)_k^2}{(A^{-1})_{kk}}, \quad
+              A = J^T W J + P, \quad b = J^T W r - P (\eta - m)
+
+    The evidence is half of what this cost, with the wide prior for k, is below that of the fit, less
+    :math:`\ln w`, the price of the wide prior where the data determine the value with both.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+    names : collection of str
+    widening : float
+        w.
+    large : collection of str
+        Those that have wide priors already. They have no entry.
+    partners : mapping or None
+        As ``with_wide_priors``.
+
+    Returns
+    -------
+    dict
+        Name -> evidence [nats]; {} without hammer tests. A value at which the simulation fails has none.
+    """
+    wide = with_wide_priors(case, large, widening, partners)
+    chosen = [i for i, o in enumerate(case.observations) if case.is_hammer_test(o)]
+    if not chosen:
+        return {}
+    problem = JointProblem(wide, (), [case.observations[i] for i in chosen])
+    at_fit = np.array([fit.values[n.name] for n in wide.nuisances])
+    noise = dict.fromkeys((o.data_type for o in problem.observations), 1.0)  # as in ``_posterior``
+    jacobian = [np.asarray(fit.jacobian[i], dtype=float) for i in chosen]
+    rows, residual = problem.stack(jacobian, problem.residuals([fit.predictions[i] for i in chosen]), noise)
+    covariance = np.linalg.inv(rows.T @ rows + np.diag(problem.sd**-2))
+
+    def cost(residual: np.ndarray, theta: np.ndarray, sd: np.ndarray, held: int | None) -> float:
+        deviation = (theta - problem.mean) / sd
+        b = rows.T @ residual - deviation / sd
+        shift = covariance @ b
+        gain = b @ shift if held is None else b @ shift - shift[held] ** 2 / covariance[held, held]
+        return float(residual @ residual + deviation @ deviation - gain)
+
+    nearby, gains = cost(residual, at_fit, problem.sd, None), dict[str, float]()
+    for k, nuisance in enumerate(wide.nuisances):
+        if nuisance.name not in names or nuisance.name in large:
+            continue
+        far = _with_wide_prior(nuisance, widening)
+        sd = np.where(np.arange(at_fit.size) == k, far.sd, problem.sd)
+        for size in (s * sign * far.sd for s in THRESHOLDS.large_start_sds for sign in (1.0, -1.0)):
+            theta = at_fit.copy()
+            theta[k] = np.clip(far.mean + size, *far.bounds)
+            if (predictions := problem.predict_or_none(theta)) is None:
+                continue
+            moved = problem.stack(jacobian, problem.residuals(predictions), noise)[1]
+            gain = 0.5 * (nearby - cost(moved, theta, sd, k)) - float(np.log(widening))
+            gains[nuisance.name] = max(gain, gains.get(nuisance.name, -np.inf))
+    return gains
+
+
+def _evidence_near_and_far(
+    case: Case,
+    fit: Fit,
+    names: Collection[str],
+    widening: float,
+    large: Collection[str],
+    partners: Mapping[str, str],
+) -> dict[str, float]:
+    near, far = (
+        f(case, fit, names, widening, large, partners) for f in (evidence_of_large_values, evidence_far_from_fit)
+    )
+    return {name: max(near.get(name, -np.inf), far.get(name, -np.inf)) for name in {**near, **far}}
 
 
 def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -152,10 +256,6 @@ def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return precision, score
 
 
-def _with_partners(names: Collection[str], partners: Mapping[str, str]) -> tuple[str, ...]:
-    return (*names, *(partners[n] for n in names if n in partners))
-
-
 def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float, partners: Mapping[str, str]) -> Fit:
     """Fit with wide priors of these values: the best of several starts.
 
@@ -163,7 +263,7 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
     fits of the case start: the fit without it has moved them to hide it, and may be at another minimum. These end where
     their steps do not lead below the best one so far.
     """
-    wide = replace(search, case=with_wide_priors(search.case, _with_partners(large, partners), widening))
+    wide = replace(search, case=with_wide_priors(search.case, large, widening, partners))
     solution = dict(zip((n.name for n in wide.case.nuisances), np.linalg.solve(*_posterior(wide.case, fit))))
     costs: list[tuple[float, dict[str, float]]] = []
     for share in (*THRESHOLDS.size_factors, 0.0):

@@ -147,7 +147,7 @@ def fit_all_recordings(case: Case, fit: Fit, prior: NormalPrior, values: Mapping
     return replace(fit, values=_values(case, x), jacobian=rows, white=white), cost
 
 
-def fit_again(case: Case, fit: Fit, large: Collection[str]) -> Fit:
+def fit_again(case: Case, fit: Fit, large: Collection[str], partners: Mapping[str, str]) -> Fit:
     """The fit, continued to the maximum of all recordings under the prior of the file.
 
     Where trains meet a nose, recordings that are linear about the maximum of a few others lead far from their own.
@@ -160,6 +160,8 @@ def fit_again(case: Case, fit: Fit, large: Collection[str]) -> Fit:
         Where the steps begin.
     large : collection of str
         Nuisances that are far beyond their prior: they have a wide one, as in ``fit_large_values``.
+    partners : mapping
+        As ``with_wide_priors``.
 
     Returns
     -------
@@ -171,7 +173,7 @@ def fit_again(case: Case, fit: Fit, large: Collection[str]) -> Fit:
     SimulationError
         If the model cannot be simulated at the beginning, or beside an end of a step.
     """
-    wide = with_wide_priors(case, large, CALIBRATION.change_sds)
+    wide = with_wide_priors(case, large, CALIBRATION.change_sds, partners)
     again, _ = fit_all_recordings(wide, fit, NormalPrior.of_file(wide), fit.values)
     return replace(again, scale={**again.scale, **noise_scales(wide, again)})
 
