@@ -9,6 +9,7 @@ import numpy as np
 
 from turnout.mismatch.calibrated.belief import Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, change_sd
+from turnout.mismatch.calibrated.change_size import error_of_stiff_spring
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import Deviation, deviations_from_file, evidence_from_first
 from turnout.mismatch.calibrated.history import BEFORE_ALL, Event, History, estimate_history
@@ -81,9 +82,9 @@ def file_answer(
         deviation = _deviation_answer(parameters, visits, events, history, visit, steps, margin)
         return _at_dip(deviation, history, surface)
     first = order[0]
-    stated = LeadingEffect.of(
-        steps[first], by_name, (float(sizes[first]), float(sds[first])), float(gains[first]) - penalty
-    )
+    size = float(sizes[first])
+    sd = float(np.hypot(sds[first], error_of_stiff_spring(steps[first], size, by_name)))
+    stated = LeadingEffect.of(steps[first], by_name, (size, sd), float(gains[first]) - penalty)
     jump = history.steps[0].innovation  # without a visit nothing has evidence
     if not _explains_first_visit(parameters, visits, events, steps[first], jump):
         return _at_dip(stated.unknown(visit, FILE, by_name[jump.parameter]), history, surface)

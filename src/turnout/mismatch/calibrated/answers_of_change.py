@@ -12,6 +12,7 @@ from turnout.constants import Z95
 from turnout.mismatch.calibrated.belief import StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, OnsetEvidence, change_sd, compare_onsets
 from turnout.mismatch.calibrated.change_course import courses_of, visits_of_ended_change
+from turnout.mismatch.calibrated.change_size import is_material, present_size, with_model_error
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import Event, History, estimate_history
 from turnout.mismatch.calibrated.information import VisitInformation
@@ -23,7 +24,6 @@ from turnout.mismatch.calibrated.model_answer import (
     ModelAnswer,
     free_shape,
     is_explained,
-    least_size,
     name_of,
     position_of,
     with_rivals,
@@ -168,7 +168,7 @@ def change_answer(
     with_loads = with_offsets(parameters, visits)
     by_name = {p.name: p for p in with_loads[0]}
     least = threshold + penalty
-    relevant = [e for e in evidence if e.gain > least - margin and (is_alarmed or _is_material(e, by_name))]
+    relevant = [e for e in evidence if e.gain > least - margin and (is_alarmed or is_material(e, by_name))]
     relevant = [e for e in relevant if e.gain >= e.from_first]
     gain = _evidence_of_name(relevant, by_name)
     if gain < least:
@@ -204,7 +204,7 @@ def change_answer(
         present = None  # the work has not changed it
     grows = leader.effect.grows and present is None
     sizes = (leader.size if grows else present or courses.last_size, present or courses.last_size)
-    size, total = (_with_model_error(leader.effect, s) for s in sizes)
+    size, total = (with_model_error(leader.effect, s, by_name) for s in sizes)
     effect = replace(leader.effect, grows=grows)
     stated = LeadingEffect.of(effect, by_name, size, gain - penalty, courses.onset_interval())
     opened = [*events, *_events_of_change(leader, parameters, candidates)]
@@ -217,7 +217,7 @@ def change_answer(
     names = [stated.name]
     if stated.name == "local_ballast" and leader.size[0] < 0.0:
         information = with_trains or (parameters, visits)
-        names = names_of_softer_ballast(*information, events, leader, _present_size(leader), margin, levels)
+        names = names_of_softer_ballast(*information, events, leader, present_size(leader), margin, levels)
     rivals = [name_of(e.effect, by_name) for e in relevant if e.gain > leader.gain - margin]
     answer = stated.answer(visit, CHANGE, with_rivals(names, stated, rivals))
     ends = stretch_ends(changes_alike(evidence, leader, by_name), by_name)
@@ -250,8 +250,8 @@ def _after_work(
     work = newest_work(leader.effect, events, onset, last)
     if work is None:
         return None, []
-    others = [v for v in visits if not since < v.time < work]
-    without = _history_of_changes(parameters, others, events, levels)
+    unaffected = [v for v in visits if not since < v.time < work]
+    without = _history_of_changes(parameters, unaffected, events, levels)
     before = _history_of_changes(parameters, [v for v in visits if v.time < work], events, levels)
     if lasts_after_work(without, leader.effect, since, courses_of(before, leader.effect).last_size):
         return courses_of(without, leader.effect).last_size, []
@@ -328,16 +328,6 @@ def _evidence_of_name(relevant: Sequence[OnsetEvidence], by_name: Mapping[str, S
     return float(np.logaddexp.reduce([e.gain for e in changes_alike(relevant, relevant[0], by_name)]))
 
 
-def _with_model_error(effect: ChangeEffect, size: tuple[float, float]) -> tuple[float, float]:
-    """Size and its standard deviation with the error of the model, which is a share of the size.
-
-    The share is larger for stiffness under load. The model of a visit is linear in the stiffness about its value
-    without the effect, but signals may be linear in the compliance. A loss x of the linear model is then ln(1 - x).
-    """
-    share = CALIBRATION.linear_error if is_under_load(effect) else CALIBRATION.size_error
-    return size[0], float(np.hypot(size[1], share * size[0]))
-
-
 def _events_of_change(
     evidence: OnsetEvidence, parameters: Sequence[StateParameter], candidates: Sequence[ChangeEffect]
 ) -> list[Event]:
@@ -348,18 +338,6 @@ def _events_of_change(
         return [Event(float(times[first + 1]), {}, *d) for d in directions]
     steps = list(zip(times[first:-1], times[first + 1 :]))
     return [Event(float(now), {}, d, sd * float(now - before)) for before, now in steps for d, sd in directions]
-
-
-def _is_material(evidence: OnsetEvidence, by_name: Mapping[str, StateParameter]) -> bool:
-    """Whether the present size causes any action."""
-    return abs(_present_size(evidence)[0]) >= least_size(evidence.effect, by_name)
-
-
-def _present_size(evidence: OnsetEvidence) -> tuple[float, float]:
-    """Size at the last visit and its standard deviation: of growth, that since its most probable onset."""
-    start = evidence.times[int(np.argmax(evidence.gains))]
-    elapsed = float(evidence.times[-1] - start) if evidence.effect.grows else 1.0
-    return elapsed * evidence.size[0], elapsed * evidence.size[1]
 
 
 def surface_changes(shapes: Mapping[str, Mapping[str, float]]) -> list[ChangeEffect]:

@@ -203,11 +203,11 @@ def evidence_far_from_fit(
     rows, residual = problem.stack(jacobian, problem.residuals([fit.predictions[i] for i in chosen]), noise)
     covariance = np.linalg.inv(rows.T @ rows + np.diag(problem.sd**-2))
 
-    def cost(residual: np.ndarray, theta: np.ndarray, sd: np.ndarray, held: int | None) -> float:
+    def cost(residual: np.ndarray, theta: np.ndarray, sd: np.ndarray, fixed: int | None) -> float:
         deviation = (theta - problem.mean) / sd
         b = rows.T @ residual - deviation / sd
         shift = covariance @ b
-        gain = b @ shift if held is None else b @ shift - shift[held] ** 2 / covariance[held, held]
+        gain = b @ shift if fixed is None else b @ shift - shift[fixed] ** 2 / covariance[fixed, fixed]
         return float(residual @ residual + deviation @ deviation - gain)
 
     nearby, gains = cost(residual, at_fit, problem.sd, None), dict[str, float]()
