@@ -76,17 +76,21 @@ def file_answer(
     order = [
         k for k in np.argsort(-gains) if gains[k] > least - margin and abs(sizes[k]) >= least_size(steps[k], by_name)
     ]
-    if order and (repair := _repair_of(steps[order[0]], float(sizes[order[0]]), parameters, visits, events, steps)):
-        return file_answer(parameters, visits, [*events, *repair], visit, candidates, threshold, margin, surface)
-    if not order or gains[order[0]] < least:
+    jump = history.steps[0].innovation if visits else None
+    is_explained_by_first = bool(
+        order and jump and _explains_first_visit(parameters, visits, events, steps[order[0]], jump)
+    )
+    for k in order[:1] if is_explained_by_first else order:  # beside it there may be one that was repaired
+        if repair := _repair_of(steps[k], float(sizes[k]), parameters, visits, events, steps):
+            return file_answer(parameters, visits, [*events, *repair], visit, candidates, threshold, margin, surface)
+    if not order or jump is None or gains[order[0]] < least:
         deviation = _deviation_answer(parameters, visits, events, history, visit, steps, margin)
         return _at_dip(deviation, history, surface)
     first = order[0]
     size = float(sizes[first])
     sd = float(np.hypot(sds[first], error_of_stiff_spring(steps[first], size, by_name)))
     stated = LeadingEffect.of(steps[first], by_name, (size, sd), float(gains[first]) - penalty)
-    jump = history.steps[0].innovation  # without a visit nothing has evidence
-    if not _explains_first_visit(parameters, visits, events, steps[first], jump):
+    if not is_explained_by_first:
         return _at_dip(stated.unknown(visit, FILE, by_name[jump.parameter]), history, surface)
     names = [stated.name]
     if stated.name == "local_ballast" and sizes[first] < 0.0:

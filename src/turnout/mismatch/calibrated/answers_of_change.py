@@ -28,7 +28,7 @@ from turnout.mismatch.calibrated.model_answer import (
     position_of,
     with_rivals,
 )
-from turnout.mismatch.calibrated.repairs import agrees_with_file, lasts_after_work, newest_work, repair_events
+from turnout.mismatch.calibrated.repairs import agrees_with_file, newest_work, repair_events, size_after_work
 from turnout.mismatch.calibrated.soft_ballast_or_gap import names_of_softer_ballast
 from turnout.mismatch.calibrated.stiffness_under_load import (
     is_all_explained,
@@ -182,18 +182,19 @@ def change_answer(
             parameters, visits, events, candidates, threshold, margin, True, with_trains, surface
         )
     leader = relevant[0]
-    present, repair = _after_work(leader, parameters, visits, events, candidates, levels)
+    present, repair, ended = _after_work(leader, parameters, visits, events, candidates, levels, margin)
     if repair:
         return change_answer(
             parameters, visits, [*events, *repair], candidates, threshold, margin, is_alarmed, with_trains, surface
         )
-    lasts = present is not None
     jump = history.steps[1 + int(np.argmax(leader.gains))].innovation
     without_loads = parameters, visits
     if is_under_load(leader.effect):
         parameters, visits = with_loads
         history = _history_of_changes(parameters, visits, events, levels)
-    if not lasts and (ended := visits_of_ended_change(history, leader.effect, margin)):
+    if not ended and present is None:
+        ended = visits_of_ended_change(history, leader.effect, margin)
+    if ended:
         parameters, visits = without_loads[0], _without(ended, without_loads[1])
         with_trains = with_trains and (with_trains[0], _without(ended, with_trains[1]))
         return change_answer(
@@ -231,14 +232,16 @@ def _after_work(
     events: Sequence[Event],
     candidates: Sequence[ChangeEffect],
     levels: Mapping[str, float],
-) -> tuple[tuple[float, float] | None, list[Event]]:
+    margin: float,
+) -> tuple[tuple[float, float] | None, list[Event], tuple[str, ...]]:
     """Size of a change that lasts after recorded work on it (None without work), and the noise of one that does not.
 
     A change between the visits before and after the work is the work itself, where the later visits agree with the
-    file.
+    file. Where the visits after the work show another effect in its place, the noise of this one would hide that: the
+    third part is the visits that are left out then, those between this change and the work.
     """
     if is_under_load(leader.effect):
-        return None, []
+        return None, [], ()
     first = int(np.argmax(leader.gains))
     since, onset, last = (float(leader.times[k]) for k in (first, first + 1, -1))
     shapes = free_shape(leader.effect, parameters, candidates)
@@ -246,17 +249,30 @@ def _after_work(
     work = newest_work(leader.effect, events, since, onset)
     later = [v for v in visits if v.time >= onset]
     if work is not None and agrees_with_file(leader.effect, parameters, later, events):
-        return None, _new_events(repair_events(shapes, size, [work]), events)
+        return None, _new_events(repair_events(shapes, size, [work]), events), ()
     work = newest_work(leader.effect, events, onset, last)
     if work is None:
-        return None, []
-    unaffected = [v for v in visits if not since < v.time < work]
-    without = _history_of_changes(parameters, unaffected, events, levels)
+        return None, [], ()
+    between = [v for v in visits if since < v.time < work]
+    without = _history_of_changes(parameters, [v for v in visits if not since < v.time < work], events, levels)
     before = _history_of_changes(parameters, [v for v in visits if v.time < work], events, levels)
-    if lasts_after_work(without, leader.effect, since, courses_of(before, leader.effect).last_size):
-        return courses_of(without, leader.effect).last_size, []
-    times = [*(v.time for v in visits if since < v.time < work), work]
-    return None, _new_events(repair_events(shapes, size, times), events)
+    before_work = courses_of(before, leader.effect).last_size
+    after_work = size_after_work(without, leader.effect, since, before_work)
+    if after_work is None:
+        times = [*(v.time for v in between), work]
+        return None, _new_events(repair_events(shapes, size, times), events), ()
+    is_other = after_work * before_work[0] < 0.0 or _is_elsewhere(without, leader.effect, candidates, margin)
+    if is_other:
+        return None, [], tuple(v.visit for v in between)
+    return courses_of(without, leader.effect).last_size, [], ()
+
+
+def _is_elsewhere(history: History, effect: ChangeEffect, candidates: Sequence[ChangeEffect], margin: float) -> bool:
+    """Whether another change, of none of its parameters, has more evidence than an effect by the margin [nats]."""
+    others = [c for c in candidates if not is_under_load(c) and not c.direction.keys() & effect.direction.keys()]
+    (own,) = compare_onsets(history, [replace(effect, grows=False)])  # one visit shows no growth
+    best = next(iter(compare_onsets(history, others)), None)
+    return best is not None and best.gain > own.gain + margin
 
 
 def _new_events(repair: list[Event], events: Sequence[Event]) -> list[Event]:

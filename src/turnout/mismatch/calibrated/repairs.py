@@ -59,8 +59,8 @@ def agrees_with_file(
     return bool(evidence_from_first(history, [effect])[0][0] <= 0.0)
 
 
-def lasts_after_work(history: History, effect: ChangeEffect, since: float, size: tuple[float, float]) -> bool:
-    """Whether a change is more probable than not after recorded work, either of any size or of that before the work.
+def size_after_work(history: History, effect: ChangeEffect, since: float, size: tuple[float, float]) -> float | None:
+    """Size of a change after recorded work if it is more probable than not, either as any size or as before the work.
 
     Parameters
     ----------
@@ -75,20 +75,21 @@ def lasts_after_work(history: History, effect: ChangeEffect, since: float, size:
 
     Returns
     -------
-    bool
+    float or None
+        None where the work has ended it. With the other sign than before the work, it is another change.
     """
     (evidence,) = compare_onsets(history, [replace(effect, grows=False)])
     k = int(np.flatnonzero(evidence.times == since)[0])
     information = evidence.size_sds[k] ** -2 - effect.sd**-2
     if information <= 0.0:  # nothing is known after the work
-        return True
+        return size[0]
     value, variance = evidence.sizes[k] / (evidence.size_sds[k] ** 2 * information), 1.0 / information
     with_noise = variance + size[1] ** 2
     of_same_size = 0.5 * (
         value**2 / variance - (value - size[0]) ** 2 / with_noise - float(np.log(with_noise / variance))
     )
-    has_sign = bool(value * size[0] > 0.0)
-    return has_sign and max(float(evidence.gains[k]), float(of_same_size)) > 0.0
+    gain = max(float(evidence.gains[k]), float(of_same_size) if value * size[0] > 0.0 else -np.inf)
+    return float(evidence.sizes[k]) if gain > 0.0 else None
 
 
 def repair_events(shapes: Shapes, size: float, times: Iterable[float]) -> list[Event]:
