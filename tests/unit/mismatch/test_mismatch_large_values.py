@@ -134,6 +134,9 @@ def test_the_partner_of_a_large_value_may_change_as_much_as_that_value():
     assert wide.nuisances[3].sd == pytest.approx(np.hypot(0.2, 0.5))
     assert wide.nuisances[3].bounds == pytest.approx((-0.6 * np.hypot(1.0, 2.5), 0.6 * np.hypot(1.0, 2.5)))
     assert wide.nuisances[5] == case.nuisances[5]
+    shared = with_wide_priors(case, ["k3", "k4"], WIDE, {"k3": "k1", "k4": "k1"})
+    assert shared.nuisances[1].sd == pytest.approx(np.hypot(0.1, 1.0))  # the wider of the two
+    assert with_wide_priors(case, ["k2"], WIDE, {"k2": "absent"}).nuisances[1] == case.nuisances[1]
 
 
 class TwoValleys(Springs):
@@ -177,6 +180,28 @@ def test_a_large_value_of_which_a_small_deviation_shows_nothing_is_found(size):
     assert fit.values["k3"] == pytest.approx(size, abs=0.05) and max(others) < PRIOR
 
 
+class Reversed(Cubes):
+    """Hammer tests that respond to a small deviation with the other sign than to a large one."""
+
+    def __init__(self, truth, slope):
+        self.slope = slope
+        super().__init__(truth)
+
+    def response(self, x):
+        return MIXING @ (x**3 - self.slope * x)
+
+
+@pytest.mark.parametrize("slope", [0.1, 0.3])
+@pytest.mark.parametrize("size", [-1.4, 1.4])
+def test_a_large_value_is_sought_with_the_sign_that_it_has_where_it_is_large(size, slope):
+    """The sign of the linear model led to two values of 1.15 beside it in two of these four."""
+    truth = np.zeros(N)
+    truth[3] = size
+    fit = fit_large_values(*base_of(Reversed(truth, slope)), NAMES, WIDE)
+    assert fit.values["k3"] == pytest.approx(size, abs=0.05)
+    assert max(abs(fit.values[n]) for j, n in enumerate(NAMES) if j != 3) < PRIOR
+
+
 def test_the_evidence_far_from_the_fit_is_that_of_the_best_fit_with_the_value_held_there():
     """A linear model, solved by least squares with the held value taken to the right-hand side."""
     case = Cubes([0.0, 0.0, 0.9, 0.1, 0.0, 0.05, 0.0], power=0.0)
@@ -197,8 +222,9 @@ def test_the_evidence_far_from_the_fit_is_that_of_the_best_fit_with_the_value_he
     sizes = [s * sign * WIDE * PRIOR for s in THRESHOLDS.large_start_sds for sign in (1.0, -1.0)]
     for j, name in enumerate(NAMES):
         if name != "k5":
-            expected = 0.5 * (cost() - min(cost(j, size) for size in sizes)) - np.log(WIDE)
-            assert gains[name] == pytest.approx(expected, abs=1e-6)
+            best = min(sizes, key=lambda size: cost(j, size))
+            expected = 0.5 * (cost() - cost(j, best)) - np.log(WIDE)
+            assert gains[name] == (pytest.approx(expected, abs=1e-6), pytest.approx(best))
 
 
 def test_the_usual_scatter_has_no_large_value_far_from_the_fit_either():

@@ -56,12 +56,12 @@ def fit_large_values(
     penalty, partners = float(np.log(max(len(names), 1))) + THRESHOLDS.large_value_lead, partners or {}
     large: tuple[str, ...] = ()
     for _ in range(THRESHOLDS.max_large_values):
-        gains = _evidence_near_and_far(search.case, fit, names, widening, large, partners)
+        gains, far_values = _evidence_near_and_far(search.case, fit, names, widening, large, partners)
         promising = sorted((n for n, g in gains.items() if g > penalty), key=lambda n: -gains[n])
         fits = {}
         for name in promising[: THRESHOLDS.n_large_starts]:
             try:
-                fits[name] = _fit_with(search, fit, (*large, name), widening, partners)
+                fits[name] = _fit_with(search, fit, (*large, name), widening, partners, far_values.get(name))
             except SimulationError:
                 continue
         leader = max(fits, key=lambda n: fits[n].evidence, default=None)
@@ -93,7 +93,8 @@ def with_wide_priors(
     Case
     """
     partners, wide = partners or {}, copy(case)
-    sds = {partners[n.name]: widening * n.sd for n in case.nuisances if n.name in names and n.name in partners}
+    changed = sorted((n for n in case.nuisances if n.name in names and n.name in partners), key=lambda n: n.sd)
+    sds = {partners[n.name]: widening * n.sd for n in changed}  # of two with one partner, the wider
     factors = {n.name: float(np.hypot(n.sd, sds[n.name])) / n.sd for n in case.nuisances if n.name in sds}
     factors |= dict.fromkeys(names, widening)
     wide.nuisances = tuple(_with_wide_prior(n, factors[n.name]) if n.name in factors else n for n in case.nuisances)
@@ -161,7 +162,7 @@ def evidence_far_from_fit(
     widening: float,
     large: Collection[str] = (),
     partners: Mapping[str, str] | None = None,
-) -> dict[str, float]:
+) -> dict[str, tuple[float, float]]:
     r"""Evidence of hammer tests that a value has a wide prior, at the values where fits with a large value start.
 
     A stiff pad changes receptances little at first, and much where its sleeper moves with the rail. So the value itself
@@ -190,7 +191,8 @@ def evidence_far_from_fit(
     Returns
     -------
     dict
-        Name -> evidence [nats]; {} without hammer tests. A value at which the simulation fails has none.
+        Name -> evidence [nats] and the value that has it; {} without hammer tests. A value at which the simulation
+        fails has none.
     """
     wide = with_wide_priors(case, large, widening, partners)
     chosen = [i for i, o in enumerate(case.observations) if case.is_hammer_test(o)]
@@ -210,7 +212,7 @@ def evidence_far_from_fit(
         gain = b @ shift if fixed is None else b @ shift - shift[fixed] ** 2 / covariance[fixed, fixed]
         return float(residual @ residual + deviation @ deviation - gain)
 
-    nearby, gains = cost(residual, at_fit, problem.sd, None), dict[str, float]()
+    nearby, gains = cost(residual, at_fit, problem.sd, None), dict[str, tuple[float, float]]()
     for k, nuisance in enumerate(wide.nuisances):
         if nuisance.name not in names or nuisance.name in large:
             continue
@@ -223,7 +225,7 @@ def evidence_far_from_fit(
                 continue
             moved = problem.stack(jacobian, problem.residuals(predictions), noise)[1]
             gain = 0.5 * (nearby - cost(moved, theta, sd, k)) - float(np.log(widening))
-            gains[nuisance.name] = max(gain, gains.get(nuisance.name, -np.inf))
+            gains[nuisance.name] = max((gain, float(theta[k])), gains.get(nuisance.name, (-np.inf, 0.0)))
     return gains
 
 
@@ -234,11 +236,12 @@ def _evidence_near_and_far(
     widening: float,
     large: Collection[str],
     partners: Mapping[str, str],
-) -> dict[str, float]:
-    near, far = (
-        f(case, fit, names, widening, large, partners) for f in (evidence_of_large_values, evidence_far_from_fit)
-    )
-    return {name: max(near.get(name, -np.inf), far.get(name, -np.inf)) for name in {**near, **far}}
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Evidence of each value [nats], and the large value of those that have more of it there than near the fit."""
+    near = evidence_of_large_values(case, fit, names, widening, large, partners)
+    far = evidence_far_from_fit(case, fit, names, widening, large, partners)
+    values = {name: value for name, (gain, value) in far.items() if gain > near.get(name, -np.inf)}
+    return {**near, **{name: far[name][0] for name in values}}, values
 
 
 def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -256,12 +259,20 @@ def _posterior(case: Case, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return precision, score
 
 
-def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float, partners: Mapping[str, str]) -> Fit:
+def _fit_with(
+    search: Search,
+    fit: Fit,
+    large: tuple[str, ...],
+    widening: float,
+    partners: Mapping[str, str],
+    far_value: float | None,
+) -> Fit:
     """Fit with wide priors of these values: the best of several starts.
 
     One is on the way to the maximum of the linear model. In the others the last value is large, and the rest is where
     fits of the case start: the fit without it has moved them to hide it, and may be at another minimum. These end where
-    their steps do not lead below the best one so far.
+    their steps do not lead below the best one so far. The sign of the large value is that of ``far_value``, None: that
+    of the linear model.
     """
     wide = replace(search, case=with_wide_priors(search.case, large, widening, partners))
     solution = dict(zip((n.name for n in wide.case.nuisances), np.linalg.solve(*_posterior(wide.case, fit))))
@@ -279,7 +290,7 @@ def _fit_with(search: Search, fit: Fit, large: tuple[str, ...], widening: float,
     (value,) = (n for n in wide.case.nuisances if n.name == large[-1])
     kept = {name: fit.values[name] for name in large[:-1]}
     for sds in THRESHOLDS.large_start_sds:
-        size = np.copysign(sds * value.sd, solution[value.name] - value.mean)
+        size = np.copysign(sds * value.sd, (solution[value.name] if far_value is None else far_value) - value.mean)
         starts.append({**kept, value.name: float(np.clip(value.mean + size, *value.bounds))})
     fits: list[Fit] = []
     for at in starts:
