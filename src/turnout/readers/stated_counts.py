@@ -156,7 +156,8 @@ def missing_blocks(record: RawRecord, n_sample: int) -> tuple[str, str]:
         return "", ""
     entry, samples = size
     blocks = _first_number(record, NUMBER_OF_BLOCKS)
-    if samples * (blocks[1] if blocks else 1) <= n_sample:
+    number = blocks[1] if blocks else 1
+    if samples * number <= n_sample or number == n_sample:  # a frame of audio is one sample of all channels
         return "", ""
     stated = f"{blocks[0].name!r} is {blocks[1]} and " if blocks else ""
     return f"{stated}{entry.name!r} is {samples}, and the file has {n_sample} samples", entry.name
