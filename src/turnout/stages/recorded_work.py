@@ -64,7 +64,7 @@ def events_of(
     Returns
     -------
     list of Event
-        In the order of time, then accepted changes.
+        Work in the order of time, then accepted changes, then the work that may have ended these.
     """
     recorded, _, _ = read_events(Path(turnout.folder) / "events.csv", "events.csv", None, {})
     positions = {s.label: s.position for s in turnout.sections}
@@ -97,10 +97,9 @@ def _is_near(parameter: StateParameter, at: float) -> bool:
 
 def _repairs(works: Sequence[Event], accepted: Sequence[Event]) -> list[Event]:
     """Process noise of later work on what an accepted change has changed: the work may have ended it."""
-    shapes = {tuple(sorted(e.direction.items())): e for e in sorted(accepted, key=lambda e: e.time)}  # of each the last
-    return [
-        replace(last, time=work.time)
-        for last in shapes.values()
-        for work in works
-        if work.time > last.time and work.opened.keys() & last.direction.keys()
-    ]
+    repairs = []
+    for work in works:
+        before = (e for e in accepted if e.time < work.time and work.opened.keys() & e.direction.keys())
+        shapes = {tuple(sorted(e.direction.items())): e for e in before}  # one of each, however often it was accepted
+        repairs += [replace(e, time=work.time) for e in shapes.values()]
+    return repairs

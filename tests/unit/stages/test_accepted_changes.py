@@ -251,6 +251,17 @@ def test_the_estimate_follows_the_repair_of_an_accepted_change(tmp_path, seed):
         assert answer_of_events(turnout, visits, change).verdict == "none"
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_estimate_follows_the_repair_of_a_change_that_came_back_and_was_accepted_again(tmp_path, seed):
+    """Only work after the newer acceptance counted: the visits between the repair and the return were not used."""
+    (tmp_path / "events.csv").write_text("turnout,section,date,kind\nt1,,2001-08-01,tamping\n")
+    turnout, start = SimpleNamespace(folder=tmp_path, id="t1", sections=()), years_of("2000-01-01")
+    visits = [replace(v, time=start + v.time) for v in history_of((0, -1, -1, -1, 0, 0, -1, -1), seed)]
+    changes = [AcceptedChange("local_ballast", 1.2, 1.2, visits[k].time, visits[k + 1].time) for k in (0, 5)]
+    history = estimate_history(PARAMETERS, visits, events_of(turnout, PARAMETERS, changes, visits))
+    assert all(s.is_used for s in history.steps)
+
+
 def answer_of_events(turnout, visits, change):
     events = events_of(turnout, PARAMETERS, [change], visits)
     candidates = further_candidates([change], PARAMETERS, CANDIDATES)
