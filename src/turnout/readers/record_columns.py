@@ -176,7 +176,7 @@ def are_texts(column: Column) -> bool:
     Returns
     -------
     bool
-        False for an empty column.
+        False for an empty column. Its first cells may be empty.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def are_texts(column: Column) -> bool:
     """
     if column.dtype.kind not in "OUST" or not len(column):
         return False
-    first = column[:1][0]
+    first = next((cell for cell in np.asarray(column[:]).tolist() if cell not in (None, "", b"")), None)
     first = decode_text(first) if isinstance(first, bytes) else first
     return isinstance(first, str) and not is_clock_or_date(first)
 

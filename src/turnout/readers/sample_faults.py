@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from turnout.counts import first_texts
+from turnout.counts import count_of, first_texts
 from turnout.errors import ReadError
 from turnout.readers.blocks import LARGEST_NUMBER, ChannelStatistics, channel_error
 from turnout.readers.channel_maps import MAX_LISTED, ChannelMapping
@@ -185,7 +185,8 @@ def absent_channels_error(
     if not absent:
         return []
     listed = first_texts([*map(repr, absent)], MAX_LISTED)
-    problem = f"the file has no channel {listed}; its {len(mappings)} other channels are used"
+    noun, verb = "channel" if len(absent) == 1 else "channels", "is" if len(mappings) == 1 else "are"
+    problem = f"the file does not have the {noun} {listed}; its {count_of(len(mappings), 'other channel')} {verb} used"
     return [source.error(where, problem, ABSENT_REMEDY, reason="channel_missing")]
 
 

@@ -27,6 +27,7 @@ def test_the_channels_of_one_of_two_loggers_are_read(names, tmp_path):
     assert tuple(c.name for c in recording.channels) == names
     np.testing.assert_allclose(recording.samples, SAMPLES[: len(names)])
     assert error.reason == "channel_missing" and all(repr(n) in str(error) for n in NAMES if n not in names)
+    assert ("1 other channel is used" if len(names) == 1 else "2 other channels are used") in str(error)
 
 
 @pytest.mark.parametrize(

@@ -180,6 +180,15 @@ def test_a_word_that_says_that_samples_are_invalid_is_an_error_in_any_format(ext
         write_table(tmp_path, extension, ["gut"] * 200 + ["invalid"] + ["gut"] * (N - 201))
 
 
+@pytest.mark.parametrize(("extension", "empty"), [("parquet", None), ("parquet", ""), ("npz", ""), ("h5", "")])
+def test_a_column_of_words_may_begin_with_empty_cells(extension, empty, tmp_path):
+    """A logger may mark nothing but what is wrong. Before, the kind of a column was that of its first cell."""
+    with pytest.raises(ReadError, match="'invalid' in row 201"):
+        write_table(tmp_path, extension, [empty] * 200 + ["invalid"] + [empty] * (N - 201))
+    (error,) = write_table(tmp_path, extension, [empty] * 200 + ["OVR"] + [empty] * (N - 201)).errors
+    assert "OVR" in str(error)
+
+
 @pytest.mark.parametrize("extension", ["parquet", "npz", "h5", "csv"])
 @pytest.mark.parametrize("words", [["inverted"] * N, ["raw"] * N, ["inverted"] * 300 + ["off line"] * 100])
 def test_words_beside_the_samples_may_state_what_was_done_to_them(words, extension, tmp_path):

@@ -36,7 +36,8 @@ def test_blocks_of_more_samples_than_the_file_has_are_a_remark(lines, tmp_path):
     "lines",
     [
         ("Blocks,2", "Block size,200"), ("SegmentSize,400",), ("Segments,1", "SegmentSize,400"), ("Block size,256",),
-        ("Frames,400", "Frame size,8"), ("Blocks,4",), ("Block size,4096", "Number of samples,400"), ("Block size,64 kB",),
+        ("Blocks,4",), ("Block size,4096", "Number of samples,400"), ("Block size,64 kB",),
+        ("Frames,400", "Frame size,8"),  # bytes of a sample of all channels
     ],
 )  # fmt: skip
 def test_blocks_that_the_samples_fill_are_no_remark(lines, tmp_path):
