@@ -269,10 +269,12 @@ def _after_work(
 
 def _is_elsewhere(history: History, effect: ChangeEffect, candidates: Sequence[ChangeEffect], margin: float) -> bool:
     """Whether another change, of none of its parameters, has more evidence than an effect by the margin [nats]."""
-    others = [c for c in candidates if not is_under_load(c) and not c.direction.keys() & effect.direction.keys()]
-    (own,) = compare_onsets(history, [replace(effect, grows=False)])  # one visit shows no growth
-    best = next(iter(compare_onsets(history, others)), None)
-    return best is not None and best.gain > own.gain + margin
+    candidates_elsewhere = [
+        c for c in candidates if not is_under_load(c) and not c.direction.keys() & effect.direction.keys()
+    ]
+    (evidence,) = compare_onsets(history, [replace(effect, grows=False)])  # one visit shows no growth
+    leader = next(iter(compare_onsets(history, candidates_elsewhere)), None)
+    return leader is not None and leader.gain > evidence.gain + margin
 
 
 def _new_events(repair: list[Event], events: Sequence[Event]) -> list[Event]:
