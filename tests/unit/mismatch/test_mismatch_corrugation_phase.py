@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from turnout import physics
 from turnout.mismatch.engine.case import Case
@@ -61,6 +62,21 @@ def test_the_phase_is_that_of_the_free_waves(phase):
     found = physics.RailCorrugation(wave.start, STRETCH[1], wave.amplitude, 0.0, wave.wavelength, 2.5)
     assert np.corrcoef(height_at(found, x), height_at(true, x))[0, 1] > 0.8
     assert wave.gain > 10.0 and abs(wave.start - STRETCH[0]) <= 0.6 * LENGTH
+
+
+def test_the_error_of_the_wavelength_is_that_of_all_probable_ones():
+    """In the band: the true one is within two errors in 95 % of 40 (at least 34: four standard errors of n less).
+    Outside it: the error of the level, as far as it is tried, two standard deviations to both sides."""
+    inside, errors = 0, []
+    for seed in range(40):
+        phase = 0.157 * seed
+        true = physics.RailCorrugation(*STRETCH, 5e-5 * np.cos(phase), 5e-5 * np.sin(phase), LENGTH, 2.5)
+        wave = wave_in_band(scan_of(CorrugatedRail(true, seed)), STRETCH, (1.02 * LENGTH, 0.025 * LENGTH), AMPLITUDE)
+        inside += abs(wave.wavelength - LENGTH) <= 2.0 * wave.wavelength_error
+        errors.append(wave.wavelength_error)
+    assert inside >= 34 and np.median(errors) < 0.5 * 0.025 * LENGTH
+    short = wave_in_band(scan_of(CorrugatedRail(true)), STRETCH, (0.12, 0.003), AMPLITUDE)
+    assert short.wavelength_error == pytest.approx(stats.truncnorm(-2.0, 2.0).std() * 0.003, rel=0.05)
 
 
 def test_the_penalty_of_a_phase_is_at_most_that_of_the_number_of_phases():

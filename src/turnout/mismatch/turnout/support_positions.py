@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -101,11 +102,28 @@ class _OffsetFits:
         Supports elsewhere show in every channel. What shows in one is a fault of that channel.
         """
         filed, moved = self.fit(0.0), self.fit(offset)
-        by_channel: dict[str, float] = defaultdict(float)
-        for o, before, after in zip(self.observations, filed.white, moved.white):
-            by_channel[self.pairs[o.name].channel] += float(before @ before - after @ after)
+        by_channel = self._fall_by_channel(offset)
         without_largest = sum(by_channel.values()) - max(by_channel.values())
         return 0.5 * min(filed.cost - moved.cost, without_largest / max(filed.scale.values()) ** 2)
+
+    def _fall_by_channel(self, offset: float) -> dict[str, float]:
+        """By how much the sum of squares of each channel falls with the supports moved by ``offset`` [m]."""
+        by_channel: dict[str, float] = defaultdict(float)
+        for o, before, after in zip(self.observations, self.fit(0.0).white, self.fit(offset).white):
+            by_channel[self.pairs[o.name].channel] += float(before @ before - after @ after)
+        return by_channel
+
+    def is_shown_by_others(self, offset: float) -> bool:
+        """Whether fits without the channel that gains most show this offset too [m].
+
+        A faulty channel distorts the fit of all, so that others seem to agree with it.
+        """
+        by_channel = self._fall_by_channel(offset)
+        leading = max(by_channel, key=lambda channel: by_channel[channel])
+        others = copy(self)
+        others.observations = [o for o in self.observations if self.pairs[o.name].channel != leading]
+        others.fits = {}
+        return 0.5 * (others.fit(0.0).cost - others.fit(offset).cost) >= SUPPORT_POSITIONS.min_gain
 
 
 def misplaced_supports(start: HammerStart, reserved: Collection[str]) -> MisplacedSupports:
@@ -151,4 +169,4 @@ def _offset(fits: _OffsetFits) -> float:
     explained = 0.5 * abs(wave) ** 2 / float(np.var(evidence))
     if explained < SUPPORT_POSITIONS.min_explained or abs(offset) < 0.5 * step:
         return 0.0
-    return round(offset, 2)
+    return round(offset, 2) if fits.is_shown_by_others(offset) else 0.0

@@ -36,6 +36,8 @@ class WaveInBand:
     """Where a joint fit of corrugation starts.
 
     ``start`` [m] is the position at which its sine begins, ``amplitude`` [m] and ``wavelength`` [m] its size there.
+    ``wavelength_error`` [m] is the root mean square distance of all probable wavelengths from it: a joint fit sees only
+    those beside it, and several are often as probable.
     ``gain`` [nats] is that in the fitted band, ``evidence`` [nats] the mean over all phases, wavelengths and
     amplitudes, and ``penalty`` [nats] that of the search for the phase. ``nuisances`` are the amplitudes of the free
     waves beside it.
@@ -44,6 +46,7 @@ class WaveInBand:
     start: float
     amplitude: float
     wavelength: float
+    wavelength_error: float
     gain: float
     evidence: float
     penalty: float
@@ -92,12 +95,14 @@ def wave_in_band(
     j = int(np.argmax(by_phase))
     k = int(np.argmax(evidence[:, j]))
     a = float(likeliest[k, j])
+    by_wavelength = scipy.special.softmax(scipy.special.logsumexp(evidence, axis=1))
     sine, cosine = a * directions[j]
     nuisances = scan.waves_without(_path(scan, start, end, sine, cosine, length + steps[k]))
     return WaveInBand(
         start - float(phases[j] / (2.0 * np.pi) * (length + steps[k])),
         a,
         float(length + steps[k]),
+        float(np.sqrt(by_wavelength @ (steps - steps[k]) ** 2)),
         float(a * slopes[k, j] - 0.5 * a**2 * sizes[k, j]),
         mean,
         float(by_phase[j]) - mean,

@@ -214,8 +214,13 @@ def _in_phase(
     """The hypothesis with the phase that the free waves show; the search for it has its penalty."""
     wave = wave_in_band(scan, stretch, priors["wavelength"], priors["sine"])
     assert hypothesis.promise is not None
+    errors = {"wavelength": wave.wavelength_error / wave.wavelength}
+    parameters = tuple(
+        replace(p, model_error_share=errors.get(p.name, p.model_error_share)) for p in hypothesis.parameters or ()
+    )
     return replace(
         hypothesis,
+        parameters=parameters,
         starts=((wave.amplitude, wave.wavelength),),
         fixed={**hypothesis.fixed, "start": wave.start},
         n_scanned=hypothesis.n_scanned * float(np.exp(wave.penalty)),
