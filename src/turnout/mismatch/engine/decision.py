@@ -73,7 +73,7 @@ EFFECT_RULES: tuple[Rule[EffectEvidence], ...] = (
     Rule("no_tolerance_explains_it", lambda e: e.shows_nothing and e.strained, "unknown",
          "the recordings are explained only if a value is far from that of the file: {e.strained}", LOCATED),
     Rule(COMPONENT_DIFFERS, lambda e: e.shows_nothing and e.local_change > e.settings.threshold, "unknown",
-         "a component there has another value under trains than under impacts (evidence: {e.change_in_words})",
+         "a component or a channel there differs between trains and impacts (evidence: {e.change_in_words})",
          LOCATED),
     Rule(COMPONENT_UNUSUAL, lambda e: e.shows_nothing and e.local_deviation > e.settings.threshold, "unknown",
          "a component there differs from others of its kind by more than they differ among themselves "

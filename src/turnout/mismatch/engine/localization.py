@@ -11,9 +11,11 @@ component with an unusual value has a sharper position (``component_evidence``),
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
@@ -220,6 +222,8 @@ def location_of_ambiguity(case: Case) -> Location | None:
 def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
     """Location of a component whose value is unusual: between trains and impacts, or among those of its kind.
 
+    A channel that differs between trains and impacts is the location if one filter in the passages has more evidence.
+
     Parameters
     ----------
     case : Case
@@ -233,11 +237,27 @@ def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
     Location or None
         By the one of both questions with more evidence. None if neither has enough, or no position is known.
     """
-    gains = max((local_changes(case, fit), local_deviations(case, fit)), key=evidence_of_any_component)
+    changes, deviations = local_changes(case, fit), local_deviations(case, fit)
+    gains = max((changes, deviations), key=evidence_of_any_component)
     if evidence_of_any_component(gains) <= threshold:
         return None
-    positions = evidence_by_position(gains)
-    return replace(_location_of_evidence(positions), measured_range=case.measured_range) if positions else None
+    ranked = evidence_by_position(gains)
+    if gains is changes:
+        ranked = sorted([*ranked, *_filtered_passages(case, fit)], key=lambda w: -w.nats)
+    return replace(_location_of_evidence(ranked), measured_range=case.measured_range) if ranked else None
+
+
+def _filtered_passages(case: Case, fit: Fit) -> list[SpaceEvidence]:
+    """Evidence that all passages show one channel through a filter, for each channel; all are equally probable."""
+    floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
+    hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
+    channels = weigh_spaces(case, fit, floor, "sensor")
+    return [replace(w, nats=_nats_of_one_filter(w, hammer_names) - float(np.log(len(channels)))) for w in channels]
+
+
+def _nats_of_one_filter(evidence: SpaceEvidence, hammer_names: Set[str]) -> float:
+    """Evidence that one filter of a channel explains all recordings but the hammer tests. [nats]"""
+    return sum(nats for name, nats in evidence.by_common_law.items() if name not in hammer_names)
 
 
 def _lead(ranked: Sequence[SpaceEvidence]) -> float:
@@ -252,8 +272,8 @@ def _lead(ranked: Sequence[SpaceEvidence]) -> float:
 
 
 def _credible_evidence(case: Case, ranked: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
-    """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel,
-    only if impacts, if any, support it.
+    """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel
+    that impacts, if any, do not support, what one filter explains in all other recordings.
     """
     hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
     for w in ranked:
@@ -266,7 +286,7 @@ def _credible_evidence(case: Case, ranked: Sequence[SpaceEvidence]) -> Iterator[
             and hammer_names
             and sum(w.by_space.get(name, 0.0) for name in hammer_names) < THRESHOLDS.min_hammer_evidence
         ):
-            continue
+            nats = _nats_of_one_filter(w, hammer_names)
         if nats > 0.0:
             yield replace(w, nats=nats)
 

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from turnout.mismatch.engine.observation import Observation
     from turnout.mismatch.engine.residual_space import ResidualSpace
 
+# (frame, level) -> data type -> law -> name of the space -> evidence [nats]
+_ByLevel = dict[tuple[str, Any], dict[str, dict[str, dict[str, float]]]]
+
 AMPLITUDES = np.concatenate(
     [[0.0], np.geomspace(THRESHOLDS.min_amplitude, THRESHOLDS.max_amplitude, THRESHOLDS.n_amplitudes)]
 )
@@ -33,12 +36,17 @@ NOISE_FACTORS = np.geomspace(1.0, THRESHOLDS.max_noise_factor, THRESHOLDS.n_nois
 
 @dataclass(frozen=True)
 class SpaceEvidence:
-    """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space."""
+    """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space.
+
+    ``by_common_law`` has those of the best law that is the same for several recordings, also where a cause that is
+    free in each of them has more evidence.
+    """
 
     frame: str
     level: Any
     nats: float
     by_space: dict[str, float] = field(default_factory=dict)
+    by_common_law: dict[str, float] = field(default_factory=dict)
 
 
 def subspace_evidence(gram: np.ndarray, inner: np.ndarray, square: float, n: int, floor: float) -> float:
@@ -107,7 +115,7 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float], frame: str = 
     for k, o in enumerate(case.observations):
         offsets[o.name] = k, n_samples
         n_samples += o.data.size
-    by_level: dict[tuple[str, Any], dict[str, dict[str, float]]] = {}
+    by_level: _ByLevel = {}
     for space in case.residual_spaces(fit):
         if frame:
             space = replace(space, combinations={k: c for k, c in space.combinations.items() if k[0] == frame})
@@ -117,31 +125,30 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float], frame: str = 
         first_member = members[0][0]
         products = marginal.products(space.columns, members)
         for key, nats in _level_evidence(space, *products, floor[first_member.data_type]):
-            by_law = by_level.setdefault(key, {})
+            by_law = by_level.setdefault(key, {}).setdefault(first_member.data_type, {})
             by_law.setdefault(space.law, {})[space.names[0]] = first_member.effective * nats
     ranked = [_combined_evidence(key, by_level) for key in by_level]
     return sorted(ranked, key=lambda w: -w.nats)
 
 
-def _combined_evidence(
-    key: tuple[str, Any], by_level: Mapping[tuple[str, Any], Mapping[str, Mapping[str, float]]]
-) -> SpaceEvidence:
-    """Evidence for one level of all observations, with the best of its laws.
+def _combined_evidence(key: tuple[str, Any], by_level: _ByLevel) -> SpaceEvidence:
+    """Evidence for one level of all observations: of each type of data with the best of its laws.
 
     An observation that has spaces of positions, but none of the stretch, counts with the best position in it.
     """
     frame, level = key
-    by_law = dict(by_level[key])
-    by_space = dict(by_law.pop("", {}))
+    by_type = {data_type: dict(by_law) for data_type, by_law in by_level[key].items()}
     if frame == "place" and isinstance(level, tuple):
-        for (level_frame, position), laws in by_level.items():
+        for (level_frame, position), position_types in by_level.items():
             if level_frame == "place" and not isinstance(position, tuple) and level[0] <= position <= level[1]:
-                for name, nats in laws.get("", {}).items():
-                    by_space[name] = max(nats, by_space.get(name, 0.0))
-    if by_law:
-        likeliest: Mapping[str, float] = max(by_law.values(), key=_total)
-        by_space |= likeliest
-    return SpaceEvidence(frame, level, _total(by_space), by_space)
+                for data_type, laws in position_types.items():
+                    best = by_type.setdefault(data_type, {}).setdefault("", {})
+                    best |= {name: max(nats, best.get(name, 0.0)) for name, nats in laws.get("", {}).items()}
+    by_space, by_common_law = dict[str, float](), dict[str, float]()
+    for by_law in by_type.values():
+        by_space |= max(by_law.values(), key=_total)
+        by_common_law |= max((evidence for law, evidence in by_law.items() if law), key=_total, default={})
+    return SpaceEvidence(frame, level, _total(by_space), by_space, by_common_law)
 
 
 def _total(by_space: Mapping[str, float]) -> float:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 
 
+LEAST_FILTER = 1e-3  # variance of a combination of frequencies over that of the strongest; less changes nothing
 _COMMON_NAMES = [name for name, *_ in COMMON_PARAMETERS]
 _COMMON_VALUES, _RAIL_VALUES = ("pad_stiffness", "ballast_stiffness"), tuple(name for name, _ in RAIL_SDS)
 
@@ -53,13 +54,15 @@ def source_spaces(case: TrackCase, fit: Fit) -> Iterator[ResidualSpace]:
     Yields
     ------
     ResidualSpace
-        Those of one passage after the other, then those of the hammer tests.
+        Those of one passage after the other, of all passages together, then those of the hammer tests.
     """
     for o in case.observations:
         if o.name in case.aligned_passages:
             aligned = case.aligned_passages[o.name]
             yield _force_space(case, fit, aligned)
             yield _wheel_space(case, fit, aligned)
+    if case.aligned_passages:
+        yield _filter_space(case, fit)
     pairs = [(o, case.frf_pairs[o.name]) for o in case.observations if o.name in case.frf_pairs]
     if pairs:
         yield from _change_spaces(case, fit, pairs)
@@ -96,6 +99,45 @@ def _real_blocks(transfer: np.ndarray) -> np.ndarray:
     blocks[k, k] = blocks[k + 1, k + 1] = transfer.real
     blocks[k, k + 1], blocks[k + 1, k] = transfer.imag, -transfer.imag
     return blocks
+
+
+def _filter_space(case: TrackCase, fit: Fit) -> ResidualSpace:
+    """What a channel shows of all trains, through one filter that varies slowly with frequency."""
+    passages = [
+        (o, case.aligned_passages[o.name], prediction)
+        for o, prediction in zip(case.observations, fit.predictions)
+        if o.name in case.aligned_passages
+    ]
+    octaves, filters = _slow_filters(1.1 * max(aligned.high for _, aligned, _ in passages))
+    channels = list(dict.fromkeys(sensor.name for _, aligned, _ in passages for sensor in aligned.sensors))
+    size = 2 * filters.shape[1]
+    columns = {channel: np.arange(size * k, size * (k + 1)) for k, channel in enumerate(channels)}
+    blocks = []
+    for o, aligned, prediction in passages:
+        n = aligned.time.size
+        block = np.zeros((o.data.size, size * len(channels)))
+        frequency = np.fft.rfftfreq(n, 1.0 / aligned.clock)
+        octave = np.log2(np.maximum(frequency, frequency[1]))
+        weights = np.stack([np.interp(octave, octaves, values, 0.0, 0.0) for values in filters.T])
+        for k, sensor in enumerate(aligned.sensors):
+            rows = slice(k * n, (k + 1) * n)
+            filtered = weights * np.fft.rfft(prediction[rows])
+            block[rows, columns[sensor.name]] = np.fft.irfft(np.concatenate([filtered, 1j * filtered]), n).T
+        blocks.append(block)
+    levels: dict[tuple[str, Any], np.ndarray | None] = {("sensor", channel): columns[channel] for channel in channels}
+    return ResidualSpace(tuple(o.name for o, *_ in passages), np.concatenate(blocks), levels, "one filter")
+
+
+def _slow_filters(high: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) octaves of frequency up to ``high`` [Hz], and (n, k) filters on them whose sum of squares is a normal
+    correlation over ``RECEPTANCE.change_octaves``.
+    """
+    low = np.log2(PASSAGE.band_low)
+    octaves = np.linspace(low, np.log2(high), int(np.ceil((np.log2(high) - low) / (0.2 * RECEPTANCE.change_octaves))))
+    correlation = np.exp(-0.5 * ((octaves[:, None] - octaves) / RECEPTANCE.change_octaves) ** 2)
+    eigenvalues, vectors = np.linalg.eigh(correlation)
+    shown = eigenvalues > LEAST_FILTER * eigenvalues[-1]
+    return octaves, vectors[:, shown] * np.sqrt(eigenvalues[shown])
 
 
 def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> ResidualSpace:
