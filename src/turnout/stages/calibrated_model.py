@@ -50,6 +50,7 @@ from turnout.stages.visit_fits import VisitFits
 from turnout.stages.visit_notes import summary_of_notes
 from turnout.stages.visit_time import day_of
 from turnout.stages.visits_unlike_others import notes_on_channels, unlike_visits
+from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ def calibrate_turnout(
     """
     turnout = with_raw(load_configuration(config).turnout(turnout_id), Path(raw_root))
     units, copies = without_copies(scan(turnout, Path(raw_root)).units, raw_root)
-    by_visit = since_renewal(turnout, visits(units))
+    by_visit = since_renewal(turnout, visits(units, work_days_of(turnout)))
     if not by_visit:
         raise SimulationError(
             f"{turnout_id}: no hammer test and no passage below {raw_root}{renewal_note(turnout)}; "

@@ -49,6 +49,7 @@ from turnout.stages.stored_visits import (
 )
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_time import day_of, years_of
+from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -108,7 +109,8 @@ def change_unit(
 
 def _newest_day(unit: Unit, turnout: TurnoutConfig, raw_root: str | Path) -> datetime:
     """End of the day of the newest visit of the unit."""
-    newest = max(visits(members_of(unit, scan(turnout, Path(raw_root)).units)), default="1970-01")
+    members = members_of(unit, scan(turnout, Path(raw_root)).units)
+    newest = next(reversed(visits(members, work_days_of(turnout))), "1970-01")
     return datetime.combine(datetime.fromisoformat(day_of(years_of(newest))), time(23, 59))
 
 
@@ -127,7 +129,7 @@ def _diagnose(
     members, copies = without_copies(members_of(unit, scan(turnout, Path(raw_root)).units), raw_root)
     about = turnout, raw_root, track, accepted, code
     recorded_here = [u for u in members if u.kind == "passage" or u.section in labels]
-    tests = since_renewal(turnout, visits(u for u in recorded_here if u.kind == "hammer"))
+    tests = since_renewal(turnout, visits((u for u in recorded_here if u.kind == "hammer"), work_days_of(turnout)))
     stored, notes = _fitted_visits(FOLDER / unit.label, labels, tests, *about)
     if not stored:
         raise SimulationError("; ".join(notes) or NO_HAMMER_TESTS.format(since=renewal_note(turnout)))
@@ -140,7 +142,7 @@ def _diagnose(
         answer, _ = change_of(stored, turnout, least, changes)
     with_trains: Sequence[StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
-        ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here)))
+        ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here, work_days_of(turnout))))
         folder = TRAINS_FOLDER / unit.label
         with_trains, more_notes = _fitted_visits(folder, labels, ends, *about, passage_tables)
         remove_other_visits(folder, turnout.id, ends)
@@ -192,7 +194,7 @@ def _fitted_visits(
 
 def _first_and_newest_with_trains(by_visit: Mapping[str, Sequence[Unit]]) -> dict[str, Sequence[Unit]]:
     """Visits whose trains tell most of a change, ``VISITS_AT_ENDS`` at each end. One alone tells nothing of it: {}."""
-    with_both = [v for v in sorted(by_visit) if {u.kind for u in by_visit[v]} >= {"hammer", "passage"}]
+    with_both = [v for v in by_visit if {u.kind for u in by_visit[v]} >= {"hammer", "passage"}]
     return {v: by_visit[v] for v in ends_of(with_both)} if len(with_both) > 1 else {}
 
 

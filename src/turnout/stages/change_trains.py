@@ -25,6 +25,7 @@ from turnout.stages.mismatch_groups import Group, groups, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.recording_choice import select_passages, split_by_length
 from turnout.stages.visit_time import years_of
+from turnout.stages.work_days import work_days_of
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -98,8 +99,8 @@ def trains_of_change(
         If the track cannot be simulated.
     """
     assert answer.onset is not None and answer.position is not None
-    after = {v: of for v, of in visits(recordings).items() if years_of(v) >= answer.onset[1]}
-    for visit in sorted(after, reverse=True):
+    after = {v: of for v, of in visits(recordings, work_days_of(turnout)).items() if years_of(v) >= answer.onset[1]}
+    for visit in reversed(after):
         if {u.kind for u in after[visit]} < {"hammer", "passage"}:
             continue
         inputs = gather_inputs(after[visit], turnout, raw_root, track, passage_tables)

@@ -94,11 +94,13 @@ def _units(
 ) -> Iterator[PlannedUnit]:
     from turnout.stages.change_diagnosis import group_labels  # late: a night without alarms needs no model
     from turnout.stages.track_files import digest_of_model
+    from turnout.stages.work_days import days_of_work
 
+    days = days_of_work(works)
     recorded_work = [[event.at.isoformat(), event.kind, event.section, event.resets] for event in works]
     for labels in group_labels(turnout, sections):
         members = [p for p in planned if p.unit.kind == "hammer" and p.unit.section in labels]
-        members += _trains_of_first_and_newest_visits(members, [p for p in planned if p.unit.kind == "passage"])
+        members += _trains_of_first_and_newest_visits(members, [p for p in planned if p.unit.kind == "passage"], days)
         if not members:
             continue
         files = tuple(sorted(f for p in members for f in p.unit.files))
@@ -107,7 +109,7 @@ def _units(
 
 
 def _trains_of_first_and_newest_visits(
-    tests: Sequence[PlannedUnit], trains: Sequence[PlannedUnit]
+    tests: Sequence[PlannedUnit], trains: Sequence[PlannedUnit], work_days: Sequence[date]
 ) -> list[PlannedUnit]:
     """Trains of the first and the newest visits with hammer tests and trains, those nearest to the day of the tests.
 
@@ -118,7 +120,7 @@ def _trains_of_first_and_newest_visits(
 
     by_unit = {id(p.unit): p for p in (*tests, *trains)}
     with_trains: dict[str, list[Unit]] = {}
-    for visit, units in visits(p.unit for p in (*tests, *trains)).items():
+    for visit, units in visits((p.unit for p in (*tests, *trains)), work_days).items():
         passed = [u for u in units if u.kind == "passage"]
         if passed and (len(passed) < len(units) or not tests):
             day = date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15")

@@ -136,7 +136,7 @@ def read_value(path: Path) -> Any:
             if (content["format"], content["version"]) != (FORMAT, VERSION):
                 raise KeyError(str(path))
             return _unpack(content["value"], archive)
-    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile):
+    except (OSError, EOFError, ValueError, TypeError, RuntimeError, zipfile.BadZipFile):
         raise KeyError(str(path)) from None
 
 

@@ -31,6 +31,7 @@ from turnout.stages.state_rows import state_rows
 from turnout.stages.track_files import digest_of_model, improbable_entries, track_of
 from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of
+from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def diagnose_visit(
     members = list(groups(turnout, track, inputs, options.sections))
     # Sections that were chosen, or several visits in one case, are no visit of the calibrated model
     every = groups(turnout, track, replace(inputs, notes=[])) if options.sections else members
-    is_visit = set(visits(units)) <= {unit.label}
+    is_visit = set(visits(units, work_days_of(turnout))) <= {unit.label}
     about["every_group"] = [", ".join(g.neighbours) for g in every] if is_visit else []
     diagnosed: list[tuple[Group, dict[str, list[dict]]]] = []
     for k, group in enumerate(members):
@@ -268,7 +269,7 @@ def _earlier_versions(
     """Versions of the stored visits before that of the unit, as ``present_versions``."""
     before = {
         visit: unit_of(turnout.id, visit, units, turnout.hashes["mismatch"])
-        for visit, units in since_renewal(turnout, visits(scanned)).items()
+        for visit, units in since_renewal(turnout, visits(scanned, work_days_of(turnout))).items()
         if visit != unit.label and years_of(visit) <= years_of(unit.label)
     }
     folder = stored_visits.folder_of(options.fits)

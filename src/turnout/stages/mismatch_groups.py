@@ -7,9 +7,10 @@ respond to the same effect.
 from __future__ import annotations
 
 import json
+from bisect import bisect
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
+from datetime import date, timedelta
 from pathlib import Path
 from re import search
 from typing import TYPE_CHECKING
@@ -30,6 +31,8 @@ from turnout.stages.recording_choice import (
     split_by_length,
 )
 from turnout.stages.track_files import digest_of_model
+from turnout.stages.visit_time import MIDDLE_OF_MONTH, years_of
+from turnout.stages.work_days import days_of_work
 from turnout.workflow.plan import PlannedUnit, read_plan
 
 if TYPE_CHECKING:
@@ -183,13 +186,18 @@ MAX_DAYS_TO_CAMPAIGN = 31  # a passage further from every campaign belongs to th
 N_NEWEST_VISITS = 1  # visits per turnout in the workflow: older ones were diagnosed before
 
 
-def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
+def visits(units: Iterable[Unit], work_days: Sequence[date]) -> dict[str, list[Unit]]:
     """Units by visit, oldest first: a campaign's day with the passages nearest to it, else a month.
+
+    No recorded work lies between the day of a visit, or the middle of its month, and its passages: these show another
+    track before the work than after it. Passages between two works with no such day between these are in no visit.
 
     Parameters
     ----------
     units : iterable of Unit
         Units of the scan.
+    work_days : sequence of date
+        As ``work_days_of``, those of the turnout.
 
     Returns
     -------
@@ -201,29 +209,39 @@ def visits(units: Iterable[Unit]) -> dict[str, list[Unit]]:
     >>> def at(kind, label, campaign=None):
     ...     return Unit("t", kind, label, (), "", None, campaign)
     >>> found = visits([at("hammer", "A7/2026-07-25", "2026-07-25"), at("passage", "20260722T084238Z.h5"),
-    ...                 at("passage", "20260301T084238Z.h5")])
+    ...                 at("passage", "20260301T084238Z.h5")], [])
     >>> {name: len(members) for name, members in found.items()}
     {'2026-03': 1, '2026-07-25': 2}
+
+    The same with tamping on July 23: the train of July 22 passed before it.
+
+    >>> found = visits([at("hammer", "A7/2026-07-25", "2026-07-25"), at("passage", "20260722T084238Z.h5")],
+    ...                [date(2026, 7, 23)])
+    >>> {name: len(members) for name, members in found.items()}
+    {'2026-07': 1, '2026-07-25': 1}
     """
     units = list(units)
     days = sorted({date.fromisoformat(u.campaign) for u in units if u.campaign})
     by_visit: dict[str, list[Unit]] = {}
     for unit in units:
-        label = unit.campaign or _visit_of(unit.label, days)
+        label = unit.campaign or _visit_of(unit.label, days, work_days)
         if label:
             by_visit.setdefault(label, []).append(unit)
-    return dict(sorted(by_visit.items()))
+    return dict(sorted(by_visit.items(), key=lambda item: (years_of(item[0]), item[0])))
 
 
-def _visit_of(label: str, days: Sequence[date]) -> str:
+def _visit_of(label: str, days: Sequence[date], work_days: Sequence[date]) -> str:
     stamp = search(r"(\d{4})(\d\d)(\d\d)T\d{6}Z", label)
     if not stamp:
         return ""
     day = date(*map(int, stamp.groups()))
-    nearest = min(days, key=lambda d: abs((d - day).days), default=None)
+    epoch = bisect(work_days, day)
+    nearest = min((d for d in days if bisect(work_days, d) == epoch), key=lambda d: abs((d - day).days), default=None)
     if nearest is not None and abs((nearest - day).days) <= MAX_DAYS_TO_CAMPAIGN:
         return nearest.isoformat()
-    return f"{day:%Y-%m}"
+    middle = day.replace(day=MIDDLE_OF_MONTH)
+    middles = [middle, *((middle + timedelta(days=n)).replace(day=MIDDLE_OF_MONTH) for n in (-31, 31))]
+    return next((f"{m:%Y-%m}" for m in middles if bisect(work_days, m) == epoch), "")
 
 
 def enabled_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUnit]:
@@ -272,10 +290,13 @@ def every_visit(plan: Path, configuration: Configuration) -> Iterator[PlannedUni
             continue
         notes = {id(p.unit): p.note for p in members}
         model = digest_of_model(configuration.turnout(turnout))
-        work = [[e.at.isoformat(), e.kind, e.section, e.resets] for e in configuration.events if e.turnout == turnout]
-        by_visit = visits(p.unit for p in members)
+        events = [e for e in configuration.events if e.turnout == turnout]
+        work = [[e.at.isoformat(), e.kind, e.section, e.resets] for e in events]
+        by_visit = visits((p.unit for p in members), days_of_work(events))
+        labels = list(by_visit)
         for label, units in list(by_visit.items())[-N_NEWEST_VISITS:]:
-            earlier = sorted(f for visit, of in by_visit.items() if visit < label for u in of for f in u.files)
+            before = labels[: labels.index(label)]
+            earlier = sorted(f for visit in before for u in by_visit[visit] for f in u.files)
             note = digest([model, work, earlier, *(notes[id(u)] for u in units)])[:16]
             yield PlannedUnit(unit_of(turnout, label, units, hashes[turnout].get("mismatch", "")), note)
 

@@ -19,6 +19,7 @@ from turnout.stages.mismatch import Options, diagnose_visit
 from turnout.stages.mismatch_groups import Group, unit_of, visits
 from turnout.stages.mismatch_inputs import mismatch_context
 from turnout.stages.renewals import since_renewal
+from turnout.stages.work_days import work_days_of
 from turnout.workflow.batches import decode, encode
 from turnout.workflow.scan import scan
 
@@ -112,7 +113,7 @@ def diagnose_turnout(
     if unknown := sorted(set(sections) - {s.label for s in turnout.sections}):
         labels = ", ".join(s.label for s in turnout.sections)
         raise SimulationError(f"{turnout_id} has no section {', '.join(unknown)}. Write some of {labels}.")
-    by_visit = visits(scan(turnout, Path(raw_root)).units)
+    by_visit = visits(scan(turnout, Path(raw_root)).units, work_days_of(turnout))
     if visit == ALL_VISITS:
         by_visit = since_renewal(turnout, by_visit)
     label, units = _visit(turnout_id, by_visit, visit, raw_root)

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.config.events import RENEWAL, RESETS, read_events
 from turnout.constants import DAYS_PER_YEAR
 from turnout.mismatch.calibrated import Event, StateParameter, VisitInformation, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
 from turnout.stages.accepted_changes import change_events
+from turnout.stages.work_days import further_resonances, opened_groups, recorded_events
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
     from turnout.stages.accepted_changes import AcceptedChange
 
-# Groups of parameters that a kind of work makes uncertain again
-OPENED = {
-    "tamping": ("ballast", "ballast_damper", "wave", "surface"),
-    "ballast_cleaning": ("ballast", "ballast_damper", "wave", "surface"),
-    "pad_exchange": ("pad", "pad_damper"),
-    "rail_change": ("rail", "wave", "surface", "depth", "top_shape", "gain", "seat"),
-    "grinding": ("wave", "surface", "depth", "top_shape"),
-    "sleeper_change": ("sleeper", "pad", "pad_damper", "ballast", "ballast_damper", "wave"),
-    "sensor_change": ("gain", "seat"),
-}
-OPENED[RENEWAL] = tuple(sorted({group for opened in OPENED.values() for group in opened}))  # of one section
 # Parameters that all supports share, which work on the whole turnout makes uncertain, too
 BALLAST, PADS = ("ballast_stiffness", "ballast_damping"), ("pad_stiffness", "pad_damping")
 OPENED_COMMON = {
@@ -36,8 +24,6 @@ OPENED_COMMON = {
     "pad_exchange": PADS,
     "sleeper_change": ("sleeper_mass", *BALLAST, *PADS),
 }
-# The same of a resonance that a row resets beside those of its kind, as "other" with "railpad" for tightened clips
-OF_RESONANCE = {"ballast": ("ballast", "ballast_damper"), "railpad": ("pad", "pad_damper")}
 COMMON_OF_RESONANCE = {"ballast": BALLAST, "railpad": PADS}
 EVENT_REACH = 6.0  # m from a section that work there may touch
 
@@ -66,13 +52,11 @@ def events_of(
     list of Event
         Work in the order of time, then accepted changes, then the work that may have ended these.
     """
-    recorded, _, _ = read_events(Path(turnout.folder) / "events.csv", "events.csv", None, {})
     positions = {s.label: s.position for s in turnout.sections}
     by_day: dict[int, dict[str, float]] = {}
-    for event in recorded:
-        further = [resonance for resonance in event.resets if resonance not in RESETS[event.kind]]
-        groups = {*OPENED.get(event.kind, ()), *(g for r in further for g in OF_RESONANCE[r])}
-        if event.turnout != turnout.id or not groups:
+    for event in recorded_events(turnout):
+        groups = opened_groups(event)
+        if not groups:
             continue
         if event.section is not None and event.section not in positions:  # misspelt, as ``turnout check`` reports
             continue
@@ -80,7 +64,10 @@ def events_of(
         opened = by_day.setdefault(event.first_day_after.toordinal(), {})
         opened |= {p.name: p.sd for p in parameters if p.group in groups and (at is None or _is_near(p, at))}
         if at is None:
-            common = {*OPENED_COMMON.get(event.kind, ()), *(g for r in further for g in COMMON_OF_RESONANCE[r])}
+            common = {
+                *OPENED_COMMON.get(event.kind, ()),
+                *(g for r in further_resonances(event) for g in COMMON_OF_RESONANCE[r]),
+            }
             opened |= {p.name: p.sd for p in parameters if p.name.split(" ")[-1] in common}
     events = [Event(day / DAYS_PER_YEAR, opened) for day, opened in sorted(by_day.items())]
     candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from turnout.config.events import RENEWAL, Event, now, read_events
+from turnout.config.events import RENEWAL, now
 from turnout.constants import DAYS_PER_YEAR
 from turnout.stages.visit_time import day_of, years_of
+from turnout.stages.work_days import recorded_events
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
@@ -29,29 +28,12 @@ def renewal_of(turnout: TurnoutConfig) -> float | None:
     float or None
         [years]
     """
-    path = Path(turnout.folder) / "events.csv"
     days = [
         e.first_day_after.toordinal() / DAYS_PER_YEAR
-        for e in _renewals_in(path, _state_of(path))
-        if e.turnout == turnout.id and e.at <= now()
+        for e in recorded_events(turnout)
+        if e.kind == RENEWAL and e.section is None and e.at <= now()
     ]
     return max(days, default=None)
-
-
-@lru_cache(maxsize=8)
-def _renewals_in(path: Path, state: tuple[int, int] | None) -> tuple[Event, ...]:
-    """Renewals of whole turnouts in a file, which is read once for each ``state`` in which it is found."""
-    recorded, _, _ = read_events(path, "events.csv", None, {})
-    return tuple(e for e in recorded if e.kind == RENEWAL and e.section is None)
-
-
-def _state_of(path: Path) -> tuple[int, int] | None:
-    """Size and time of change of a file, None if there is none."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return status.st_size, status.st_mtime_ns
 
 
 def since_renewal(turnout: TurnoutConfig, by_visit: Mapping[str, Value]) -> dict[str, Value]:

@@ -34,6 +34,7 @@ from turnout.mismatch.turnout.relinearization import fit_again
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.track_files import digest_of_model
+from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -386,4 +387,4 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         neighbours, every_group = value.get("neighbours", ""), tuple(value.get("every_group", ()))
         fitted, levels = value.get("fitted", True), value.get("levels", {})
         stored.append(StoredVisit(*about, information, parameters, notes, fitted, levels, neighbours, every_group))
-    return sorted(stored, key=lambda s: (s.visit, s.sections))
+    return sorted(stored, key=lambda s: (years_of(s.visit), s.visit, s.sections))

@@ -6,6 +6,8 @@ from datetime import date
 
 from turnout.constants import DAYS_PER_YEAR
 
+MIDDLE_OF_MONTH = 15  # day that a visit of a whole month counts as
+
 
 def years_of(visit: str) -> float:
     """Time of a visit in years; of a month its middle.
@@ -19,7 +21,7 @@ def years_of(visit: str) -> float:
     -------
     float
     """
-    return date.fromisoformat(visit if len(visit) > 7 else f"{visit}-15").toordinal() / DAYS_PER_YEAR
+    return date.fromisoformat(visit if len(visit) > 7 else f"{visit}-{MIDDLE_OF_MONTH}").toordinal() / DAYS_PER_YEAR
 
 
 def day_of(time: float) -> str:

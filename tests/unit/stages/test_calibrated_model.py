@@ -182,7 +182,7 @@ def test_a_withdrawn_visit_has_no_effect_on_the_model(turnout, model):
 def test_the_information_of_a_visit_equals_that_of_its_joint_fit(year):
     """With independent errors, mean and covariance are those of one more Gauss-Newton step of the joint fit."""
     turnout = with_raw(load_configuration(year / "config").turnout("t1"), year / "raw")
-    units = visits(scan(turnout, year / "raw").units)[DAYS[0]]
+    units = visits(scan(turnout, year / "raw").units, [])[DAYS[0]]
     track, _ = track_of(turnout)
     (group,) = groups(turnout, track, gather_inputs(units, turnout, year / "raw", track, {}))
     search, fit = fit_base(
@@ -215,7 +215,7 @@ def test_the_information_of_a_visit_equals_that_of_its_joint_fit(year):
 def test_linearized_passages_give_the_same_information_as_fitted_passages(year):
     """One fitted and one linearized passage against two fitted ones: means within half a standard deviation."""
     turnout = with_raw(load_configuration(year / "config").turnout("t1"), year / "raw")
-    units = visits(scan(turnout, year / "raw").units)[DAYS[0]]
+    units = visits(scan(turnout, year / "raw").units, [])[DAYS[0]]
     track, _ = track_of(turnout)
     (group,) = groups(turnout, track, gather_inputs(units, turnout, year / "raw", track, {}))
     n_axles = len(group.campaign.passages[0].vehicle.wheels)

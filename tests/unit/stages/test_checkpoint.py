@@ -140,3 +140,21 @@ def test_the_first_prediction_and_hammer_tests_never_exceed_the_budget(tmp_path)
     with pytest.raises(BudgetSpentError):
         passage.predict({"a": 2.0}, (), ())
     assert reported == [1, 2, 3, 4, 5]
+
+
+def test_a_changed_bit_of_the_index_of_the_archive_is_treated_as_a_missing_file(tmp_path):
+    """Formerly a file that seems to be encrypted, or of a later version of zip, ended the diagnosis."""
+    path = tmp_path / "value.npz"
+    value = {"mean": np.arange(6.0), "visit": "2026-05-01"}
+    write_value(path, value)
+    whole = path.read_bytes()
+    start = whole.index(b"PK\x01\x02")
+    n_damaged = 0
+    for place in range(start, len(whole)):
+        for bit in range(8):
+            path.write_bytes(whole[:place] + bytes([whole[place] ^ (1 << bit)]) + whole[place + 1 :])
+            try:
+                assert str(read_value(path)) == str(value)  # a bit of no meaning, as of its time
+            except KeyError:
+                n_damaged += 1
+    assert n_damaged > 100

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from turnout.stages import renewals
+from turnout.stages import work_days
 from turnout.stages.renewals import renewal_note, renewal_of, since_renewal
 
 HEAD = "turnout,section,date,kind,resets,note\n"
@@ -58,8 +58,8 @@ def test_the_file_is_read_again_only_when_it_has_changed(turnout, monkeypatch):
         n_read += 1
         return original(*arguments)
 
-    original = renewals.read_events
-    monkeypatch.setattr(renewals, "read_events", counting)
+    original = work_days.read_events
+    monkeypatch.setattr(work_days, "read_events", counting)
     first = turnout("t1,,2025-06-01,renewal,,")
     assert [len(since_renewal(first, VISITS)) for _ in range(5)] == [3] * 5
     assert n_read == 1
