@@ -142,12 +142,15 @@ def _combined_evidence(key: tuple[str, Any], by_level: _ByLevel) -> SpaceEvidenc
         for (level_frame, position), position_types in by_level.items():
             if level_frame == "place" and not isinstance(position, tuple) and level[0] <= position <= level[1]:
                 for data_type, laws in position_types.items():
-                    best = by_type.setdefault(data_type, {}).setdefault("", {})
-                    best |= {name: max(nats, best.get(name, 0.0)) for name, nats in laws.get("", {}).items()}
+                    by_name = by_type.setdefault(data_type, {}).setdefault("", {})
+                    for name, nats in laws.get("", {}).items():
+                        by_name[name] = max(nats, by_name.get(name, 0.0))
     by_space, by_common_law = dict[str, float](), dict[str, float]()
     for by_law in by_type.values():
-        by_space |= max(by_law.values(), key=_total)
-        by_common_law |= max((evidence for law, evidence in by_law.items() if law), key=_total, default={})
+        by_space |= by_law[max(by_law, key=lambda law: _total(by_law[law]))]
+        common_laws = [law for law in by_law if law]
+        if common_laws:
+            by_common_law |= by_law[max(common_laws, key=lambda law: _total(by_law[law]))]
     return SpaceEvidence(frame, level, _total(by_space), by_space, by_common_law)
 
 

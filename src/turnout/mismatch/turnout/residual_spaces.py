@@ -136,8 +136,8 @@ def _slow_filters(high: float) -> tuple[np.ndarray, np.ndarray]:
     octaves = np.linspace(low, np.log2(high), int(np.ceil((np.log2(high) - low) / (0.2 * RECEPTANCE.change_octaves))))
     correlation = np.exp(-0.5 * ((octaves[:, None] - octaves) / RECEPTANCE.change_octaves) ** 2)
     eigenvalues, vectors = np.linalg.eigh(correlation)
-    shown = eigenvalues > LEAST_FILTER * eigenvalues[-1]
-    return octaves, vectors[:, shown] * np.sqrt(eigenvalues[shown])
+    is_relevant = eigenvalues > LEAST_FILTER * eigenvalues[-1]
+    return octaves, vectors[:, is_relevant] * np.sqrt(eigenvalues[is_relevant])
 
 
 def _wheel_space(case: TrackCase, fit: Fit, aligned: AlignedPassage) -> ResidualSpace:
