@@ -11,13 +11,21 @@ MARKS_IN_ASCII = str.maketrans("\u03bc∕⁄−–∙⋅•×", "µ//--···x")
 BRACKETS_IN_ASCII = str.maketrans("（）［］｛｝【】〔〕〖〗〈〉⟨⟩《》", "()[]{}[][][]<><><>")
 PAIRS_OF_BRACKETS = ("[]", "()", "{}", "<>")
 
-SECOND = "(?:s|sec|seconds?)"
+SECOND = "(?:s|se[ck]|seconds?|sekunden?)"
 ACCELERATION = re.compile(
-    rf"(nm|µm|um|mm|cm|dm|m|met(?:er|re)s?|km|ft|in|inch(?:es)?)"
-    rf"(?: ?(?:/|per) ?\(?(?:{SECOND} ?(?:(?:\^|\*\*)? ?2| squared)|{SECOND} ?/ ?{SECOND})\)?"
+    rf"(nm|µm|um|mm|cm|dm|m|(?:milli|centi)?met(?:er|re)s?|km|ft|feet|foot|in|inch(?:es)?)"
+    rf"(?: ?(?:/|per|pro) ?\(?(?:{SECOND} ?(?:(?:\^|\*\*)? ?2| squared)|{SECOND} ?[/*·] ?{SECOND})\)?"
     rf"|[ *·.]?{SECOND} ?(?:\^|\*\*)? ?\(?-2\)?)"
 )
-LENGTHS = {"um": "µm", "inch": "in", "inches": "in"} | dict.fromkeys(("meter", "meters", "metre", "metres"), "m")
+LENGTHS = {"um": "µm", "inch": "in", "inches": "in", "feet": "ft", "foot": "ft"} | {
+    f"{prefix}{meter}{plural}": symbol
+    for prefix, symbol in (("", "m"), ("milli", "mm"), ("centi", "cm"))
+    for meter in ("meter", "metre")
+    for plural in ("", "s")
+}
+CAMEL_CASE = re.compile(r"(?<=[a-z])(?=[A-Z])")  # "MetersPerSecondSquared"
+FORCE_OF_MASS = re.compile(r"(pound|kilogram|gram)s?[ -]?force|(pound|kilopond)s?")
+FORCES = {"pound": "lbf", "kilogram": "kgf", "gram": "gf", "kilopond": "kgf"}
 PREFIX_APART = re.compile(r"(da|[munpµkM]) (?=(?:N|V|Pa)$)")
 WORD = re.compile(r"(|milli|mi[ck]ro|de[ck]a|kilo|mega)(newton|volt|pascal)s?")
 PREFIXES_OF_WORDS = {
@@ -55,6 +63,7 @@ def plain_unit(unit: str) -> str:
     """
     text = SUPERSCRIPT_RUN.sub(lambda run: f"^{run[0].translate(SUPERSCRIPTS_IN_ASCII)}", unit)
     text = unicodedata.normalize("NFKC", text.translate(BRACKETS_IN_ASCII)).translate(MARKS_IN_ASCII)
+    text = re.sub(r"\^\{([+-]?\d+)\}", r"^\1", text)  # of LaTeX
     return " ".join(without_brackets(text).strip("[]").split())
 
 
@@ -105,13 +114,18 @@ def canonical_spelling(text: str) -> str:
 
     Examples
     --------
+    >>> [canonical_spelling(t) for t in ("MetersPerSecondSquared", "Pounds", "kilogram-force", "m/(s*s)")]
+    ['m/s²', 'lbf', 'kgf', 'm/s²']
     >>> [canonical_spelling(t) for t in ("mm s^-2", "um/s**2", "k N", "Kilonewtons", "g pk", "m/(s^2)", "ms2", "kg")]
     ['mm/s²', 'µm/s²', 'kN', 'kN', 'g', 'm/s²', 'ms2', 'kg']
     """
     if (peak := PEAK.fullmatch(text)) and not unit_of_a_stretch(text):
         text = plain_unit(peak[1])
-    if match := ACCELERATION.fullmatch(text):
+    words = CAMEL_CASE.sub(" ", text).casefold() if re.search("[a-zA-Z]{4}", text) else text
+    if match := ACCELERATION.fullmatch(words):
         return f"{LENGTHS.get(match[1], match[1])}/s²"
+    if match := FORCE_OF_MASS.fullmatch(words):
+        return FORCES[match[1] or match[2]]
     if match := WORD.fullmatch(text.casefold()):
         return PREFIXES_OF_WORDS[match[1]] + SYMBOLS[match[2]]
     return PREFIX_APART.sub(r"\1", text)

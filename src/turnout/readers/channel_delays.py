@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from turnout.readers.entries import Entry
-from turnout.readers.entry_owners import numbered_channels, owners_of, spaced_words
+from turnout.readers.entry_owners import numbered_channels, owners_of, spaced_words, without_channels
 from turnout.readers.rate_units import SAMPLES, rate_unit, words_of
 from turnout.readers.source import RawRecord
 from turnout.readers.stated_numbers import finite_numbers, number_and_unit
@@ -51,7 +51,7 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
     for entry in (e for e in record.entries if is_delay_name(e.name)):
         numbers = _seconds(entry, rate)
         owners = owners_of(entry, record.entries, record.names)
-        name = _without_channels(entry.name, [record.names[i] for i in owners])
+        name = without_channels(entry.name, [record.names[i] for i in owners])
         if not owners and (owners := numbered_channels(entry.name, record.entries, len(record.names))):
             name = re.sub(r"\d+", "", name)
         labels.setdefault(name, entry.name)
@@ -66,14 +66,6 @@ def delay_problem(record: RawRecord, rows: Sequence[int], rate: float) -> str:
             problem = f"its metadata state different delays ({labels[name]}: {listed})"
             return f"{problem}, and nothing says that they are corrected"
     return ""
-
-
-def _without_channels(name: str, channels: Sequence[str]) -> str:
-    """The words of a name without those of channels, so that "force_delay" and "rail delay" are one quantity."""
-    words = f" {spaced_words(name)} "
-    for channel in channels:
-        words = words.replace(f" {spaced_words(channel)} ", " ")
-    return words.strip()
 
 
 @lru_cache(maxsize=4096)

@@ -9,6 +9,7 @@ from turnout.readers.inversions import INVERSION
 from turnout.readers.lazy import Column
 from turnout.readers.rate_units import words_of
 from turnout.readers.sensitivity_comparison import sensitivity_problem
+from turnout.readers.sensitivity_scales import is_scale_of_sensor
 from turnout.readers.source import BLOCK_SIZE, RawRecord, Source
 from turnout.readers.stated_quantities import contradicting_quantity
 from turnout.readers.stated_units import contradicting_unit, is_meaningless
@@ -55,7 +56,9 @@ def checked_conversion(record: RawRecord, index: int, raw: RawChannel, place: st
             remedy = f"{remedy}; if its letters are wrong, save the file as UTF-8 with a text editor"
         raise source.error(place, str(error), remedy, reason="unit_unknown") from error
     if (scale_error := undecided_error(record, index, place, source)) and not raw.overrules_file:
-        raise scale_error
+        is_in_volts = conversion(resolve_unit(file_unit, raw.unit)).dimension == "voltage"
+        if not (is_in_volts and is_scale_of_sensor(record, index, raw)):
+            raise scale_error
     if not raw.overrules_file:
         _check_stated_units(record, index, raw, place, source)
     if raw.sensitivity is not None and not raw.overrules_file:

@@ -65,7 +65,7 @@ from turnout.readers.repeated_heads import check_separate, tables_of
 from turnout.readers.source import BLOCK_SIZE, COPY_AGAIN, HEAD_SIZE, RawFile, RawRecord, Source
 from turnout.readers.start_columns import start_or_clock_in_cells
 from turnout.readers.start_times import start_fields
-from turnout.readers.stated_scales import entry_statements, scale_problem, scale_statements, without_drawings
+from turnout.readers.stated_scales import entry_statements
 from turnout.readers.stated_units import decoded_units
 from turnout.readers.texts import decode_text, other_readings, wide_encoding
 from turnout.readers.thousands_marks import ambiguous_marks
@@ -279,8 +279,7 @@ def _records(
     promised, rows = facts.count(("n_samples",)), facts.number(SAMPLE_COUNT_NAMES)
     if promised is None and rows is not None and n_row < rows != n_row * n_table:
         promised = int(rows)
-    of_notes = enumerate(map(scale_problem, scale_statements(without_drawings(facts.variables), len(selected))))
-    undecided = entry_statements(entries, [names[i] for i in selected]) | {i: text for i, text in of_notes if text}
+    undecided = entry_statements(entries, [names[i] for i in selected])
     if time in head.unit_conflicts:
         raise source.error("the time column", head.unit_conflicts[time], TIME_UNIT_REMEDY, reason="unit_unknown")
     unit_conflicts = {k: head.unit_conflicts[i] for k, i in enumerate(selected) if i in head.unit_conflicts}

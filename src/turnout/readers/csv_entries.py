@@ -135,7 +135,9 @@ def entries_of_lines(
         elif (match := HEAD_LINE.match(text)) and len(cells) < 3 and not is_drawn and not _is_statement(match[1], text):
             name = f"{match[1]} {match[2]}" if match[2] else match[1]
             pairs.append((name, match[3].strip(separator + ' "')))
-        entries = [Entry(place, name.strip('"# ').rstrip(": "), value.strip('"')) for name, value in pairs]
+        entries = [
+            Entry(place, name.strip('"# ').rstrip(":= "), value.lstrip(":= ").strip('"')) for name, value in pairs
+        ]
         is_of_columns = is_unit_name(cells[0]) or is_quantity_name(cells[0])
         if len(cells) > 2 and (is_of_columns or _describes_columns(cells, names)):
             entries = [Entry(place, cells[0].rstrip(": "), cells[1:])]  # one for each column
@@ -182,7 +184,7 @@ def _dated_line(text: str) -> tuple[str, str] | None:
     words = text.split()
     for n in range(1, min(len(words), MAX_WORDS_OF_START + 1)):
         name, value = " ".join(words[:n]), " ".join(words[n:])
-        if re.search("[:=,;]", name):  # the mark itself
+        if re.search("[:=,;]", f"{name}{value[:1]}"):  # the mark itself
             return None
         if may_state_start(name) and (looks_dated(value) or is_day(value) or CLOCK_ALONE.fullmatch(value)):
             return name, value

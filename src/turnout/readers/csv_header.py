@@ -22,6 +22,7 @@ from turnout.readers.csv_cells import (
 )
 from turnout.readers.csv_columns import are_names, describes_columns, names_and_units
 from turnout.readers.csv_entries import HEAD_LINE, entries_of_lines, with_unit_in_brackets
+from turnout.readers.csv_first_column import with_unnamed_first_column
 from turnout.readers.csv_words import is_row_with_words
 from turnout.readers.entries import Entry, entries_of_text
 from turnout.readers.lost_entries import CONTROL_CHARACTER
@@ -105,7 +106,7 @@ def read_head(data: bytes | mmap, source: Source) -> Head:
         if of_words:
             separator, cells = of_words[0], cells_of(line, of_words[0])
         if of_words or is_row(cells):
-            return _complete_head(notes, text_lines, head_lines, cells, separator, position, source)
+            return _complete_head(notes, text_lines, head_lines, cells, separator, position, source, data)
         head_lines.append(line)
         note = _note_of(line, separator, len(cells))
         if note is not None:
@@ -129,9 +130,11 @@ def _complete_head(
     separator: str,
     offset: int,
     source: Source,
+    data: bytes | mmap,
 ) -> Head:
     """The head above the first row, of which ``cells`` are the cells; ``text_lines`` are those without a note."""
     texts = [cells_of(text, separator) for text in text_lines]
+    texts = with_unnamed_first_column(texts, len(cells), data, offset, separator)
     if separator == BLANK:
         texts = [words for words in texts if len(words) == len(cells)]
     texts += _names_between_other_separators(text_lines[-1:], texts, cells)
@@ -229,7 +232,8 @@ def _values_below_names(
     for title, line in pairwise(lines):
         names, values = cells_of(title, separator), cells_of(line, separator)
         words = [row[i] for row in (names, values) for i in filled if i < len(row)]
-        if len(filled) < 2 or len(words) < 2 * len(filled) or not all(words) or any(map(is_number, words)):
+        is_of_words = all(words) and not any(is_number(word) or re.search("[:=]", word) for word in words)
+        if len(filled) < 2 or len(words) < 2 * len(filled) or not is_of_words:
             continue
         pairs = [(a, b) for i, (a, b) in enumerate(zip(names, values)) if i not in filled and a and is_number(b)]
         if entries := tuple(Entry(f"the line below {a!r}", a, b) for a, b in pairs if not is_number(a)):

@@ -26,7 +26,7 @@ from turnout.readers.metadata_subjects import (
 from turnout.readers.number_meanings import is_code, is_inverse_of_rate, number_value, rates_of_number
 from turnout.readers.precision import Interval, readings
 from turnout.readers.rate_statements import USUAL_RATES, statements_of_value
-from turnout.readers.rate_units import SECONDS, RateUnit, rate_unit, words_of
+from turnout.readers.rate_units import PER, SECONDS, RateUnit, rate_unit, words_of
 from turnout.readers.rate_vocabulary import CERTAIN, NAME_WITH_UNIT, SAMPLING, SHORT_UNIT, name_meaning
 from turnout.readers.scale_vocabulary import (
     INVERSIONS,
@@ -59,10 +59,11 @@ MAX_LABEL = 3  # words of a quantity with its unit
 MAX_SIZE = 40  # characters of a candidate that are shown
 
 LETTER = r"(?:[^\W\d_]|[°%‰])"
+PER_SECOND = rf"(?:{'|'.join(sorted(PER))})\.? (?:{'|'.join(sorted(SECONDS, key=len, reverse=True))})\b"
 QUANTITY = re.compile(
     r"(?<![\d.,^])(?!\d\dE\d\b)([+-]?(?:\d+(?:[.,'’\u00a0\u202f]\d+)*|[.,]\d+)(?:[eE][+-]?\d+)?)"
-    rf"(?:[ \u00a0-]?((?!x\d){LETTER}+[²³]?(?:\^?-?\d(?![\d.,]))?(?:/\(?{LETTER}+[²³]?(?:\^?\d)?\)?){{0,3}}"
-    r"(?: per sec(?:ond)?\b)?))?"
+    rf"(?:[ \u00a0-]?({PER_SECOND}|(?!x\d){LETTER}+[²³]?(?:\^?-?\d(?![\d.,]))?"
+    rf"(?:/\(?{LETTER}+[²³]?(?:\^?\d)?\)?){{0,3}}(?: {PER_SECOND})?))?"
 )
 BARE_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -90,8 +91,8 @@ CONVERSION = re.compile(
     re.IGNORECASE,
 )
 UNIT_IN_TEXT = re.compile(
-    rf"(?:\b(?:in|en|as|i|im)\s*[:=]?\s+(?:units of\s+)?|[\[(]\s*|[,/|:]\s+)"
-    rf"({LETTER}+[²³]?(?:\^?\d)?(?:/{LETTER}+[²³]?(?:\^?\d)?)?)(?=$|[\s\]),;.|'’])"
+    rf"(?:\b(?:in|en|as|i|im)\s*[:=]?\s+(?:units of\s+)?|(?<!/)[\[(]\s*|[,/|:]\s+)"
+    rf"({LETTER}+[²³]?(?:\^?\d)?(?:/{LETTER}+[²³]?(?:\^?\d)?)?)(?=$|[\s\]),;.|'’])(?!\)\s?/)"
 )
 LABEL_WITH_UNIT = re.compile(rf"([^\W\d_]+)[_ ]({LETTER}+(?:/{LETTER}+[²³]?)?)")
 LEVEL_UNIT = re.compile(r"dB", re.IGNORECASE)

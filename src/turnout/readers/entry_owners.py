@@ -156,3 +156,29 @@ def spaced_words(text: str) -> str:
         Letters and digits only.
     """
     return " ".join(re.split(r"[\W_]+", text.casefold())).strip()
+
+
+def without_channels(name: str, channels: Sequence[str]) -> str:
+    """The words of a name without those of channels, so that "force_delay" and "rail delay" are one quantity.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry.
+    channels : sequence of str
+        Names of channels.
+
+    Returns
+    -------
+    str
+        In lower case, with one blank between them.
+
+    Examples
+    --------
+    >>> without_channels("dt_rail [ms]", ["rail"])
+    'dt ms'
+    """
+    words = f" {spaced_words(name)} "
+    for channel in channels:
+        words = words.replace(f" {spaced_words(channel)} ", " ")
+    return words.strip()

@@ -122,8 +122,11 @@ _FILLER = re.compile(
 # Words that make a statement about the samples of any subject: "Nyquist", "Empfindlichkeitskorrektur", "channel 2 in".
 _OF_SAMPLES = re.compile(r"\bnyquist|corre[ckz]t|korrekt|correz|\b(?:in|as)$|(?<!bits)(?<!bytes) per \w")
 
+# A coefficient of a calibration, "cal_a", "calB", "a_calibration": a single letter is no article there.
+_CALIBRATION = r"[ck]al(?:ib(?:ration|rierung|rering)?)?"
 # A scale is one whatever its subject, apart from figures that are called factors.
 _OF_SCALE = re.compile(
+    rf"^{_CALIBRATION} [a-z]$|^[a-z] {_CALIBRATION}$|"
     r"(?<!quality )(?<!crest )(?<!form )(?<!coverage )(?<!load )(?<!damping )fa[ck]tor|facteur|fattor|[ck]oef"
     r"|scal(?:e|ing)\b|skal|\bgain"
     r"|verstark|multipl|umrechn|conver|gananc|guadagn|weight\b|tare|\bunits?\b|einheit|\bspan\b"

@@ -1,5 +1,7 @@
 """Reader of Parquet: a column per channel, and a column ``record`` that numbers the records if there are several.
 
+A table with a row for each record has the samples of a channel in one cell, as a list.
+
 ``rate``, ``started_at`` and other metadata are in the schema (JSON under ``turnout``, or plain keys), a unit is in the
 metadata of its field. A truncated file lacks its footer and cannot be opened; pages have checksums.
 """
@@ -12,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from turnout.errors import ReadError
@@ -70,8 +73,11 @@ def read_raw(source: Source) -> RawFile:
             raise source.error("the columns", problem, "Write the file again with a name of its own for each column")
         schema, n_row = file.schema_arrow, file.metadata.num_rows
         remarks = tuple(_differing_copies(schema.metadata, file.metadata.metadata, source))
-        rows = RowGroupReader(file) if source.lazy and not any(map(may_number_records, schema.names)) else None
-        columns = _columns(file, rows, source)
+        is_listed = any(map(_holds_lists, schema))
+        is_lazy = source.lazy and not is_listed and not any(map(may_number_records, schema.names))
+        rows = RowGroupReader(file) if is_lazy else None
+        columns = _columns_of_lists(file, source) if is_listed else _columns(file, rows, source)
+        n_row = len(next(iter(columns.values()))) if is_listed else n_row
     notes = _notes_of(schema.metadata)
     facts = Metadata(notes, source)
     units = {field.name: _unit(field) for field in schema}
@@ -87,7 +93,7 @@ def read_raw(source: Source) -> RawFile:
     words = {name: x for name, x in columns.items() if isinstance(x, np.ndarray) and are_texts(x)}
     check_valid(words, source)
     not_numbers = {name: f"{kind_of(dtype)}, no real numbers" for name, dtype in others.items()}
-    clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM" and _varies(x)]
+    clocks = [name for name, x in columns.items() if name != time and x.dtype.kind in "mM"]
     stamped = [name for name, x in columns.items() if x.dtype.kind == "M"]
     fields = {f"column {f.name!r}": _field_notes(f) for f in schema}
     common = tuple(entries_of(_metadata(schema), "metadata"))
@@ -122,7 +128,11 @@ def read_raw(source: Source) -> RawFile:
                 undecided=nested | {i: stated[name] for i, name in enumerate(names) if stated[name]},
                 time_label="" if time is None else f"{time} [{units[time]}]" if units[time].strip() else time,
                 is_time_in_seconds=time is not None and columns[time].dtype.kind in "mM",
-                clocks=tuple((f"column {name!r}", _seconds(columns[name][span])) for name in clocks),
+                clocks=tuple(
+                    (f"column {name!r}", _seconds(columns[name][span]))
+                    for name in clocks
+                    if _varies(columns[name][span])
+                ),
                 not_numbers=not_numbers,
                 counters={name: numbers_of_texts(x[span]) for name, x in words.items()},
             )
@@ -154,6 +164,36 @@ def _columns(file: pq.ParquetFile, rows: "RowGroupReader | None", source: Source
     columns: dict[str, Column] = {name: _to_numpy(table.column(name), name, source) for name in table.column_names}
     columns |= {name: rows.column(name) for name in lazy_names}
     return {name: columns[name] for name in names}
+
+
+def _holds_lists(field: pa.Field) -> bool:
+    """Whether each cell of a column holds the samples of a record."""
+    kind = field.type
+    is_list = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+    return is_list and (pa.types.is_floating(kind.value_type) or pa.types.is_integer(kind.value_type))
+
+
+def _columns_of_lists(file: pq.ParquetFile, source: Source) -> dict[str, Column]:
+    """Columns with a row for each sample, of a table with a row for each record; other cells are repeated."""
+    table = file.read(use_threads=False)
+    listed = [field.name for field in table.schema if _holds_lists(field)]
+    lengths = {name: pc.fill_null(pc.list_value_length(table.column(name)), 0).to_numpy() for name in listed}
+    of_rows = next(iter(lengths.values()))
+    for name, of_channel in lengths.items():
+        if (is_other := of_channel != of_rows).any():
+            k = int(np.argmax(is_other))
+            problem = f"row {k + 1} has {of_channel[k]} samples in {name!r} and {of_rows[k]} in {listed[0]!r}"
+            raise source.error("the columns", problem, COPY_AGAIN, reason="truncated")
+    columns: dict[str, Column] = {}
+    for name in table.column_names:
+        column = table.column(name)
+        if name in listed:
+            columns[name] = _to_numpy(pa.chunked_array([pc.list_flatten(c) for c in column.chunks]), name, source)
+        else:
+            columns[name] = np.repeat(_to_numpy(column, name, source), of_rows)
+    if table.num_rows > 1 and record_column(columns, source) is None:
+        columns["record"] = np.repeat(np.arange(1, table.num_rows + 1), of_rows)
+    return columns
 
 
 def _to_numpy(column: pa.ChunkedArray, name: str, source: Source) -> np.ndarray:

@@ -13,7 +13,8 @@ PER = {"per", "pro", "par", "por", "al", "pr", "je"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
     r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger|ech"
-    r"|echantillons?|campioni|muestras|count"
+    r"|echantillons?|campioni|muestras|count|(?:data ?)?(?:points?|values?)|readings?|mess(?:ungen|punkte)|mesures?"
+    r"|valeurs?|valori|valores|misure|medidas|vaerdier|varden|probek|pomiarow|vzorku|monsters"
 )
 SECONDS = set(
     "s sec secs second seconds sek sekund sekunde sekunden sekunder seconde secondes secondi secondo segundo "
@@ -106,6 +107,8 @@ def rate_unit(text: str) -> RateUnit | None:
     if len(parts) != 2:
         return None
     over, under = parts
+    if not over and under in SECONDS:  # "per second"
+        return RateUnit(False, Fraction(1))
     if under in SECONDS:
         for prefix, scale in PREFIXES.items():
             if over.startswith(prefix) and SAMPLES.fullmatch(over[len(prefix) :].strip()):

@@ -203,6 +203,51 @@ def _agrees(
     return False if is_own and is_of_other_quantity else None
 
 
+def agrees_with_layout(number: float, unit: str, channel: RawChannel) -> bool | None:
+    """Whether a number with the unit of a sensitivity is the sensitivity of a channel of the layout.
+
+    Parameters
+    ----------
+    number : float
+        The number.
+    unit : str
+        Its unit, "mV/N" or "N/V".
+    channel : RawChannel
+        The channel, with a sensitivity.
+
+    Returns
+    -------
+    bool or None
+        None for a unit of another quantity, or that is not known.
+    """
+    return _agrees(number, unit, *_sensitivity_of(channel), False, Entry("", "", ""))
+
+
+def is_of_other_sensor(number: float, unit: str, quantity: str) -> bool:
+    """Whether a number with its unit is the sensitivity of a sensor of another quantity.
+
+    Parameters
+    ----------
+    number : float
+        The number.
+    unit : str
+        Its unit.
+    quantity : str
+        Quantity of the channel.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_of_other_sensor(0.23, unit, "acceleration") for unit in ("mV/N", "mV/g", "mV/EU")]
+    [True, False, False]
+    """
+    is_own = _sensitivity_scale(quantity, number, unit) is not None
+    return not is_own and any(_sensitivity_scale(other, number, unit) for other in SENSOR_WORDS)
+
+
 def _sensitivity_scale(quantity: str, number: float, unit: str) -> tuple[str, float] | None:
     """(electrical unit, SI per electrical unit) of a sensitivity; None if the unit is none of the quantity."""
     for electrical in ("V", "count"):

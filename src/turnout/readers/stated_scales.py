@@ -37,6 +37,7 @@ from turnout.readers.stated_numbers import MAX_CHANNELS, finite_numbers, number_
 from turnout.unit_spellings import SUPERSCRIPTS
 from turnout.units import conversion
 
+LEVEL_IN_NAME = re.compile(r"(?:[\[(]\s*|[\s_])db(?:\s*[\])])?$", re.IGNORECASE)  # "Gain (dB)", "gain_db"
 ROUND_YEARS = (2000.0, 2048.0, 2050.0)  # which are factors as well
 YEARS = (1990.0, 2060.0)  # a whole number between them behind a word of calibration is a year
 
@@ -138,6 +139,8 @@ def _stated_by_channel(label: str, meaning: str, value: Any, n_channel: int) -> 
         stated = [f"{label} = {_value_text(v)}" if number != neutral else "" for v, number in words]
     else:
         values = _scale_values(value)
+        if LEVEL_IN_NAME.search(label) and "db" not in str(value).casefold():  # the unit is in the name alone
+            values = [10 ** (x / 20) if isinstance(x, float) else x for x in values]
         if meaning not in (FACTOR, OFFSET):
             values = [x if isinstance(x, float) and not _is_year(x) else _ratio(x, neutral) for x in values]
         stated = [_scale_text(label, x, neutral) for x in values]

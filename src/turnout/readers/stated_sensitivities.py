@@ -30,7 +30,7 @@ RATIO = rf"(?:{ELECTRICAL}{BESIDE_VOLTS}{PER}{MECHANICAL}|{MECHANICAL}{PER}{ELEC
 # A number with the unit of a sensitivity anywhere in a text: "ca. 100 mV/g @ 160 Hz", "mV/g 100", "100 (mV/g)".
 NUMBER_AND_RATIO = re.compile(rf"(?<![\w.,])({NUMBER})\s?[\[(]?\s?({RATIO})")
 RATIO_AND_NUMBER = re.compile(rf"(?<![\w/])({RATIO})[\])]?[\s:=]+({NUMBER})(?![\w/])")
-ENGINEERING_UNIT = re.compile(r"/\s?(?:EU|units?)$", re.IGNORECASE)  # that of the channel
+ENGINEERING_UNIT = re.compile(r"^(?:EU|units?)\s?/|/\s?(?:EU|units?)$", re.IGNORECASE)  # that of the channel
 MAX_TEXT = 1000  # characters of a text that are searched
 
 
@@ -124,7 +124,7 @@ def sensitivities_of_channel(
         if not owners and _is_of_other_sensor(entry, is_named):
             continue
         if not owners or index in owners:
-            yield entry, owners, [(number, own or unit) for number, own in _sensitivities(entry, entries)]
+            yield entry, owners, [(number, own or unit) for number, own in sensitivities_of_entry(entry, entries)]
 
 
 def _ratios_beside(entry: Entry) -> tuple[tuple[float, str], ...]:
@@ -169,8 +169,21 @@ def _plain_ratio(ratio: str) -> str:
     return re.sub(rf"{BESIDE_VOLTS}{PER}", "/", ratio, count=1).strip()
 
 
-def _sensitivities(entry: Entry, entries: Sequence[Entry]) -> list[tuple[float, str]]:
-    """Numbers of an entry with their unit: beside the number, else in or behind the name, else ""."""
+def sensitivities_of_entry(entry: Entry, entries: Sequence[Entry]) -> list[tuple[float, str]]:
+    """Numbers of an entry with their unit: beside the number, else in or behind the name.
+
+    Parameters
+    ----------
+    entry : Entry
+        An entry that may state a sensitivity.
+    entries : sequence of Entry
+        All entries of the record; one of them may be the unit.
+
+    Returns
+    -------
+    list of (float, str)
+        The unit is "" where none is stated, or that of the channel ("EU").
+    """
     if isinstance(entry.value, str) and (pairs := sensitivities_in_text(entry.value)):
         return list(pairs)
     in_name = re.search(r"[\[(](.+)[\])]\s*$", entry.name)

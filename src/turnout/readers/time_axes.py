@@ -1,6 +1,7 @@
 """Time axes of a record: its time column, and every column that no sensor of the layout uses and that rises evenly."""
 
 from collections.abc import Collection, Iterator, Sequence, Set
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -15,11 +16,12 @@ from turnout.readers.column_forms import (
     rises_evenly,
 )
 from turnout.readers.entries import Entry
+from turnout.readers.entry_owners import named_channels, without_channels
 from turnout.readers.lazy import Column
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_statements import USUAL_RATES, Statement, statements_of, time_statement
 from turnout.readers.rate_units import hertz_of, rate_unit, seconds_of, words_of
-from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY, is_time_name, name_meaning
+from turnout.readers.rate_vocabulary import CERTAIN, POSSIBLY, is_rate_name, is_time_name, name_meaning
 from turnout.readers.source import MEANINGLESS_UNITS, RawRecord, Source
 from turnout.readers.stated_units import known_unit
 from turnout.readers.time_numbers import unit_of_axis
@@ -69,9 +71,26 @@ def all_statements(
     ReadError
         If a time axis runs backwards, is not finite, jumps over missing samples, or is not even.
     """
-    stated = statements_of(record.entries, k, n)
+    stated = statements_of(_without_names_of_channels(record, measured), k, n)
     is_proven = any(s.is_defined and _is_rate(s, promised) for s in stated)
     return stated + time_statements(record, measured, where, source, promised, checked, is_proven)
+
+
+def _without_names_of_channels(record: RawRecord, measured: Set[int]) -> Iterator[Entry]:
+    """The entries of a record; the rate of a channel, "dt_rail" or "dt (rail)", under the name of the rate alone.
+
+    That of a channel that no sensor of the layout uses is left out.
+    """
+    for entry in record.entries:
+        owners = named_channels(entry.name, record.names)
+        name = without_channels(entry.name, [record.names[i] for i in owners]) if owners else ""
+        if is_rate_name(name) and measured.isdisjoint(owners) and measured:
+            continue
+        if is_rate_name(name):
+            place = entry.place if entry.name in entry.place else f"{entry.name!r} in {entry.place}"
+            yield replace(entry, place=place, name=name)
+        else:
+            yield entry
 
 
 def _is_rate(statement: Statement, promised: float | None) -> bool:

@@ -12,6 +12,7 @@ or their rate must be explained, else it is reported by name, with the key of th
 What may convert whole numbers of a physical unit is reported as well (``whole_numbers``).
 """
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -23,6 +24,7 @@ from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.entries import MAX_ENTRIES, Entry
 from turnout.readers.entry_candidates import (
     MAX_TEXT,
+    QUANTITY,
     SCALE,
     SCALE_OR_OFFSET,
     UNIT,
@@ -33,8 +35,9 @@ from turnout.readers.entry_owners import container_of, owners_of
 from turnout.readers.precision import EXACT_PRECISION, around
 from turnout.readers.rate_agreement import is_near_rate
 from turnout.readers.scale_vocabulary import INVERSIONS, scale_meaning
-from turnout.readers.stated_units import same_unit
+from turnout.readers.stated_units import known_unit, same_unit
 from turnout.readers.time_texts import time_of_vector
+from turnout.units import conversion
 
 MAX_DURATION_RATIO = 8.0  # a time that differs more from the record's duration is one of something else
 DURATION_TOLERANCE = 0.02  # relative
@@ -74,6 +77,8 @@ class RecordFacts:
         counts = (n, n - 1, n * self.n_record, n * self.n_channel, self.n_channel, self.n_record)
         if candidate.text.isdigit() and candidate.number in counts:
             return True
+        if candidate.statement in (SCALE, SCALE_OR_OFFSET) and _states_factor_of(candidate.text, self.units):
+            return True
         if candidate.unit:
             return any(same_unit(candidate.unit, unit) for unit in self.units)
         if candidate.is_of_other:
@@ -92,6 +97,16 @@ class RecordFacts:
         if np.isnan(candidate.number):  # its unit is known
             return bool(candidate.rates) and not any(is_near_rate(i.rate, self.rate) for i in candidate.rates)
         return abs(candidate.number * self.rate / n - 1.0) <= DURATION_TOLERANCE
+
+
+def _states_factor_of(text: str, units: Sequence[str]) -> bool:
+    """Whether a text states the factor of a unit of the layout, as "Full scale ±10 V" does of "10 V"."""
+    factors = {conversion(unit) for unit in units if FACTOR_AND_UNIT.match(unit) and known_unit(unit)}
+    quantities = (f"{match[1].lstrip('+-')} {match[2]}" for match in QUANTITY.finditer(text) if match[2])
+    return bool(factors) and any(known_unit(quantity) in factors for quantity in quantities)
+
+
+FACTOR_AND_UNIT = re.compile(r"\s*[+-]?[\d.]")  # "10 V", full scale or a step
 
 
 def _is_multiple(ratio: float, multiples: Sequence[float]) -> bool:

@@ -16,14 +16,17 @@ FORCES = {
     "dyn": 1e-5, "gf": 1e-3 * G, "kg-f": G, "kgF": G, "tf": 1e3 * G, "lb": 4.4482216152605, "hN": 100.0, "10^3 N": 1e3,
     "10³ N": 1e3, "10**3 N": 1e3, "x10 N": 10.0, "×10 N": 10.0, "x 10³ N": 1e3, "1E3 N": 1e3, "N·10³": 1e3, "k N": 1e3,
     "da N": 10.0, "ｋＮ": 1e3, "Ｎ": 1.0, "［ｋＮ］": 1e3, "Dekanewton": 10.0, "KILONEWTONS": 1e3,
-    "N pk": 1.0, "kN peak": 1e3,
+    "N pk": 1.0, "kN peak": 1e3, "Pounds": 4.4482216152605, "PoundForce": 4.4482216152605, "KilogramForce": G,
+    "kilogram-force": G, "Kilopond": G,
 }  # fmt: skip
 ACCELERATIONS = {
     "µm/s²": 1e-6, "μm/s^2": 1e-6, "um/s2": 1e-6, "mm/s2": 1e-3, "mm·s⁻²": 1e-3, "mm s^-2": 1e-3, "mm/s**2": 1e-3,
     "cm s-2": 1e-2, "dm/s²": 0.1, "km/s2": 1e3, "nm/s²": 1e-9, "inch/s²": 0.0254, "ft/sec²": 0.3048, "m / s2": 1.0,
     "m per s²": 1.0, "meters per second squared": 1.0, "ｍ／ｓ²": 1.0, "㎨": 1.0, "gn": G, "g_n": G, "g0": G,
     "µg": 1e-6 * G, "g pk": G, "g peak": G, "gpk": G, "g (0-pk)": G, "m/s² pk": 1.0, "10^-2 m/s²": 1e-2,
-    "（g）": G, "【m/s²】": 1.0,
+    "（g）": G, "【m/s²】": 1.0, "MetersPerSecondSquared": 1.0, "MillimetersPerSecondSquared": 1e-3,
+    "InchesPerSecondSquared": 0.0254, "FeetPerSecondSquared": 0.3048, "Meters/Second^2": 1.0, "m/(s*s)": 1.0,
+    "m/sek²": 1.0, "Meter pro Sekunde²": 1.0, "m/s^{2}": 1.0, "mm/s^{2}": 1e-3, "Gs": G,
 }  # fmt: skip
 
 
