@@ -23,11 +23,11 @@ FORCE = np.array([0.3, 1.0, 0.5])  # response of the sensors to a force at 1.2 m
 class Passages(Case):
     """Two trains and an impact at three sensors. A force at 1.2 m is free in each train, as is what a channel adds.
 
-    ``filtered`` is what one filter makes of the trains in S1: the same of three shapes in both. One support, at 1.2 m,
-    acts on all sensors.
+    ``filtered`` is what one filter makes of the trains in S1, the same of three shapes in both, and ``beside`` in S0.
+    One support, at 1.2 m, acts on all sensors.
     """
 
-    def __init__(self, filtered, force=0.0, impact=0.0, support=0.0):
+    def __init__(self, filtered, force=0.0, impact=0.0, support=0.0, beside=0.0):
         rng = np.random.default_rng(11)
         self.shapes = {train: rng.normal(size=(N, 3)) for train in TRAINS}
         self.component = {name: rng.normal(size=3 * N) for name in (*TRAINS, "impact")}
@@ -38,6 +38,7 @@ class Passages(Case):
             if name in TRAINS:
                 rows += force * np.outer(FORCE, rng.normal(size=N))
                 rows[1] += filtered * self.shapes[name] @ np.array([1.0, -2.0, 0.5])
+                rows[0] += beside * self.shapes[name] @ np.array([0.5, 1.5, -1.0])
                 rows += support * self.component[name].reshape(3, N)
             else:
                 rows[1] += impact
@@ -96,7 +97,7 @@ def test_a_channel_whose_fault_is_another_one_in_each_train_needs_impacts():
     "facts, text", [({"filtered": 0.5}, "in channel S1"), ({"filtered": 0.0, "support": 0.5}, "at 1.2 m")]
 )
 def test_what_differs_between_trains_and_impacts_is_a_component_or_a_channel(facts, text):
-    """The fault of the channel moves the support as well."""
+    """The fault of the channel moves the support as well. What two channels show belongs to the track."""
     case = Passages(**facts)
     assert str(locate_component(case, fit_jointly(case), -9.0)).startswith(text)
 

@@ -252,12 +252,21 @@ def _filtered_passages(case: Case, fit: Fit) -> list[SpaceEvidence]:
     floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
     hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
     channels = weigh_spaces(case, fit, floor, "sensor")
-    return [replace(w, nats=_nats_of_one_filter(w, hammer_names) - float(np.log(len(channels)))) for w in channels]
+    return [
+        replace(w, nats=_nats_of_filter(w, channels, hammer_names) - float(np.log(len(channels)))) for w in channels
+    ]
 
 
-def _nats_of_one_filter(evidence: SpaceEvidence, hammer_names: Set[str]) -> float:
-    """Evidence that one filter of a channel explains all recordings but the hammer tests. [nats]"""
-    return sum(nats for name, nats in evidence.by_common_law.items() if name not in hammer_names)
+def _nats_of_filter(channel: SpaceEvidence, ranked: Sequence[SpaceEvidence], hammer_names: Set[str]) -> float:
+    """Evidence that one filter of a channel explains all recordings but the hammer tests, less that of all other
+    channels: what they show as well belongs to the track. [nats]
+    """
+    by_channel = {
+        w.level: sum(nats for name, nats in w.by_common_law.items() if name not in hammer_names)
+        for w in ranked
+        if w.frame == "sensor"
+    }
+    return 2.0 * by_channel[channel.level] - sum(by_channel.values())
 
 
 def _lead(ranked: Sequence[SpaceEvidence]) -> float:
@@ -286,7 +295,7 @@ def _credible_evidence(case: Case, ranked: Sequence[SpaceEvidence]) -> Iterator[
             and hammer_names
             and sum(w.by_space.get(name, 0.0) for name in hammer_names) < THRESHOLDS.min_hammer_evidence
         ):
-            nats = _nats_of_one_filter(w, hammer_names)
+            nats = _nats_of_filter(w, ranked, hammer_names)
         if nats > 0.0:
             yield replace(w, nats=nats)
 

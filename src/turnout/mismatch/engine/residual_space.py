@@ -17,7 +17,8 @@ class ResidualSpace:
     ``combinations`` (frame, level) -> (k, m) combinations of the columns, (m,) indices of columns, or None for all of
     them. A level of "place" is a position [m], or the first and last position of a stretch.
 
-    ``law`` of the cause, if there are several for the same observations: of them the one with the most evidence counts.
+    ``law`` of a cause that is the same for several recordings: of such laws the one with the most evidence counts. It
+    is "" where the cause is free in each recording.
     """
 
     names: tuple[str, ...]

@@ -38,8 +38,7 @@ NOISE_FACTORS = np.geomspace(1.0, THRESHOLDS.max_noise_factor, THRESHOLDS.n_nois
 class SpaceEvidence:
     """Evidence [nats] that the residual is fixed to ``level`` of ``frame``; ``by_space`` nats by name of the space.
 
-    ``by_common_law`` has those of the best law that is the same for several recordings, also where a cause that is
-    free in each of them has more evidence.
+    ``by_common_law`` has those of the best law that is the same for several recordings.
     """
 
     frame: str
@@ -132,7 +131,7 @@ def weigh_spaces(case: Case, fit: Fit, floor: Mapping[str, float], frame: str = 
 
 
 def _combined_evidence(key: tuple[str, Any], by_level: _ByLevel) -> SpaceEvidence:
-    """Evidence for one level of all observations: of each type of data with the best of its laws.
+    """Evidence for one level of all observations, free in each of them or, if no space is, with the best common law.
 
     An observation that has spaces of positions, but none of the stretch, counts with the best position in it.
     """
@@ -142,15 +141,15 @@ def _combined_evidence(key: tuple[str, Any], by_level: _ByLevel) -> SpaceEvidenc
         for (level_frame, position), position_types in by_level.items():
             if level_frame == "place" and not isinstance(position, tuple) and level[0] <= position <= level[1]:
                 for data_type, laws in position_types.items():
-                    by_name = by_type.setdefault(data_type, {}).setdefault("", {})
                     for name, nats in laws.get("", {}).items():
+                        by_name = by_type.setdefault(data_type, {}).setdefault("", {})
                         by_name[name] = max(nats, by_name.get(name, 0.0))
     by_space, by_common_law = dict[str, float](), dict[str, float]()
     for by_law in by_type.values():
-        by_space |= by_law[max(by_law, key=lambda law: _total(by_law[law]))]
-        common_laws = [law for law in by_law if law]
-        if common_laws:
-            by_common_law |= by_law[max(common_laws, key=lambda law: _total(by_law[law]))]
+        common_laws = {law: evidence for law, evidence in by_law.items() if law}
+        likeliest = max(common_laws, key=lambda law: _total(common_laws[law]), default="")
+        by_space |= by_law.get("") or common_laws[likeliest]
+        by_common_law |= common_laws.get(likeliest, {})
     return SpaceEvidence(frame, level, _total(by_space), by_space, by_common_law)
 
 
