@@ -43,11 +43,11 @@ from turnout.stages.stored_visits import (
     StoredVisit,
     by_content,
     read_visits,
-    remove_other_visits,
     store_visit,
     version_of,
 )
 from turnout.stages.track_files import track_of
+from turnout.stages.visit_files import remove_other_visits
 from turnout.stages.visit_time import day_of, years_of
 from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan

@@ -268,7 +268,7 @@ def with_held_out(campaign: CampaignInput, passages: Sequence[Any]) -> CampaignI
         return campaign
     trains = split_by_length(passages)
     fitted = select_passages(trains, MAX_FITTED_TRAINS, MAX_AXLES_OF_TEST)
-    others = [p for p in trains if all(p is not f for f in fitted)]
-    held_out = select_passages(others, MAX_HELD_OUT_TRAINS, MAX_HELD_OUT_AXLES) if others else []
+    not_fitted = [p for p in trains if all(p is not f for f in fitted)]
+    held_out = select_passages(not_fitted, MAX_HELD_OUT_TRAINS, MAX_HELD_OUT_AXLES) if not_fitted else []
     chosen = [p for p in trains if any(p is c for c in (*fitted, *held_out))]
     return replace(campaign, passages=tuple(chosen), reserved=tuple(p.name for p in held_out))

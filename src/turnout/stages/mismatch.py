@@ -20,9 +20,10 @@ from turnout.stages import stored_visits
 from turnout.stages.accepted_changes import changes_of
 from turnout.stages.budget import Budget, BudgetSpentError, Watch
 from turnout.stages.changed_effects import changed_effects
+from turnout.stages.changed_visits import fit_changed_visits
 from turnout.stages.checkpoint import Checkpoint, Replay
 from turnout.stages.combined_visits import is_stored
-from turnout.stages.mismatch_groups import Group, groups, members_of, unit_of, visits
+from turnout.stages.mismatch_groups import Group, groups, members_of, visits
 from turnout.stages.mismatch_inputs import Note, gather_inputs
 from turnout.stages.mismatch_rows import finding_tables
 from turnout.stages.raw_files import quarantine_row
@@ -152,13 +153,13 @@ def diagnose_visit(
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
     about["changes"] = changes_of(track.terms)
     about["version"] = stored_visits.version_of(unit, turnout, raw_root, options.track, algo)
-    about["earlier"] = _earlier_versions(unit, scanned, turnout, raw_root, options, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
     # Sections that were chosen, or several visits in one case, are no visit of the calibrated model
     every = groups(turnout, track, replace(inputs, notes=[])) if options.sections else members
     is_visit = set(visits(units, work_days_of(turnout))) <= {unit.label}
     about["every_group"] = [", ".join(g.neighbours) for g in every] if is_visit else []
+    about["earlier"] = _earlier_versions(unit, scanned, turnout, raw_root, options, algo) if is_visit else {}
     diagnosed: list[tuple[Group, dict[str, list[dict]]]] = []
     for k, group in enumerate(members):
         try:
@@ -266,14 +267,14 @@ def _earlier_versions(
     options: Options,
     code: str,
 ) -> dict[str, dict[str, str]]:
-    """Versions of the stored visits before that of the unit, as ``present_versions``."""
+    """Versions of the stored visits before that of the unit, which are fitted again where they have changed."""
     before = {
-        visit: unit_of(turnout.id, visit, units, turnout.hashes["mismatch"])
+        visit: units
         for visit, units in since_renewal(turnout, visits(scanned, work_days_of(turnout))).items()
         if visit != unit.label and years_of(visit) <= years_of(unit.label)
     }
     folder = stored_visits.folder_of(options.fits)
-    return stored_visits.present_versions(folder, before, turnout, raw_root, options.track, code)
+    return fit_changed_visits(turnout, folder, before, raw_root, options.track, code)
 
 
 def _changed_effects(group: Group, about: Mapping[str, Any]) -> tuple[AcceptedEffect, ...]:

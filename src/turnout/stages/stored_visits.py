@@ -34,6 +34,7 @@ from turnout.mismatch.turnout.relinearization import fit_again
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
 from turnout.stages.track_files import digest_of_model
+from turnout.stages.visit_files import stored_files, visit_of_file
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def present_versions(
     model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
     by_files = {v: {"code": code, "model": model, "files": _digest(unit.files)} for v, unit in units.items()}
     unchanged = {s.visit for s in read_visits(folder, turnout.id, by_files)}
-    stored = {path.stem.rpartition("-")[0] for path in (folder / turnout.id).glob(f"*{SUFFIX}")}
+    stored = set(map(visit_of_file, stored_files(folder, turnout.id)))
     changed = {v: version_of(u, turnout, raw_root, track, code) for v, u in units.items() if v in stored - unchanged}
     return {v: by_files[v] for v in units if v in unchanged} | by_content(changed)
 
@@ -338,23 +339,6 @@ def _path(folder: Path, turnout_id: str, visit: str, labels: Sequence[str]) -> P
     return folder / turnout_id / f"{visit}-{digest}{SUFFIX}"
 
 
-def remove_other_visits(folder: Path, turnout_id: str, visits: Collection[str]) -> None:
-    """Remove the files of all visits of a turnout but these, so that a folder does not grow with each night.
-
-    Parameters
-    ----------
-    folder : Path
-        As ``folder_of``.
-    turnout_id : str
-    visits : collection of str
-        Visits whose files stay.
-    """
-    for path in (folder / turnout_id).glob(f"*{SUFFIX}"):
-        visit, _, _ = path.name.rpartition("-")
-        if visit not in visits:
-            path.unlink(missing_ok=True)
-
-
 def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[str, str]]) -> list[StoredVisit]:
     """Stored visits of a turnout. Those of another code, track file or recordings are left out.
 
@@ -372,7 +356,7 @@ def read_visits(folder: Path, turnout_id: str, versions: Mapping[str, Mapping[st
         In the order of visit and sections.
     """
     stored = []
-    for path in sorted((folder / turnout_id).glob(f"*{SUFFIX}")):
+    for path in stored_files(folder, turnout_id):
         try:
             value = read_value(path)
         except KeyError:  # damaged, or of another format

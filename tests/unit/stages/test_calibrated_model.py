@@ -327,9 +327,37 @@ def test_the_state_after_a_visit_is_that_of_the_recordings_and_the_recorded_work
         path.touch()  # a copied folder
     assert after(DAYS[2], "work") == never
     (Path("raw/t1/hammer") / DAYS[0] / "B_1.h5").unlink()
-    assert after(DAYS[2], "work")["pad@18.00"][2:] == (1, 2)  # the first visit is not diagnosed as it is now
-    after(DAYS[0], "work")
-    assert after(DAYS[2], "work")["pad@18.00"][2:] == (2, 3)
+    one_less = after(DAYS[2], "work")  # the first visit is fitted again, as it is now
+    assert one_less["pad@18.00"][2:] == (2, 3)
+    after(DAYS[0], "never-either")
+    assert after(DAYS[2], "never-either") == one_less
+
+
+def test_the_state_has_each_visit_that_it_had_after_another_track_or_code_or_a_damaged_file(turnout, monkeypatch):
+    """Formerly, an edited track file, another version of the program or a damaged file left the newest visit alone."""
+    shutil.rmtree("raw/t1/passages")
+    for day in DAYS[1:3]:
+        shutil.rmtree(Path("raw/t1/hammer") / day)
+    diagnose_turnout("t1", visit=DAYS[0])
+    before = states_of(diagnose_turnout("t1", visit=DAYS[3]))
+    (path,) = Path("work/calibrated-model/t1").glob(f"{DAYS[0]}-*.npz")
+    path.write_bytes(path.read_bytes()[:999])
+    assert states_of(diagnose_turnout("t1", visit=DAYS[3])) == before
+    path.rename(path.with_name(f"{DAYS[0]}-0123456789ab.npz"))  # of sections that are no group any more
+    path.with_name(f"{DAYS[0]}-0123456789ab.npz").write_bytes(b"")
+    assert states_of(diagnose_turnout("t1", visit=DAYS[3])) == before
+    assert [p.name for p in path.parent.glob(f"{DAYS[0]}-*.npz")] == [path.name]
+    with monkeypatch.context() as other_code:
+        other_code.setattr(mismatch_results, "fingerprint", lambda _: "of another version")
+        tables = diagnose_turnout("t1", visit=DAYS[3])
+        assert states_of(tables) == before
+        assert {r["code_version"] for r in tables["twin_states"]} == {"of another version"}
+        (stored,) = read_visits(Path("work/calibrated-model"), "t1", {DAYS[0]: {"code": "of another version"}})
+        assert stored.fitted and stored.groups
+    track = Path("config/tracks/small.yaml")
+    track.write_text(track.read_text().replace("mass: {value: 60.2,", "mass: {value: 60.3,"))
+    other_rail = states_of(diagnose_turnout("t1", visit=DAYS[3]))
+    assert other_rail["pad@18.00"][2:] == before["pad@18.00"][2:] == (1, 2) and other_rail != before
 
 
 def test_the_state_after_a_visit_rests_on_all_of_its_groups_of_sections(turnout, monkeypatch):
