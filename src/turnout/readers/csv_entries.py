@@ -8,6 +8,7 @@ from turnout.readers.channel_delays import is_delay_name
 from turnout.readers.channel_descriptions import is_description_name
 from turnout.readers.csv_cells import cells_of, is_number
 from turnout.readers.csv_columns import is_line_of_names
+from turnout.readers.directions import is_direction_name
 from turnout.readers.entries import (
     COLON,
     FREE_TEXT,
@@ -19,6 +20,7 @@ from turnout.readers.entries import (
 )
 from turnout.readers.entry_owners import CHANNEL, container_of
 from turnout.readers.exponential_windows import is_window_name
+from turnout.readers.inversions import is_phase_name
 from turnout.readers.measured_entries import is_statistic_name
 from turnout.readers.metadata_names import SAMPLE_COUNT_NAMES
 from turnout.readers.metadata_subjects import STRONG, subject_of
@@ -147,13 +149,16 @@ def entries_of_lines(
             ]
         elif len(cells) > 2 and _has_value_for_each(cells, names):
             entries = [Entry(place, cells[0].rstrip(": "), [DECIMAL_COMMA.sub(r"\1.", cell) for cell in cells[1:]])]
-        elif len(cells) > 2 and any(of(cells[0]) for of in (is_delay_name, is_of_overload, is_window_name)):
+        elif len(cells) > 2 and any(of(cells[0]) for of in OF_EACH):
             entries = [Entry(place, cells[0].rstrip(": "), [cell.replace(",", ".") for cell in cells[1:]])]
         yield from entries or (*entries_of_text(text, place), Entry(place, FREE_TEXT, text))
         is_list = any(isinstance(entry.value, list) for entry in entries)
         is_settled = is_list or any(is_rate_name(e.name) or subject_of(e.name) == STRONG for e in entries)
         if pairs and not is_drawn and not is_settled:
             yield from entries_of_text(text, place)
+
+
+OF_EACH = (is_delay_name, is_of_overload, is_window_name, is_phase_name)  # names of lines with a value for each column
 
 
 def _is_of_condition(entry: Entry) -> bool:
@@ -215,10 +220,8 @@ def _describes_columns(cells: Sequence[str], names: Sequence[str]) -> bool:
 
     There is one for each column, or for each but the first, which is often that of the time.
     """
-    texts = cells[1:]
-    return (
-        len(texts) in (len(names), len(names) - 1) and is_description_name(cells[0]) and not any(map(is_number, texts))
-    )
+    texts, is_description = cells[1:], is_description_name(cells[0]) or is_direction_name(cells[0])
+    return len(texts) in (len(names), len(names) - 1) and is_description and not any(map(is_number, texts))
 
 
 COUPLINGS = ("DC", "AC")

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from turnout.readers.entries import UnreadObject
 from turnout.readers.source import MAX_COMPRESSION_RATIO, Source
 
 MAX_EXPANSION = 6  # claimed bytes per byte of the file: packed samples reach 2 to 4
@@ -83,7 +84,13 @@ def _npz(source: Source) -> None:
             check_size(total := total + member.file_size, source, f"variable {member.filename!r}")
 
 
-def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarray | bytes:
+# Loading them would run code of the file.
+PYTHON_OBJECTS = UnreadObject(
+    "array of Python objects", "Save it as numbers or as text, for example x=json.dumps(x)", is_matlab=False
+)
+
+
+def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarray | bytes | UnreadObject:
     """An array of a NumPy archive, whose header must not claim more values than the array has bytes.
 
     Parameters
@@ -97,15 +104,15 @@ def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarra
 
     Returns
     -------
-    (...) array or bytes
-        The numbers, read-only; the bytes of a member that is no array.
+    (...) array, bytes or UnreadObject
+        The numbers, read-only; the bytes of a member that is no array; ``PYTHON_OBJECTS`` for pickled ones.
 
     Raises
     ------
     ReadError
         If it claims more. Other arrays of the archive are not concerned.
     ValueError
-        If the header cannot be read, or the array holds objects.
+        If the header cannot be read.
     """
     file_name = name if name in archive.NameToInfo else f"{name}.npy"
     member = archive.getinfo(file_name)
@@ -118,8 +125,7 @@ def read_array(archive: zipfile.ZipFile, name: str, source: Source) -> np.ndarra
     stream = io.BytesIO(data)
     shape, is_fortran_order, dtype = _npy_header(stream)
     if dtype.hasobject:
-        problem = "it holds objects of Python, which are not loaded"
-        raise source.error(f"variable {name!r}", problem, "Save it as numbers or as text, for example in JSON")
+        return PYTHON_OBJECTS
     count, start = math.prod(shape), stream.tell()
     if count * dtype.itemsize > len(data) - start:
         problem = f"its header claims {shape} values, in {len(data)} bytes"

@@ -3,8 +3,10 @@
 import re
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import Any
 
-from turnout.readers.entries import Entry
+import numpy as np
+
 from turnout.readers.entry_owners import owners_of
 from turnout.readers.scale_vocabulary import plain_word
 from turnout.readers.source import RawRecord
@@ -21,7 +23,7 @@ AGAINST_AXIS = re.compile(
     re.IGNORECASE,
 )
 UPSIDE_DOWN = re.compile(
-    r"upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
+    r"^\s*down\s*$|upside.?down|downwards?|abw(?:ä|ae)rts|nach unten|kopf(?:ü|ue)ber|vers le bas|nedad", re.IGNORECASE
 )
 # In the name of a channel itself; "down" there may be a place.
 INVERTED = re.compile(
@@ -60,7 +62,19 @@ def is_against_axis(text: str) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _is_direction_name(name: str) -> bool:
+def is_direction_name(name: str) -> bool:
+    """Whether a name means the direction in which a sensor measures.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry.
+
+    Returns
+    -------
+    bool
+        False for the direction of a train, of the track or of a force.
+    """
     word = plain_word(name)
     return bool(DIRECTION_NAME.search(word)) and not OTHER_NAME.search(word)
 
@@ -84,15 +98,19 @@ def opposite_directions(record: RawRecord, channels: Sequence[RawChannel]) -> It
     wanted = sorted(row for row in rows if row is not None)
     yield from ((i, record.names[i], record.names[i]) for i in wanted if is_against_axis(record.names[i]))
     for entry in record.entries:
-        if entry.is_piece or not _is_direction_name(entry.name) or not (text := _opposite_text(entry)):
+        if entry.is_piece or not is_direction_name(entry.name):
             continue
-        owners = owners_of(entry, record.entries, record.names)
-        yield from ((i, entry.name, text) for i in wanted if not owners or i in owners)
+        values = entry.value.ravel().tolist() if isinstance(entry.value, np.ndarray) else entry.value
+        if isinstance(values, (list, tuple)) and len(values) == len(record.names):  # one for each channel
+            yield from ((i, entry.name, text) for i in wanted if (text := _opposite_text(values[i])))
+        elif text := _opposite_text(values):
+            owners = owners_of(entry, record.entries, record.names)
+            yield from ((i, entry.name, text) for i in wanted if not owners or i in owners)
 
 
-def _opposite_text(entry: Entry) -> str:
-    """The text of an entry if it states a direction against an axis, else ""."""
-    value = decode_text(entry.value) if isinstance(entry.value, bytes) else entry.value
+def _opposite_text(value: Any) -> str:
+    """The text of a value if it states a direction against an axis, else ""."""
+    value = decode_text(value) if isinstance(value, bytes) else value
     if not isinstance(value, str) or len(value) > MAX_TEXT:
         return ""
     return value if is_against_axis(value) or UPSIDE_DOWN.search(value) else ""

@@ -8,13 +8,13 @@ from turnout.readers.rate_units import words_of
 from turnout.readers.stated_numbers import number_and_unit
 
 INVERSION = re.compile(
-    r"polari[td]\w*|polaryz\w*|invert\w*|invers\w*|inverz\w*|neg(?:ative?)?|vorzeichen|sign|signe|segno|signo|fortegn"
+    r"polari[td]\w*|polaryz\w*|invert\w*|invers\w*|inverz\w*|inwer[st]\w*|neg(?:ative?)?|vorzeichen|sign|signe|segno|signo|fortegn"
     r"|flipped|reversed|negated|negiert|odwroc\w*|obracen\w*"
 )
 SIGN = re.compile(r"signe?|segno|signo")  # a signature or a road sign as well: of a polarity by its value alone
 # Names that say themselves that the sign is reversed; any other says which sign it is.
 INVERTED_NAME = re.compile(
-    r"invert\w*|invers\w*|inverz\w*|neg(?:ative?)?|flipped|reversed|negated|negiert|odwroc\w*|obracen\w*"
+    r"invert\w*|invers\w*|inverz\w*|inwer[st]\w*|neg(?:ative?)?|flipped|reversed|negated|negiert|odwroc\w*|obracen\w*"
 )
 CHANNELS_NAME = re.compile(r"channels?|kan[aea]+le?r?|voies?|sensors?|sensoren|kanal")
 # What leaves the sign of the numbers as it is, and what only says that somebody looked at it.
@@ -32,7 +32,7 @@ CHECKED_WORDS = frozenset(
 )
 OTHER_POLARITY = frozenset("supply power battery trigger versorgung speisung alimentation plug stecker cable".split())
 REVERSING = re.compile(
-    r"inv|invert\w*|invers\w*|inverz\w*|neg\w*|rev|revers\w*|flip\w*|minus|opposite|umge\w*|umkehr\w*|verpolt|gedreht|vertauscht"
+    r"inv|invert\w*|invers\w*|inverz\w*|inwer[st]\w*|neg\w*|rev|revers\w*|flip\w*|minus|opposite|umge\w*|umkehr\w*|verpolt|gedreht|vertauscht"
     r"|przeciwn\w*|wrong|omvendt|ompolet|zaporn\w*|ujemn\w*|swapped|odwroc\w*|obracen\w*"
 )
 PARTS = re.compile(r"[()\[\]/;,|:=.]|\b(?:but|sondern|mais|men)\b")
@@ -184,11 +184,26 @@ def is_half_turn(name: str, text: str) -> bool:
     >>> [is_half_turn(*entry) for entry in (("Phase rail", "180°"), ("Phasenlage", "-180.0"), ("Phase", "2"))]
     [True, True, False]
     """
-    words = words_of(name)
-    if not any(map(PHASE.fullmatch, words)) or any(map(OTHER_PHASE.fullmatch, words)):
+    if not is_phase_name(name):
         return False
     stated = number_and_unit(text)
     return PI.fullmatch(text.strip()) is not None or (stated is not None and abs(stated[0]) == HALF_TURN)
+
+
+def is_phase_name(name: str) -> bool:
+    """Whether a name means the phase of a signal, and not that of a generator or of works.
+
+    Parameters
+    ----------
+    name : str
+        Name of an entry.
+
+    Returns
+    -------
+    bool
+    """
+    words = words_of(name)
+    return any(map(PHASE.fullmatch, words)) and not any(map(OTHER_PHASE.fullmatch, words))
 
 
 POLARITY = re.compile(r"polari[td]\w*|polaryz\w*|vorzeichen|fortegn")

@@ -48,7 +48,7 @@ STRONG_STEMS = (
     r"|operator|speed of|line speed|velocidad de linea|vitesse des"
     # settings of other things: triggers, filters, windows, limits, analysis
     r"|trigg|ausloes|auslos|declench|disparo|wyzwal|spoust|threshold|schwelle|seuil|umbral|soglia|taersk"
-    r"|prog$|hyster|filt|high ?pass|low ?pass|bandpass|hochpass|tiefpass|passe|tuning|switching|inverter"
+    r"|prog$|hyster|filt|high ?pass|low ?pass|bandpass|hochpass|tiefpass|passe|tuning|switching|inverter(?!et|a[dt])"
     r"|umricht|propre|egen(?:sv|frek)|cutoff|cut off|coupure|corner|grenz|notch|alias|butter|bessel|window"
     r"|fenster|fenetre|ventana|finestra|overlap|averag|mittel|moyenn|median|detrend|taper|zero ?pad|fft"
     r"|spectr|spektr|octav|terz|lines?$|band|resonan|risonan|eigenfr|eigensv|natural|modal|mode "

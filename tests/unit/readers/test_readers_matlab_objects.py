@@ -1,6 +1,7 @@
-"""Objects of MATLAB classes are never read as numbers, and each is reported with a way to store its content."""
+"""Objects of MATLAB classes and of Python are never read as numbers: each is reported with a way to store it."""
 
 import struct
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -10,6 +11,7 @@ from tests.unit.readers.test_readers_exports import FORCE, RAIL, RATE, layout
 
 from turnout.errors import ReadError
 from turnout.readers import read
+from turnout.records import RawChannel, RawDescription
 
 REFERENCE = np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype=np.uint32)
 PLACEHOLDER = 7.25
@@ -184,3 +186,23 @@ def test_the_reference_to_an_object_in_a_cell_of_version_73_is_not_read_as_a_num
         stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
     error = only_remark(read(path.name, tmp_path, layout("N", "m/s²")))
     assert "'MATLAB object' cannot be read" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("name", "is_read"),
+    [("meta", True), ("info", True), ("units", False), ("fs", False), ("names", False), ("gain", False)],
+)
+def test_a_pickled_variable_of_numpy_is_a_remark_unless_its_name_is_about_the_samples(name, is_read, tmp_path):
+    samples = np.random.default_rng(5).normal(size=(2, 200))
+    variables = {"force": samples[0], "rail": samples[1], name: np.array({"any": 1}, dtype=object)}
+    np.savez(tmp_path / "a.npz", **variables)
+    sensors = (RawChannel("force", "force", "force", unit="N"), RawChannel("rail", "rail", "acceleration", unit="m/s²"))
+    description = RawDescription(sensors, rate=20000.0)
+    if not is_read:
+        with pytest.raises(ReadError, match=f"variable '{name}': it holds objects of Python"):
+            read("a.npz", tmp_path, description)
+        return
+    result = read("a.npz", tmp_path, description)
+    np.testing.assert_allclose(result.recordings[0].samples, samples)
+    assert [e.reason for e in result.errors] == ["entry_unknown"] and repr(name) in str(result.errors[0])
+    assert not read("a.npz", tmp_path, replace(description, checked_entries=(name,))).errors

@@ -193,3 +193,34 @@ def test_the_full_scale_of_the_layout_is_explained(text_of_scale, tmp_path):
             assert not result[1]
         else:
             assert result.reason == "scale_unknown"
+
+
+SIGNS = [
+    ("Inverteret", "nej", "ja", "scale_unknown"), ("Inverterad", "nej", "ja", "scale_unknown"),
+    ("Inwersja", "nie", "tak", "scale_unknown"), ("Phase", "0°", "180°", "scale_unknown"),
+    ("Orientation", "+Z", "-Z", "entry_unknown"), ("Measuring direction", "up", "down", "entry_unknown"),
+    ("Richtung", "z", "-z", "entry_unknown"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "plain", "opposite", "reason"), SIGNS)
+def test_the_sign_of_each_channel_in_one_line_or_list(name, plain, opposite, reason, tmp_path):
+    """The direction of the force is that of the hammer, and says nothing about the acceleration."""
+    for of_rail, of_force in ((plain, plain), (opposite, plain), (plain, opposite)):
+        text(tmp_path, [f"{name};{of_force};{of_rail}"])
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            for channel, samples, unit in zip(("force", "rail"), SAMPLES.T, ("N", "m/s²")):
+                file[channel] = samples
+                file[channel].attrs["unit"] = unit
+            file.attrs.update({"fs": RATE, name: [of_force, of_rail]})
+        for file_name in ("a.csv", "a.h5"):
+            result = outcome(tmp_path, file_name)
+            errors = [result] if isinstance(result, ReadError) else list(result[1])
+            is_reported = opposite in (of_rail, of_force) if reason == "scale_unknown" else of_rail == opposite
+            assert [e.reason for e in errors] == [reason] * is_reported, (of_force, of_rail, file_name)
+
+
+@pytest.mark.parametrize("line", ["Inverter: off", "Inverter frequency;5 kHz", "Wechselrichter/Inverter;ein"])
+def test_an_inverter_of_the_supply_is_no_inversion(line, tmp_path):
+    text(tmp_path, [line])
+    assert not outcome(tmp_path, "a.csv")[1]
