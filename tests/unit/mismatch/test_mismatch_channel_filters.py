@@ -94,7 +94,13 @@ def test_a_channel_whose_fault_is_another_one_in_each_train_needs_impacts():
 
 
 @pytest.mark.parametrize(
-    "facts, text", [({"filtered": 0.5}, "in channel S1"), ({"filtered": 0.0, "support": 0.5}, "at 1.2 m")]
+    "facts, text",
+    [
+        ({"filtered": 0.5}, "in channel S1"),
+        ({"filtered": 0.0, "support": 0.5}, "at 1.2 m"),
+        ({"filtered": 0.4, "support": 0.6}, "in channel S1"),
+        ({"filtered": 0.4, "support": 0.6, "beside": 0.4}, "at 1.2 m"),
+    ],
 )
 def test_what_differs_between_trains_and_impacts_is_a_component_or_a_channel(facts, text):
     """The fault of the channel moves the support as well. What two channels show belongs to the track."""
