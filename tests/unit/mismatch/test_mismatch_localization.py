@@ -486,7 +486,9 @@ def test_a_position_beyond_the_measured_range_is_stated_as_such(place, text):
 )
 def test_a_candidate_without_a_name_is_stated_as_the_location(frame, where, text):
     candidate = Candidate.of("soft", (), dict, (), where, frame=frame)
-    assert str(_location_of_candidate(Score(candidate, 40.0, 0.0, 1.0, None))) == text
+    location = _location_of_candidate(Score(candidate, 40.0, 0.0, 1.0, None))
+    assert str(location) == text
+    assert location.frame == ("sensor" if "sensor" in where else frame)  # that it is its clock was rejected
 
 
 def test_a_candidate_without_a_name_is_located_at_all_its_possible_positions():

@@ -309,7 +309,8 @@ def _location_of_candidate(score: Score) -> Location:
     level = f"{where['wavelength']:.3f} m" if "wavelength" in where else score.candidate.key if where else None
     sensor, train, axle = (where.get(name) for name in ("sensor", "train", "axle"))
     low, high = score.possible_positions or (position, position)
-    return Location(score.candidate.frame, level, score.gain, position, low, high, sensor, train, axle)
+    frame = score.candidate.frame if sensor is None else "sensor"  # which part of the sensor is at fault was rejected
+    return Location(frame, level, score.gain, position, low, high, sensor, train, axle)
 
 
 def _location_of_evidence(ranked: Sequence[SpaceEvidence]) -> Location:
