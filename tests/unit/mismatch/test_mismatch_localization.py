@@ -258,7 +258,7 @@ def test_an_effect_in_all_trains_is_not_located_in_one_train():
         SpaceEvidence("train", "B", 26.0),
         SpaceEvidence("clock", "p1", 7.0),
     ]
-    credible = {(w.frame, w.level): w.nats for w in _credible_evidence(Places(np.zeros((3, 9))), of_trains)}
+    credible = {(w.frame, w.level): w.nats for w in _credible_evidence(Places(np.zeros((3, 9))), None, of_trains)}
     assert credible == {("train", "A"): 4.0, ("clock", "p1"): 7.0}
 
 

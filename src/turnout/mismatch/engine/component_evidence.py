@@ -95,19 +95,57 @@ def local_changes(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:
     list of (Nuisance, float)
         [nats]; [] without derivatives, without components of one kind, or with one kind of recordings alone.
     """
+    numbers, gram, slopes = _changes_under_trains(case, fit)
+    information = np.diag(gram)
+    gains = 0.5 * slopes**2 / (1.0 + information) - 0.5 * np.log1p(information)
+    return [(case.nuisances[k], float(nats)) for k, nats in zip(numbers, gains)]
+
+
+def evidence_of_a_changed_stretch(case: Case, fit: Fit) -> float:
+    """Evidence that all components of neighbouring positions have values of their own in the passages.
+
+    The prior is that of ``local_changes``, and all stretches are equally probable. One component imitates a cause that
+    acts on several in part alone.
+
+    Parameters
+    ----------
+    case : Case
+    fit : Fit
+        With its Jacobian.
+
+    Returns
+    -------
+    float
+        Of the stretch with the most, of up to ``THRESHOLDS.max_changed_positions`` positions. [nats]; 0 without any.
+    """
+    numbers, gram, slopes = _changes_under_trains(case, fit)
+    levels = [case.nuisances[k].at for k in numbers]
+    positions = [at[1] if at is not None and isinstance(at[1], float) else None for at in levels]
+    ordered = sorted({x for x in positions if x is not None})
+    gains = []
+    for first in range(len(ordered)):
+        for n in range(1, min(THRESHOLDS.max_changed_positions, len(ordered) - first) + 1):
+            chosen = [i for i, x in enumerate(positions) if x in ordered[first : first + n]]
+            covariance = np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)]
+            explained = slopes[chosen] @ np.linalg.solve(covariance, slopes[chosen])
+            gains.append(0.5 * (explained - np.linalg.slogdet(covariance)[1]))
+    return float(max(gains) - np.log(len(gains))) if gains else 0.0
+
+
+def _changes_under_trains(case: Case, fit: Fit) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """Numbers (k,) of components, products (k, k) of the columns of their changes and (k,) of these with the residual.
+
+    Empty without derivatives, without components of one kind, or with one kind of recordings alone.
+    """
     numbers = _components(case)
-    if not numbers or not fit.jacobian:
-        return []
     is_passage = np.concatenate([np.full(o.data.size, not case.is_hammer_test(o)) for o in case.observations])
-    if np.all(is_passage) or not np.any(is_passage):
-        return []
+    if not numbers or not fit.jacobian or np.all(is_passage) or not np.any(is_passage):
+        return [], np.zeros((0, 0)), np.zeros(0)
     projector = Projector(case, fit)
     columns = projector.scaled[:, numbers] * (THRESHOLDS.max_ordinary_spreads * is_passage[:, None])
     across = projector.scaled.T @ columns
-    information = np.sum(columns**2, axis=0) - np.sum(across * (projector.normal @ across), axis=0)
-    slopes = projector.right @ columns - projector.shift @ across
-    gains = 0.5 * slopes**2 / (1.0 + information) - 0.5 * np.log1p(information)
-    return [(case.nuisances[k], float(nats)) for k, nats in zip(numbers, gains)]
+    gram = columns.T @ columns - across.T @ (projector.normal @ across)
+    return numbers, gram, projector.right @ columns - projector.shift @ across
 
 
 def local_deviations(case: Case, fit: Fit) -> list[tuple[Nuisance, float]]:

@@ -11,16 +11,15 @@ component with an unusual value has a sharper position (``component_evidence``),
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from turnout.config.settings.mismatch import MismatchSettings
 from turnout.mismatch.engine.channel_levels import worst_channel_excess
 from turnout.mismatch.engine.component_evidence import (
     evidence_by_position,
+    evidence_of_a_changed_stretch,
     evidence_of_any_component,
     local_changes,
     local_deviations,
@@ -128,7 +127,7 @@ def locate(
     if absorbed is not None and absorbed.nuisance.at is None:
         # what intact recordings leave elsewhere is no noise here: the whole fit leaves less
         floor = {name: min(level, fit.level[name]) for name, level in floor.items()}
-    ranked = sorted(_credible_evidence(case, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
+    ranked = sorted(_credible_evidence(case, fit, weigh_spaces(case, fit, floor)), key=lambda w: -w.nats)
     if absorbed is not None and absorbed.nuisance.at is not None:
         is_intact = all(fit.level[name] <= level for name, level in floor.items())
         if (is_intact and worst_channel_excess(case, fit) <= 1.0) or _lead(ranked) < absorbed.nats:
@@ -222,7 +221,8 @@ def location_of_ambiguity(case: Case) -> Location | None:
 def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
     """Location of a component whose value is unusual: between trains and impacts, or among those of its kind.
 
-    A channel that differs between trains and impacts is the location if one filter in the passages has more evidence.
+    A channel that differs between trains and impacts is the location if one filter in the passages has more evidence
+    than changes of all components at neighbouring positions.
 
     Parameters
     ----------
@@ -243,30 +243,23 @@ def locate_component(case: Case, fit: Fit, threshold: float) -> Location | None:
         return None
     ranked = evidence_by_position(gains)
     if gains is changes:
-        ranked = sorted([*ranked, *_filtered_passages(case, fit)], key=lambda w: -w.nats)
+        floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
+        ranked = _faults_in_passages(case, fit, weigh_spaces(case, fit, floor, "sensor")) or ranked
     return replace(_location_of_evidence(ranked), measured_range=case.measured_range) if ranked else None
 
 
-def _filtered_passages(case: Case, fit: Fit) -> list[SpaceEvidence]:
-    """Evidence that all passages show one channel through a filter, for each channel; all are equally probable."""
-    floor = {name: case.control_level.get(name, 1.0) for name in fit.level}
-    hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
-    channels = weigh_spaces(case, fit, floor, "sensor")
-    return [
-        replace(w, nats=_nats_of_filter(w, channels, hammer_names) - float(np.log(len(channels)))) for w in channels
-    ]
+def _faults_in_passages(case: Case, fit: Fit, ranked: Sequence[SpaceEvidence]) -> list[SpaceEvidence]:
+    """Channels that all passages show through one filter, the largest evidence first.
 
-
-def _nats_of_filter(channel: SpaceEvidence, ranked: Sequence[SpaceEvidence], hammer_names: Set[str]) -> float:
-    """Evidence that one filter of a channel explains all recordings but the hammer tests, less that of all other
-    channels: what they show as well belongs to the track. [nats]
+    What filters of the other channels explain belongs to the track and is subtracted. The rest must exceed the evidence
+    that components at neighbouring positions differ under trains.
     """
-    by_channel = {
-        w.level: sum(nats for name, nats in w.by_common_law.items() if name not in hammer_names)
-        for w in ranked
-        if w.frame == "sensor"
-    }
-    return 2.0 * by_channel[channel.level] - sum(by_channel.values())
+    hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
+    channels = [w for w in ranked if w.frame == "sensor"]
+    filters = [sum(x for name, x in w.by_common_law.items() if name not in hammer_names) for w in channels]
+    faults = [replace(w, nats=2.0 * nats - sum(filters)) for w, nats in zip(channels, filters)]
+    least = evidence_of_a_changed_stretch(case, fit)
+    return sorted((w for w in faults if w.nats > least), key=lambda w: -w.nats)
 
 
 def _lead(ranked: Sequence[SpaceEvidence]) -> float:
@@ -280,24 +273,25 @@ def _lead(ranked: Sequence[SpaceEvidence]) -> float:
     return first.nats - max((w.nats for w in others), default=0.0)
 
 
-def _credible_evidence(case: Case, ranked: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
-    """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel
-    that impacts, if any, do not support, what one filter explains in all other recordings.
+def _credible_evidence(case: Case, fit: Fit, ranked: Sequence[SpaceEvidence]) -> Iterator[SpaceEvidence]:
+    """Evidence that counts: of a wheel or a train, less that of other trains, which belongs to the rail; of a channel,
+    if impacts, if any, support it; of a channel at fault in the passages alone.
     """
     hammer_names = {o.name for o in case.observations if case.is_hammer_test(o)}
+    unsupported = []
     for w in ranked:
         nats = w.nats
         if w.frame in ("wheel", "train"):
             others = (v.nats for v in ranked if v.frame == w.frame and _train_of(v) != _train_of(w))
             nats -= max(others, default=0.0)
-        if (
-            w.frame == "sensor"
-            and hammer_names
-            and sum(w.by_space.get(name, 0.0) for name in hammer_names) < THRESHOLDS.min_hammer_evidence
-        ):
-            nats = _nats_of_filter(w, ranked, hammer_names)
+        if w.frame == "sensor" and hammer_names:
+            if sum(w.by_space.get(name, 0.0) for name in hammer_names) < THRESHOLDS.min_hammer_evidence:
+                unsupported.append(w.level)
+                continue
         if nats > 0.0:
             yield replace(w, nats=nats)
+    if unsupported:
+        yield from (w for w in _faults_in_passages(case, fit, ranked) if w.level in unsupported)
 
 
 def _train_of(evidence: SpaceEvidence) -> Any:

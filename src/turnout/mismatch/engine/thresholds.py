@@ -288,6 +288,9 @@ class Thresholds:
     min_hammer_evidence: float = threshold(
         6.0, "nats", "that impacts must add before a fault of a channel is named: it shows in impacts, too", LOCATED
     )
+    max_changed_positions: int = threshold(
+        3, "positions", "whose components change together under trains, at most: a cause of some length", LOCATED
+    )
     position_margin: float = threshold(
         6.0,
         "nats",
