@@ -17,11 +17,12 @@ import numpy as np
 from turnout.config.events import day_problem
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import ChangeEffect, Event, StateParameter, VisitInformation
+from turnout.mismatch.calibrated.belief import ACCEPTED_EFFECT
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.history import BEFORE_ALL
 from turnout.mismatch.calibrated.model_answer import NAMES, free_shape, group_of, position_of
 from turnout.mismatch.calibrated.stiffness_under_load import LAWS
-from turnout.stages.accepted_effects import SINCE
+from turnout.stages.accepted_effects import SINCE, AcceptedEffect
 from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
@@ -145,6 +146,39 @@ def change_events(
         distinct = {tuple(sorted(direction.items())): sd for direction, sd in shapes}
         within = {t for t in times if change.since < t <= change.until} | {change.until}
         events += [Event(t, {}, dict(d), sd) for t in sorted(within) for d, sd in distinct.items()]
+    return events
+
+
+def effect_events(
+    effects: Iterable[AcceptedEffect], parameters: Sequence[StateParameter], visits: Iterable[VisitInformation]
+) -> list[Event]:
+    """Process noise of accepted effects: until their acceptance, their values may differ from visit to visit.
+
+    A diagnosis of one visit does not tell since when the turnout has the effect. Earlier visits may lack it.
+
+    Parameters
+    ----------
+    effects : iterable of AcceptedEffect
+    parameters : sequence of StateParameter
+    visits : iterable of VisitInformation
+
+    Returns
+    -------
+    list of Event
+    """
+    times, events = [v.time for v in visits], []
+    for effect in effects:
+        if effect.until is None:
+            continue
+        opened = {
+            p.name: CALIBRATION.change_sds * p.sd
+            for p in parameters
+            if p.group == ACCEPTED_EFFECT
+            and effect.is_on(p.route)
+            and p.name.removeprefix(f"{p.route} ").startswith((f"{effect.key}.", f"{effect.key} ("))
+        }
+        if opened:
+            events += [Event(t, opened) for t in (BEFORE_ALL, *(t for t in times if t <= effect.until))]
     return events
 
 

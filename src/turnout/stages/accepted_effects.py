@@ -7,9 +7,11 @@ from dataclasses import MISSING, Field, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from turnout import physics
+from turnout.config.events import day_problem
 from turnout.config.parameters import Number
 from turnout.errors import SimulationError
 from turnout.simulate.links import SUPPORT_FIELDS
+from turnout.stages.visit_time import years_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -36,12 +38,14 @@ class AcceptedEffect:
 
     ``family`` is the name of the effect and ``fixed`` holds its fixed fields, positions of supports in m. ``values``
     maps a parameter to (value, standard error or None) in its own unit. ``route`` is the route that has it, "" for all.
+    ``until`` is the time [years] of its acceptance, None of an entry that was made by hand.
     """
 
     family: str
     fixed: Mapping[str, Any]
     values: Mapping[str, tuple[float, float | None]]
     route: str = ""
+    until: float | None = None
 
     @property
     def _effect(self) -> type[physics.PhysicsTerm]:
@@ -252,7 +256,16 @@ def _effect_of_entry(entry: ParameterSet) -> AcceptedEffect:
         raise SimulationError(f"{where}: {family} needs {', '.join(sorted(missing))}.")
     if fixed.get("first", 0.0) > fixed.get("last", 0.0):
         raise SimulationError(f"{where}: {family} from {fixed['first']} m back to {fixed['last']} m.")
-    return AcceptedEffect(family, fixed, values, route)
+    return AcceptedEffect(family, fixed, values, route, _time_of_acceptance(entry, where))
+
+
+def _time_of_acceptance(entry: ParameterSet, where: str) -> float | None:
+    if "accepted" not in entry:
+        return None
+    text = str(entry["accepted"])
+    if problem := day_problem(text):
+        raise SimulationError(f"{where}: accepted is {text!r}{problem[0]}. {problem[1]}.")
+    return years_of(text)
 
 
 def _fixed_value(entry: ParameterSet, name: str) -> Any:

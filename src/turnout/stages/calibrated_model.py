@@ -181,9 +181,9 @@ def _model_of_visits(stored: list[StoredVisit], fits: VisitFits, computed: Seque
     parameters = parameters_of(stored)
     directions = dip_directions(parameters)
     informed = visits_of(stored)
-    turnout_track, _ = track_of(turnout, fits.track)
+    turnout_track, effects = track_of(turnout, fits.track)
     accepted = changes_of(turnout_track.terms)
-    events = [*events_of(turnout, parameters, accepted, informed), *file_errors(parameters, directions)]
+    events = [*events_of(turnout, parameters, accepted, informed, effects), *file_errors(parameters, directions)]
     settings = turnout.settings["mismatch"]
     versions = by_content(fits.versions)
     again, restarted = (KeyedFits(fits.folder / f / turnout.id, versions) for f in (AGREEING, RESTARTED))

@@ -136,10 +136,10 @@ def _diagnose(
     threshold = turnout.settings["mismatch"].threshold
     changes = changes_of(track.terms)
     least = threshold
-    answer, informed = change_of(stored, turnout, least, changes)
+    answer, informed = change_of(stored, turnout, least, changes, (), accepted)
     if answer.verdict == "none":  # trains may have the evidence that impacts lack
         least = SUSPICION * threshold
-        answer, _ = change_of(stored, turnout, least, changes)
+        answer, _ = change_of(stored, turnout, least, changes, (), accepted)
     with_trains: Sequence[StoredVisit] = ()
     if set(answer.names) == set(SOFT_BALLAST_OR_GAP):
         ends = _first_and_newest_with_trains(since_renewal(turnout, visits(recorded_here, work_days_of(turnout))))
@@ -147,7 +147,7 @@ def _diagnose(
         with_trains, more_notes = _fitted_visits(folder, labels, ends, *about, passage_tables)
         remove_other_visits(folder, turnout.id, ends)
         notes += more_notes
-        answer, _ = change_of(stored, turnout, least, changes, with_trains)
+        answer, _ = change_of(stored, turnout, least, changes, with_trains, accepted)
     test = None
     if answer.verdict in ("named", "a_or_b") and answer.group in SUPPORTS:
         test = trains_of_change(answer, recorded_here, turnout, raw_root, track, accepted, passage_tables, labels)
@@ -224,6 +224,7 @@ def change_of(
     threshold: float | None = None,
     changes: Sequence[AcceptedChange] = (),
     with_trains: Sequence[StoredVisit] = (),
+    effects: Sequence[AcceptedEffect] = (),
 ) -> tuple[ModelAnswer, list[VisitInformation]]:
     """What has changed up to the newest of the visits.
 
@@ -239,6 +240,8 @@ def change_of(
         Those that are part of the model.
     with_trains : sequence of StoredVisit
         Some of the visits, with their trains: these tell soft ballast from a gap.
+    effects : sequence of AcceptedEffect
+        Those that are part of the track.
 
     Returns
     -------
@@ -250,7 +253,7 @@ def change_of(
     informed = sorted(visits_of(stored), key=lambda v: (v.time, v.visit))
     settings = turnout.settings["mismatch"]
     candidates = [*change_candidates(parameters, dip_directions(parameters)), *stretch_candidates(parameters)]
-    events = events_of(turnout, parameters, changes, informed)
+    events = events_of(turnout, parameters, changes, informed, effects)
     candidates = further_candidates(changes, parameters, candidates)
     least = settings.threshold if threshold is None else threshold
     mixed = _with_trains(stored, with_trains) if with_trains else None

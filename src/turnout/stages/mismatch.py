@@ -151,7 +151,7 @@ def diagnose_visit(
         [unit.config_hash, contents, inputs.digest_content(), digest_of_model(turnout, options.track), algo]
     )
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
-    about["changes"] = changes_of(track.terms)
+    about |= {"changes": changes_of(track.terms), "effects": accepted}
     about["version"] = stored_visits.version_of(unit, turnout, raw_root, options.track, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from turnout.constants import DAYS_PER_YEAR
 from turnout.mismatch.calibrated import Event, StateParameter, VisitInformation, change_candidates
 from turnout.mismatch.turnout.calibration import dip_directions
-from turnout.stages.accepted_changes import change_events
+from turnout.stages.accepted_changes import change_events, effect_events
 from turnout.stages.work_days import further_resonances, opened_groups, recorded_events
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
     from turnout.stages.accepted_changes import AcceptedChange
+    from turnout.stages.accepted_effects import AcceptedEffect
 
 # Parameters that all supports share, which work on the whole turnout makes uncertain, too
 BALLAST, PADS = ("ballast_stiffness", "ballast_damping"), ("pad_stiffness", "pad_damping")
@@ -33,6 +34,7 @@ def events_of(
     parameters: Sequence[StateParameter],
     changes: Sequence[AcceptedChange] = (),
     visits_used: Sequence[VisitInformation] = (),
+    effects: Sequence[AcceptedEffect] = (),
 ) -> list[Event]:
     """Recorded work on the turnout, as parameters that it makes as uncertain as the file, and accepted changes.
 
@@ -46,11 +48,13 @@ def events_of(
         Of its track file.
     visits_used : sequence of VisitInformation
         Visits between which accepted changes lie.
+    effects : sequence of AcceptedEffect
+        Those of its track file.
 
     Returns
     -------
     list of Event
-        Work in the order of time, then accepted changes, then the work that may have ended these.
+        Work in the order of time, then accepted changes, the work that may have ended these, and accepted effects.
     """
     positions = {s.label: s.position for s in turnout.sections}
     by_day: dict[int, dict[str, float]] = {}
@@ -72,7 +76,8 @@ def events_of(
     events = [Event(day / DAYS_PER_YEAR, opened) for day, opened in sorted(by_day.items())]
     candidates = change_candidates(parameters, dip_directions(parameters)) if changes else []
     accepted = change_events(changes, parameters, candidates, visits_used)
-    return [*events, *accepted, *_repairs(events, accepted)]
+    of_effects = effect_events(effects, parameters, visits_used)
+    return [*events, *accepted, *_repairs(events, accepted), *of_effects]
 
 
 def _is_near(parameter: StateParameter, at: float) -> bool:

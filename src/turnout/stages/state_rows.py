@@ -34,8 +34,8 @@ def state_rows(
     finding : mapping
         Row of ``mismatch_findings``.
     about : mapping
-        visit, version (as ``version_of``), changes (as ``changes_of``) and earlier (as ``present_versions``, of the
-        visits before).
+        visit, version (as ``version_of``), changes (as ``changes_of``), effects (as ``effects_of``) and earlier (as
+        ``present_versions``, of the visits before).
 
     Returns
     -------
@@ -45,7 +45,7 @@ def state_rows(
     stored = read_visits(folder, turnout.id, {**about["earlier"], **by_content({visit: about["version"]})})
     parameters = parameters_of(stored)
     visits_used = visits_of(without_findings(stored))
-    events = [*events_of(turnout, parameters, about["changes"], visits_used)]
+    events = events_of(turnout, parameters, about["changes"], visits_used, about["effects"])
     events += file_errors(parameters, dip_directions(parameters))
     history = estimate_history(parameters, visits_used, events)
     belief, n = history.belief, sum(s.n_recordings for s in history.used_steps)

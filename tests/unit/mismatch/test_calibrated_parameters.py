@@ -27,6 +27,7 @@ def parameters(unsure_at, more=(), waves=None):
     case = SimpleNamespace(
         data=SimpleNamespace(site=SimpleNamespace(nominal=zone, waves=waves)),
         campaign=SimpleNamespace(turnout=turnout, sensors=SENSORS, hammer=()),
+        accepted=SimpleNamespace(nuisances=()),
         nuisances=(*nuisances, *more),
     )
     return {p.name: p for p in calibrated_parameters(case).values()}

@@ -1,5 +1,6 @@
 """The calibrated model contains an accepted change from its onset on; a withdrawn change leaves no trace."""
 
+import json
 import shutil
 from dataclasses import replace
 from datetime import datetime
@@ -13,6 +14,7 @@ import small_turnout as small
 
 from turnout import physics
 from turnout.cli.main import main
+from turnout.cli.twin import model_text
 from turnout.config import load_configuration, with_raw
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import (
@@ -25,6 +27,7 @@ from turnout.mismatch.calibrated import (
     change_candidates,
     estimate_history,
 )
+from turnout.mismatch.calibrated.belief import ACCEPTED_EFFECT
 from turnout.records import Unit
 from turnout.stages.accept_finding import accept, with_entry
 from turnout.stages.accepted_changes import (
@@ -32,9 +35,11 @@ from turnout.stages.accepted_changes import (
     change_events,
     change_text,
     changes_of,
+    effect_events,
     further_candidates,
     without_accepted,
 )
+from turnout.stages.accepted_effects import AcceptedEffect
 from turnout.stages.calibrated_model import calibrate_turnout
 from turnout.stages.change_diagnosis import change_unit
 from turnout.stages.recorded_work import events_of
@@ -260,6 +265,44 @@ def test_the_estimate_follows_the_repair_of_a_change_that_came_back_and_was_acce
     changes = [AcceptedChange("local_ballast", 1.2, 1.2, visits[k].time, visits[k + 1].time) for k in (0, 5)]
     history = estimate_history(PARAMETERS, visits, events_of(turnout, PARAMETERS, changes, visits))
     assert all(s.is_used for s in history.steps)
+
+
+FACTOR = StateParameter("local_ballast[1.2 m].factor", 0.3, 0.35, 0.0, ACCEPTED_EFFECT, unit="-")
+
+
+@pytest.mark.parametrize(("until", "n_opened"), [(1.0, 4), (0.9, 3), (-1.0, 1), (None, 0)])
+def test_the_values_of_an_accepted_effect_may_differ_from_visit_to_visit_until_its_acceptance(until, n_opened):
+    visits = history_of((0, 0, -1, -1))
+    of_other = [replace(FACTOR, name=name) for name in ("local_ballast[11.2 m].factor", "local_pad[1.2 m].factor")]
+    on_diverging = replace(FACTOR, name="diverging local_ballast[1.2 m].factor", route="diverging")
+    effect = AcceptedEffect("local_ballast", {"sleeper": 1.2}, {"factor": (0.3, 0.1)}, "main", until)
+    events = effect_events([effect], [*PARAMETERS, FACTOR, *of_other, on_diverging], visits)
+    assert [e.opened for e in events] == [{FACTOR.name: pytest.approx(5.0 * 0.35)}] * n_opened
+    (on_all,) = effect_events([replace(effect, route="", until=-1.0)], [FACTOR, on_diverging], visits)
+    assert set(on_all.opened) == {FACTOR.name, on_diverging.name}
+
+
+def test_a_finding_of_the_newest_visit_that_was_accepted_leaves_all_visits_in_use(tmp_path, repository):
+    """Formerly the visit with the effect was not used any more, and a change of another size was stated."""
+    config = small.write_configuration(tmp_path, repository)
+    for k, day in enumerate(("2025-08-01", "2025-11-01", "2026-02-01")):
+        terms = small.soft_pad if k == 2 else None
+        small.write_hammer_tests(tmp_path, terms, day=datetime.fromisoformat(f"{day}T09:00"), seed=10 * k)
+    value = {"value": 0.35, "se": 0.05, "unit": "-"}
+    finding = {"finding_id": "0123456789abcdef", "sections": "A, B", "verdict": "named", "grade": "A"}
+    term = {"term": "local_pad", "fixed": {"sleeper": 18.0}, "parameters": {"factor": value}}
+    finding |= {"found_at_utc": datetime(2026, 2, 1, 10), "term_json": json.dumps([term])}
+    path, _ = accept(finding, config, "t1")
+    model = calibrate_turnout("t1", config, tmp_path / "raw", tmp_path / "work")
+    assert [s.is_used for s in model.history.steps] == [True] * 3
+    assert [a.verdict for a in model.answers] == ["none", "none"]
+    number = [p.name for p in model.history.parameters].index("local_pad[18.0 m].factor")
+    assert [s.belief.mean[number] for s in model.history.steps[1:]] == pytest.approx([1.0, small.SOFT], abs=0.15)
+    (row,) = [line.split() for line in model_text("t1", model, True) if line.startswith("local_pad[18.0 m].factor")]
+    assert row[-1] == "-"  # formerly "ln"
+    path.write_text(path.read_text().replace("accepted: 20", "accepted: in 20"))
+    with pytest.raises(SimulationError, match=r"t1.yaml.*accepted is 'in 20"):
+        calibrate_turnout("t1", config, tmp_path / "raw", tmp_path / "work")
 
 
 def answer_of_events(turnout, visits, change):

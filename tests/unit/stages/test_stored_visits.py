@@ -11,7 +11,8 @@ from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.turnout import TrackCase
 from turnout.stages import stored_visits, visit_fits
 from turnout.stages.combined_visits import complete_visits, parameters_of, visits_of
-from turnout.stages.stored_visits import StoredVisit, read_visits, remove_other_visits
+from turnout.stages.stored_visits import StoredVisit, read_visits
+from turnout.stages.visit_files import remove_other_visits
 from turnout.stages.visit_fits import VisitFits
 
 

@@ -11,6 +11,8 @@ from scipy import stats
 
 from turnout.mismatch.calibrated.constants import CALIBRATION
 
+ACCEPTED_EFFECT = "accepted effect"  # group of the parameters of effects in the track file, in their own units
+
 
 @dataclass(frozen=True)
 class StateParameter:

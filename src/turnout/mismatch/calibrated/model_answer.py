@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from turnout.mismatch.calibrated.belief import Innovation, StateParameter
+from turnout.mismatch.calibrated.belief import ACCEPTED_EFFECT, Innovation, StateParameter
 from turnout.mismatch.calibrated.change import ChangeEffect, change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 
@@ -30,7 +30,7 @@ def stated_unit(unit: str, group: str) -> str:
     Parameters
     ----------
     unit : str
-        Unit of the parameter; "-" of a logarithm and of a gain.
+        Unit of the parameter; "-" of a logarithm, of a gain, and of a factor of an accepted effect.
     group : str
         Group of the parameter.
 
@@ -43,7 +43,7 @@ def stated_unit(unit: str, group: str) -> str:
     >>> stated_unit("-", "ballast"), stated_unit("-", "gain"), stated_unit("m", "seat")
     ('ln', '-', 'm')
     """
-    return "ln" if unit == "-" and group != "gain" else unit
+    return "ln" if unit == "-" and group not in ("gain", ACCEPTED_EFFECT) else unit
 
 
 @dataclass(frozen=True)

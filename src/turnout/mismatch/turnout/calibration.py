@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from turnout.constants import KMH
-from turnout.mismatch.calibrated.belief import StateParameter, scatter_sd
+from turnout.mismatch.calibrated.belief import ACCEPTED_EFFECT, StateParameter, scatter_sd
 from turnout.mismatch.calibrated.change import change_sd
 from turnout.mismatch.calibrated.constants import CALIBRATION
 from turnout.mismatch.calibrated.file_comparison import model_error
@@ -55,10 +55,12 @@ def calibrated_parameters(case: TrackCase, route: str = "main") -> dict[str, Sta
     low, high = min(measured_at) - CALIBRATION.sensor_reach, max(measured_at) + CALIBRATION.sensor_reach
     castings = zone.castings
     waves = case.data.site.waves
+    of_accepted_effects = {n.name for n in case.accepted.nuisances}
     parameters: dict[str, StateParameter] = {}
     used: Counter[str] = Counter()
     for nuisance in _shared_nuisances(case):
-        name, group, position, index = nuisance.name, nuisance.group, None, None
+        group = ACCEPTED_EFFECT if nuisance.name in of_accepted_effects else nuisance.group
+        name, position, index = nuisance.name, None, None
         start = end = None
         if nuisance.index is not None:
             position = float(support[nuisance.index])
