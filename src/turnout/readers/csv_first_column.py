@@ -7,6 +7,7 @@ from mmap import mmap
 import numpy as np
 
 from turnout.readers.attached_units import TIME_WORDS, is_known, names_and_units_in
+from turnout.readers.clock_texts import is_clock_or_date
 from turnout.readers.column_forms import is_on_line
 from turnout.readers.csv_cells import cells_of, decode_line, is_number
 from turnout.readers.rate_units import rate_unit
@@ -81,14 +82,21 @@ def _counts(numbers: np.ndarray) -> bool:
 
 
 def _first_columns(data: bytes | mmap, offset: int, separator: str, n_cell: int) -> np.ndarray | None:
-    """(2, n) numbers of the first two columns of the first rows; None if they are no numbers."""
+    """(2, n) numbers of the first two columns of the first rows; None if they are no numbers.
+
+    Dates and times of day in the first column become an even rise.
+    """
     rows: list[list[str]] = []
     while len(rows) < N_ROWS and offset < len(data):
         end = (data.find(b"\n", offset) + 1) or len(data)
         cells = cells_of(decode_line(data[offset:end]).strip(), separator)
         if any(cells):
             rows.append(cells[:2])
-        if len(cells) != n_cell or not all(map(is_number, cells[:2])):
+        if len(cells) != n_cell or not is_number(cells[1]) or not (is_number(cells[0]) or is_clock_or_date(cells[0])):
             return None
         offset = end
+    if rows and all(is_clock_or_date(row[0]) for row in rows):
+        rows = [[str(k / 2), row[1]] for k, row in enumerate(rows)]  # times are compared elsewhere
+    elif not all(is_number(row[0]) for row in rows):
+        return None
     return np.array([[float(cell.replace(",", ".")) for cell in row] for row in rows]).T

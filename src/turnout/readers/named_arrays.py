@@ -43,6 +43,7 @@ from turnout.readers.channel_matrices import with_records_of_channels
 from turnout.readers.clock_texts import with_durations
 from turnout.readers.column_forms import HEAD_SIZE, rises_evenly
 from turnout.readers.entries import MAX_ENTRIES, UnreadObject
+from turnout.readers.entry_owners import named_channels
 from turnout.readers.lazy import ARRAYS, Array, Column
 from turnout.readers.metadata_names import (
     RECORD_COUNT_NAMES,
@@ -356,7 +357,13 @@ def _not_numbers(variables: Mapping[str, Any]) -> dict[str, str | UnreadObject]:
 
 def _undecided_scales(names: Sequence[str], facts: Metadata) -> dict[int, str]:
     """Statements about the scale of channels, by index: of the group, its parents and the channels themselves."""
-    texts = scale_statements(without_drawings(facts.scale_facts), len(names))
+    scale_facts = without_drawings(facts.scale_facts)
+    owners = {name: named for name in scale_facts if (named := named_channels(name, names))}
+    texts = scale_statements({n: v for n, v in scale_facts.items() if n not in owners}, len(names))
+    if owners:  # "rail_scale" is that of one channel
+        of_channels = [{n: scale_facts[n] for n, named in owners.items() if i in named} for i in range(len(names))]
+        pairs = zip(texts, (scale_statements(of_channel)[0] for of_channel in of_channels))
+        texts = tuple(", ".join(filter(None, pair)) for pair in pairs)
     problems = facts.nested_scales(names) | {i: scale_problem(text) for i, text in enumerate(texts) if text}
     by_name = dict(facts.get((STATED_SCALES,)) or ())
     return problems | {i: by_name[name] for i, name in enumerate(names) if name in by_name}

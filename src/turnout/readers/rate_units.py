@@ -13,9 +13,9 @@ PER = {"per", "pro", "par", "por", "al", "pr", "je"}
 UNIT_PER = re.compile(rf"\s*(?:/|\b(?:{'|'.join(sorted(PER))})\b\.?)\s*")
 SAMPLES = re.compile(
     r"s|sa|samp|samples?|smpl|pts?|points?|scans?|messwerte?|abtastwerte?|werte?|punkte?|puntos?|punti|malinger|ech"
-    r"|echantillons?|campioni|muestras|count|(?:data ?)?(?:points?|values?)|readings?|mess(?:ungen|punkte)|mesures?"
-    r"|valeurs?|valori|valores|misure|medidas|vaerdier|varden|probek|pomiarow|vzorku|monsters"
+    r"|echantillons?|campioni|muestras|count|data ?points?|mess(?:ungen|punkte)|probek|pomiarow|vzorku|monsters"
 )
+VALUES = re.compile(r"(?:data ?)?values?|readings?|mesures?|valeurs?|valori|valores|misure|medidas|vaerdier|varden")
 SECONDS = set(
     "s sec secs second seconds sek sekund sekunde sekunden sekunder seconde secondes secondi secondo segundo "
     "segundos".split()
@@ -107,7 +107,7 @@ def rate_unit(text: str) -> RateUnit | None:
     if len(parts) != 2:
         return None
     over, under = parts
-    if not over and under in SECONDS:  # "per second"
+    if under in SECONDS and (not over or VALUES.fullmatch(over)):  # "per second", "values/s": of a display, too
         return RateUnit(False, Fraction(1))
     if under in SECONDS:
         for prefix, scale in PREFIXES.items():

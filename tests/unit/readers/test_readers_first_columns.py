@@ -1,5 +1,7 @@
 """Tables with a first column that has no name, as R and pandas write the numbers of their rows."""
 
+from datetime import datetime
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,13 @@ def test_a_line_of_units_may_have_a_unit_for_the_time_alone_or_none(tmp_path):
 )
 def test_names_stay_unused_where_another_column_may_have_none(head, columns, tmp_path):
     assert outcome(tmp_path, head, columns, ";").reason == "channel_missing"
+
+
+def test_times_of_day_need_no_name(tmp_path):
+    stamps = [f"2026-05-13 08:30:{12 + t:08.5f}" for t in TIME]
+    rows = [f"{stamp};{a:.4f};{b:.4f}" for stamp, (a, b) in zip(stamps, SAMPLES)]
+    (tmp_path / "a.txt").write_text("\n".join(["force [N];rail [m/s²]", *rows, ""]), "utf-8")
+    (recording,) = read("a.txt", tmp_path, RawDescription(SENSORS, rate=RATE)).recordings
+    np.testing.assert_allclose(recording.samples.T, SAMPLES)
+    assert recording.started_at == datetime(2026, 5, 13, 8, 30, 12)
+    assert read("a.txt", tmp_path, RawDescription(SENSORS, rate=25600.0)).errors[0].reason == "wrong_rate"

@@ -431,9 +431,9 @@ def test_structure_arrays_and_cells_of_matlab_are_read(kind, tmp_path):
 
 def test_the_error_of_a_file_without_samples_states_its_content(tmp_path):
     np.savez(tmp_path / "a.npz", spectrum=np.ones(50) + 1j)
-    pq.write_table(pa.table({"force": [[1.0, None, 3.0]], "rail": [[1.0, 2.0, 3.0]]}), tmp_path / "a.parquet")
+    pq.write_table(pa.table({"force": [{"x": 1.0}], "rail": [["1.0", "2.0"]]}), tmp_path / "a.parquet")
     layout = RawDescription((RawChannel("force", "force", "force", "N"),), rate=5000.0)
-    for name, words in (("a.npz", "'spectrum' (complex128 of shape (50,))"), ("a.parquet", "'force' (list")):
+    for name, words in (("a.npz", "'spectrum' (complex128 of shape (50,))"), ("a.parquet", "'force' (struct")):
         with pytest.raises(ReadError) as caught:
             read(name, tmp_path, layout)
         assert words in str(caught.value) and "Copy the file again" not in str(caught.value)

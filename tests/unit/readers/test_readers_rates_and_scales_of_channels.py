@@ -224,3 +224,21 @@ def test_the_sign_of_each_channel_in_one_line_or_list(name, plain, opposite, rea
 def test_an_inverter_of_the_supply_is_no_inversion(line, tmp_path):
     text(tmp_path, [line])
     assert not outcome(tmp_path, "a.csv")[1]
+
+
+def test_the_scale_of_a_channel_in_the_name_of_a_variable_is_that_of_no_other(tmp_path):
+    volts = {"force": SAMPLES[:, 0] * 0.23e-3, "rail": SAMPLES[:, 1] * 10.2e-3, "fs": RATE}
+    for of_rail in (98.04, 9.804):
+        scipy.io.savemat(tmp_path / "a.mat", {**volts, "force_scale": 4347.8, "rail_scale": of_rail})
+        result = outcome(tmp_path, "a.mat", IN_VOLTS)
+        if of_rail == 98.04:
+            np.testing.assert_allclose(result[0], SAMPLES)
+            assert not result[1]
+        else:
+            assert "channel 'rail'" in str(result) and "4347.8" not in str(result)
+
+
+@pytest.mark.parametrize("line", ["Data logged at 10 values/s in trend file", "Tact: 5 readings per second (display)"])
+def test_values_per_second_of_something_else_reject_no_file_that_states_its_rate(line, tmp_path):
+    text(tmp_path, ["fs;20000", line])
+    np.testing.assert_allclose(outcome(tmp_path, "a.csv")[0], SAMPLES, atol=1e-6)
