@@ -187,13 +187,13 @@ def test_trains_are_those_of_the_two_first_and_the_two_newest_visits_with_hammer
     days = [f"2026-0{month}-01" for month in range(1, 8)]
     tests = [at("hammer", day) for day in days]
     trains = [at("passage", day) for day in days[1:]]  # no train at the first visit
-    chosen = change_units._trains_of_first_and_newest_visits(tests, trains)
+    chosen = change_units._trains_of_first_and_newest_visits(tests, trains, [])
     assert [p.unit.label[:8] for p in chosen] == ["20260201", "20260301", "20260601", "20260701"]
     by_visit = visits((p.unit for p in (*tests, *trains)), [])
     wanted = change_diagnosis._first_and_newest_with_trains(by_visit)
     assert list(wanted) == [days[1], days[2], days[5], days[6]]
     assert change_diagnosis._first_and_newest_with_trains({day: by_visit[day] for day in days[:2]}) == {}
-    assert [p.unit.label for p in change_units._trains_of_first_and_newest_visits([], trains)] == [
+    assert [p.unit.label for p in change_units._trains_of_first_and_newest_visits([], trains, [])] == [
         trains[-1].unit.label
     ]
 
