@@ -4,6 +4,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version
 
 from turnout.workflow.launch import TurnoutError, launch, quote_interpreter
+from turnout.workflow.registry_copy import copy_list, restore_list
 from turnout.readers.formats import FORMATS
 from turnout.units import to_si
 
@@ -16,6 +17,14 @@ except (
     TurnoutError
 ) as error:  # of an input: its message stands alone, without the lines of the program
     raise WorkflowError(str(error)) from None
+
+
+onstart:
+    copy_list()
+
+
+onerror:
+    restore_list()
 
 
 localrules:
