@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from turnout.mismatch.engine.case import Case
-from turnout.mismatch.engine.localization import locate, locate_component
+from turnout.mismatch.engine.component_evidence import evidence_of_a_changed_stretch
+from turnout.mismatch.engine.localization import _faults_in_passages, locate, locate_component
 from turnout.mismatch.engine.map_fit import fit_jointly
 from turnout.mismatch.engine.nuisance import Nuisance
 from turnout.mismatch.engine.observation import Observation
@@ -76,6 +77,15 @@ class Passages(Case):
 def test_a_channel_without_impacts_that_show_it_counts_with_what_one_filter_explains(facts, text):
     case = Passages(**facts)
     assert str(locate(case, fit_jointly(case))) == text
+
+
+def test_recordings_without_a_fault_have_no_location():
+    """No component differs either: the evidence for that is negative."""
+    case = Passages(0.0)
+    case.place_level = 10.0
+    fit = fit_jointly(case)
+    assert evidence_of_a_changed_stretch(case, fit) < 0.0
+    assert locate(case, fit) is None and not _faults_in_passages(case, fit, weigh_spaces(case, fit, case.control_level))
 
 
 def test_a_channel_whose_fault_is_another_one_in_each_train_needs_impacts():

@@ -258,7 +258,7 @@ def _faults_in_passages(case: Case, fit: Fit, ranked: Sequence[SpaceEvidence]) -
     channels = [w for w in ranked if w.frame == "sensor"]
     filters = [sum(x for name, x in w.by_common_law.items() if name not in hammer_names) for w in channels]
     faults = [replace(w, nats=2.0 * nats - sum(filters)) for w, nats in zip(channels, filters)]
-    least = evidence_of_a_changed_stretch(case, fit)
+    least = max(0.0, evidence_of_a_changed_stretch(case, fit))
     return sorted((w for w in faults if w.nats > least), key=lambda w: -w.nats)
 
 
