@@ -138,9 +138,12 @@ def _changes_under_trains(case: Case, fit: Fit) -> tuple[list[int], np.ndarray, 
     Empty without derivatives, without components of one kind, or with one kind of recordings alone.
     """
     numbers = _components(case)
+    no_change: tuple[list[int], np.ndarray, np.ndarray] = [], np.zeros((0, 0)), np.zeros(0)
+    if not numbers or not fit.jacobian:
+        return no_change
     is_passage = np.concatenate([np.full(o.data.size, not case.is_hammer_test(o)) for o in case.observations])
-    if not numbers or not fit.jacobian or np.all(is_passage) or not np.any(is_passage):
-        return [], np.zeros((0, 0)), np.zeros(0)
+    if np.all(is_passage) or not np.any(is_passage):
+        return no_change
     projector = Projector(case, fit)
     columns = projector.scaled[:, numbers] * (THRESHOLDS.max_ordinary_spreads * is_passage[:, None])
     across = projector.scaled.T @ columns
