@@ -171,6 +171,9 @@ class ReceptancePriors:
     change_octaves: float = prior(
         0.5, "octaves", "correlation length of a change that varies slowly; a quarter and one octave locate alike",
         LOCATED)
+    least_filter: float = prior(
+        1e-3, "-", "variance of a combination of frequencies over that of the strongest; less changes nothing",
+        "numerical")
     max_stretch: int = prior(3, "supports", "next to each other at which one unnamed cause may act", LOCATED)
     relative_step: float = prior(
         1e-3, "-", "change of a support's value, for derivatives of links that follow it", "numerical")

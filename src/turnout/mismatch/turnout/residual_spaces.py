@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from turnout.mismatch.turnout.receptance_sensitivity import ReceptanceSensitivity
 
 
-LEAST_FILTER = 1e-3  # variance of a combination of frequencies over that of the strongest; less changes nothing
 _COMMON_NAMES = [name for name, *_ in COMMON_PARAMETERS]
 _COMMON_VALUES, _RAIL_VALUES = ("pad_stiffness", "ballast_stiffness"), tuple(name for name, _ in RAIL_SDS)
 
@@ -136,7 +135,7 @@ def _slow_filters(high: float) -> tuple[np.ndarray, np.ndarray]:
     octaves = np.linspace(low, np.log2(high), int(np.ceil((np.log2(high) - low) / (0.2 * RECEPTANCE.change_octaves))))
     correlation = np.exp(-0.5 * ((octaves[:, None] - octaves) / RECEPTANCE.change_octaves) ** 2)
     eigenvalues, vectors = np.linalg.eigh(correlation)
-    is_relevant = eigenvalues > LEAST_FILTER * eigenvalues[-1]
+    is_relevant = eigenvalues > RECEPTANCE.least_filter * eigenvalues[-1]
     return octaves, vectors[:, is_relevant] * np.sqrt(eigenvalues[is_relevant])
 
 
