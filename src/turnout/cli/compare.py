@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from turnout.cli.input_warnings import input_warnings
 from turnout.cli.option_types import finite_number, whole_number
 from turnout.cli.options import (
     add_configuration,
@@ -74,11 +75,13 @@ def run(args: argparse.Namespace) -> int:
     ConfigError
         An output cannot be written.
     """
+    from turnout.config import load_configuration
     from turnout.files import write_text
     from turnout.report.comparison_page import comparison_page, spectra_csv
     from turnout.stages.compare import compare_passage
 
     check_output_files(args, "--figure", "--csv")
+    add_warnings(args, input_warnings(load_configuration(args.configuration), args.turnout, args.raw))
     comparison = compare_passage(
         args.file,
         args.turnout,

@@ -17,6 +17,7 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
+from turnout.cli.input_warnings import input_warnings
 from turnout.cli.option_types import zero_or_more
 from turnout.cli.options import (
     add_configuration,
@@ -28,6 +29,7 @@ from turnout.cli.options import (
     add_track,
     add_turnout,
     add_use,
+    add_warnings,
     add_work,
     check_work_folder,
 )
@@ -128,8 +130,10 @@ def _save_and_print(args: argparse.Namespace, results: Results, rows: dict[str, 
 
 def _diagnose(args: argparse.Namespace) -> dict[str, list[dict]]:
     """Rows by table of the requested visit."""
+    from turnout.config import load_configuration
     from turnout.stages.mismatch_results import diagnose_turnout
 
+    add_warnings(args, input_warnings(load_configuration(args.configuration), args.turnout, args.raw))
     with DiagnoseBar() as bar:
         return diagnose_turnout(
             args.turnout, args.configuration, args.raw, args.work, args.visit, args.track, tuple(args.sections),

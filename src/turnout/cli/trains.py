@@ -13,7 +13,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from turnout.cli.options import add_configuration, add_raw, add_registry, add_result, add_turnouts, add_use
+from turnout.cli.input_warnings import input_warnings
+from turnout.cli.options import (
+    add_configuration,
+    add_raw,
+    add_registry,
+    add_result,
+    add_turnouts,
+    add_use,
+    add_warnings,
+)
 from turnout.constants import KMH
 from turnout.counts import count_of
 
@@ -72,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     configuration = load_configuration(args.configuration)
     names = args.turnouts or list(configuration.rows)
     settings = configuration.settings["passage"]
+    for name in names:
+        add_warnings(args, input_warnings(configuration, name, args.raw))
     with open_registry(args.registry):
         pass  # without one there are no clusters: an error before anything is computed
     has_result = []  # of each turnout, then of the clusters

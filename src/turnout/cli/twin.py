@@ -3,17 +3,17 @@
   turnout twin --turnout tommerup_s1
   turnout twin --turnout tommerup_s1 --each-visit
 
-The fit of each visit is stored in the work folder. It is computed again if the code, the track file or the recordings
-have changed. Visits with an open finding of turnout diagnose are not used.
+The fit of each visit is stored in the work folder. It is computed again if the code, the track file, the recordings or
+their rows of campaigns.csv and trains.csv have changed. Visits with an open finding of turnout diagnose are not used.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from turnout.cli.input_warnings import input_warnings
 from turnout.cli.options import (
     add_configuration,
     add_raw,
@@ -30,7 +30,6 @@ from turnout.number_text import evidence_in_words
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from turnout.config import Configuration
     from turnout.mismatch.calibrated import Deviation, ModelAnswer, OnsetEvidence, StateParameter
     from turnout.stages.calibrated_model import CalibratedModel
 
@@ -77,28 +76,12 @@ def run(args: argparse.Namespace) -> int:
     check_work_folder(args)
     configuration = load_configuration(args.configuration)
     turnout = configuration.turnout(args.turnout)
-    add_warnings(args, [*events_in_doubt(configuration, turnout.id), *improbable_entries(turnout, args.track)])
+    add_warnings(args, input_warnings(configuration, turnout.id, args.raw))
+    add_warnings(args, improbable_entries(turnout, args.track))
     model = calibrate_turnout(args.turnout, args.configuration, args.raw, args.work, args.track, args.each_visit)
     add_result(args, answer_rows(model))
     print("\n".join(model_text(args.turnout, model, args.all)))
     return 0
-
-
-def events_in_doubt(configuration: Configuration, turnout_id: str) -> list[str]:
-    """Rows of events.csv that may be of a turnout and do not count, or have a date that cannot be right.
-
-    Parameters
-    ----------
-    configuration : Configuration
-    turnout_id : str
-
-    Returns
-    -------
-    list of str
-        Their warnings, also of a similar id that no turnout has.
-    """
-    rows = (w for w in configuration.warnings if Path(w.path).name == "events.csv")
-    return [str(w) for w in rows if turnout_id in w.turnouts or repr(turnout_id) in str(w)]
 
 
 def model_text(turnout_id: str, model: CalibratedModel, show_all: bool = False) -> Iterator[str]:

@@ -40,15 +40,16 @@ from turnout.stages.combined_visits import (
     without_findings,
 )
 from turnout.stages.copied_files import without_copies
-from turnout.stages.mismatch_groups import unit_of, visits
+from turnout.stages.mismatch_groups import visits
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.restarted_visits import restarted_visits
-from turnout.stages.stored_visits import FOLDER, USED_ANSWERS, by_content, read_visits, version_of
+from turnout.stages.stored_visits import FOLDER, USED_ANSWERS, read_visits
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_fits import VisitFits
 from turnout.stages.visit_notes import summary_of_notes
 from turnout.stages.visit_time import day_of
+from turnout.stages.visit_versions import by_content, version_of
 from turnout.stages.visits_unlike_others import notes_on_channels, unlike_visits
 from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
@@ -112,8 +113,8 @@ def calibrate_turnout(
 ) -> CalibratedModel:
     """Calibrated model of a turnout from all visits below the raw root.
 
-    Visits without stored information of the present code, track file and recordings are fitted, and their information
-    is stored. They are not diagnosed: the test of their innovation decides whether they are used.
+    Visits without stored information of the present code, track file, recordings and notes are fitted, and their
+    information is stored. They are not diagnosed: the test of their innovation decides whether they are used.
 
     Parameters
     ----------
@@ -150,8 +151,7 @@ def calibrate_turnout(
             "nothing can be calibrated."
         )
     code = "-".join([fingerprint("turnout.stages.mismatch"), *sorted(without)])
-    units_of_visits = {v: unit_of(turnout_id, v, units, turnout.hashes["mismatch"]) for v, units in by_visit.items()}
-    versions = {v: version_of(unit, turnout, raw_root, track, code) for v, unit in units_of_visits.items()}
+    versions = {v: version_of(of, turnout, raw_root, track, code) for v, of in by_visit.items()}
     folder = Path(work) / FOLDER
     stored = read_visits(folder, turnout_id, by_content(versions))
     complete = complete_visits(stored)

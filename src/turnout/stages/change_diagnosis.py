@@ -34,21 +34,20 @@ from turnout.stages.change_finding import finding_of_change
 from turnout.stages.change_trains import case_of, trains_of_change
 from turnout.stages.combined_visits import parameters_of, visits_of
 from turnout.stages.copied_files import without_copies
-from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, unit_of, visits
+from turnout.stages.mismatch_groups import groups, members_of, neighbours_of, visits
 from turnout.stages.mismatch_inputs import gather_inputs
 from turnout.stages.recorded_work import events_of
 from turnout.stages.renewals import renewal_note, since_renewal
 from turnout.stages.stored_visits import (
     MAX_FITTED_AXLES,
     StoredVisit,
-    by_content,
     read_visits,
     store_visit,
-    version_of,
 )
 from turnout.stages.track_files import track_of
 from turnout.stages.visit_files import remove_other_visits
 from turnout.stages.visit_time import day_of, years_of
+from turnout.stages.visit_versions import by_content, version_of
 from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
 
@@ -172,8 +171,7 @@ def _fitted_visits(
     passage_tables: Mapping[str, dict] | None = None,
 ) -> tuple[list[StoredVisit], list[str]]:
     """Information of the recordings of each visit at these sections, fitted once; and why one could not be fitted."""
-    units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in by_visit.items()}
-    versions = {v: version_of(u, turnout, raw_root, None, code) for v, u in units.items()}
+    versions = {v: version_of(of, turnout, raw_root, None, code) for v, of in by_visit.items()}
     complete = {s.visit for s in read_visits(folder, turnout.id, by_content(versions))}
     notes = []
     for label, of in by_visit.items():

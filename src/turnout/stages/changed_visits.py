@@ -1,4 +1,4 @@
-"""Stored visits whose recordings, track file or code have changed, or whose file is damaged: they are fitted again."""
+"""Stored visits whose recordings, notes, track file or code have changed, or whose file is damaged: fitted again."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.stages.checkpoint import read_value
-from turnout.stages.mismatch_groups import unit_of
-from turnout.stages.stored_visits import present_versions, version_of
+from turnout.stages.stored_visits import present_versions
 from turnout.stages.visit_files import stored_files, visit_of_file
 from turnout.stages.visit_fits import VisitFits
+from turnout.stages.visit_versions import version_of
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig
@@ -28,7 +28,7 @@ def fit_changed_visits(
     """Fit the stored visits again that have changed, so that the state never lacks a visit that it had.
 
     What was stored of them is removed then. A visit that was diagnosed is fitted with the recordings of its diagnosis.
-    An open finding stays as long as its recordings and the track file do.
+    An open finding stays as long as its recordings, the notes on them and the track file do.
 
     Parameters
     ----------
@@ -49,11 +49,10 @@ def fit_changed_visits(
         Versions of all stored visits, as ``present_versions``.
     """
     about = turnout, raw_root, track, code
-    units = {v: unit_of(turnout.id, v, of, turnout.hashes["mismatch"]) for v, of in by_visit.items()}
-    present = present_versions(folder, units, *about)
+    present = present_versions(folder, by_visit, *about)
     changed = [path for path in stored_files(folder, turnout.id) if _is_changed(path, present)]
     labels = [visit for visit in present if visit in set(map(visit_of_file, changed))]
-    versions = {visit: version_of(units[visit], *about) for visit in labels}
+    versions = {visit: version_of(by_visit[visit], *about) for visit in labels}
     answers = dict(answer for path in changed for answer in _answers(path, versions))
     fits = VisitFits(turnout, folder, by_visit, versions, answers, raw_root, folder.parent, track, (), [])
     fits.fit_all(labels)
@@ -76,11 +75,11 @@ def _is_changed(path: Path, present: Mapping[str, Mapping[str, str]]) -> bool:
 
 
 def _answers(path: Path, versions: Mapping[str, Mapping[str, str]]) -> list[tuple[tuple[str, str], str]]:
-    """The answer of a diagnosis, by visit and neighbours: "" if it was of other recordings or of another track file."""
+    """The answer of a diagnosis, by visit and neighbours: "" if it was of other recordings, notes or track file."""
     try:
         value = read_value(path)
     except KeyError:
         return []
     visit, version = value["visit"], value["version"]
-    holds = all(version.get(k) == versions[visit][k] for k in ("model", "recordings"))
+    holds = all(version.get(k) == versions[visit][k] for k in ("model", "recordings", "notes"))
     return [((visit, value.get("neighbours", "")), value["answer"] if holds else "")] if value["answer"] else []

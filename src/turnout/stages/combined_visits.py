@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from turnout.mismatch.calibrated import StateParameter, VisitInformation
-from turnout.stages.stored_visits import USED_ANSWERS, by_content, read_visits
+from turnout.stages.stored_visits import USED_ANSWERS, read_visits
 from turnout.stages.visit_time import years_of
+from turnout.stages.visit_versions import by_content
 
 if TYPE_CHECKING:
     from turnout.stages.mismatch_groups import Group

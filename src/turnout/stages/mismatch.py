@@ -32,6 +32,7 @@ from turnout.stages.state_rows import state_rows
 from turnout.stages.track_files import digest_of_model, improbable_entries, track_of
 from turnout.stages.visit_notes import notes_in_words
 from turnout.stages.visit_time import years_of
+from turnout.stages.visit_versions import version_of
 from turnout.stages.work_days import work_days_of
 from turnout.workflow.scan import scan
 
@@ -152,7 +153,7 @@ def diagnose_visit(
     )
     about = {"turnout": turnout, "visit": unit.label, "identity": identity, "notes": inputs.notes}
     about |= {"changes": changes_of(track.terms), "effects": accepted}
-    about["version"] = stored_visits.version_of(unit, turnout, raw_root, options.track, algo)
+    about["version"] = version_of(units, turnout, raw_root, options.track, algo)
     rows: dict[str, list[dict]] = {name: [] for name in TABLES}
     members = list(groups(turnout, track, inputs, options.sections))
     # Sections that were chosen, or several visits in one case, are no visit of the calibrated model

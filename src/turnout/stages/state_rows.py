@@ -10,7 +10,8 @@ from turnout.mismatch.calibrated import estimate_history, track_sds
 from turnout.mismatch.turnout.calibration import dip_directions, file_errors
 from turnout.stages.combined_visits import parameters_of, visits_of, without_findings
 from turnout.stages.recorded_work import events_of
-from turnout.stages.stored_visits import by_content, read_visits
+from turnout.stages.stored_visits import read_visits
+from turnout.stages.visit_versions import by_content
 
 if TYPE_CHECKING:
     from turnout.config.turnout import TurnoutConfig

@@ -1,19 +1,17 @@
 """The information of each visit on disk, in one file per group of sections below the work folder.
 
-Each has the versions of its code, track file and recordings. A file of another version is ignored and computed again,
-never read as if it were of this one.
+Each has the versions of its code, track file, recordings and notes beside these. A file of another version is ignored
+and computed again, never read as if it were of this one.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Collection, Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from turnout.content import sha256_of
 from turnout.errors import SimulationError
 from turnout.mismatch.calibrated import GroupInformation, StateParameter
 from turnout.mismatch.calibrated.constants import CALIBRATION
@@ -33,9 +31,9 @@ from turnout.mismatch.turnout.nose_starts import fit_from_nose_positions
 from turnout.mismatch.turnout.relinearization import fit_again
 from turnout.stages.agreeing_visits import FittedGroup, packed_groups, unpacked_groups
 from turnout.stages.checkpoint import SUFFIX, read_value, write_value
-from turnout.stages.track_files import digest_of_model
 from turnout.stages.visit_files import stored_files, visit_of_file
 from turnout.stages.visit_time import years_of
+from turnout.stages.visit_versions import by_content, version_by_files, version_of
 
 if TYPE_CHECKING:
     from turnout.config.settings.mismatch import MismatchSettings
@@ -86,60 +84,15 @@ def folder_of(fits: str | Path) -> Path:
     return Path(fits).parent / FOLDER
 
 
-def version_of(
-    unit: Unit, turnout: TurnoutConfig, raw_root: str | Path, track: str | None, code: str
-) -> dict[str, str]:
-    """Versions that the information of a visit depends on.
-
-    Parameters
-    ----------
-    unit : Unit
-        The files of the visit.
-    turnout : TurnoutConfig
-    raw_root : path
-    track : str or None
-        Track file, None: the turnout's own.
-    code : str
-        Fingerprint of the code.
-
-    Returns
-    -------
-    dict
-        "code", "model" (track, vehicles and settings), "recordings" (content, without copies) and "files" (names, sizes
-        and times of change) -> digest.
-    """
-    paths: dict[str, str] = {}  # of each content the first path
-    for path, *_ in unit.files:
-        content = sha256_of(file) if (file := Path(raw_root) / path).is_file() else f"no file {path}"
-        paths.setdefault(content, path)
-    model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
-    contents = [[path, content] for content, path in paths.items()]
-    return {"code": code, "model": model, "recordings": _digest(contents), "files": _digest(unit.files)}
-
-
-def _digest(value: Sequence[Any]) -> str:
-    return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]
-
-
-def by_content(versions: Mapping[str, Mapping[str, str]]) -> dict[str, dict[str, str]]:
-    """Versions without names, sizes and times of files: a copied folder is not fitted again.
-
-    Parameters
-    ----------
-    versions : mapping
-        Visit -> as ``version_of``.
-
-    Returns
-    -------
-    dict
-    """
-    return {visit: {k: v for k, v in version.items() if k != "files"} for visit, version in versions.items()}
-
-
 def present_versions(
-    folder: Path, units: Mapping[str, Unit], turnout: TurnoutConfig, raw_root: str | Path, track: str | None, code: str
+    folder: Path,
+    by_visit: Mapping[str, Sequence[Unit]],
+    turnout: TurnoutConfig,
+    raw_root: str | Path,
+    track: str | None,
+    code: str,
 ) -> dict[str, dict[str, str]]:
-    """Versions of those stored visits whose recordings are as they were.
+    """Versions that the stored visits have with their present recordings.
 
     Only files that were changed or copied since are read.
 
@@ -147,8 +100,8 @@ def present_versions(
     ----------
     folder : Path
         As ``folder_of``.
-    units : mapping
-        Visit -> its files now.
+    by_visit : mapping
+        Visit -> its recordings now.
     turnout, raw_root, track, code
         As ``version_of``.
 
@@ -157,12 +110,15 @@ def present_versions(
     dict
         Visit -> its versions, for ``read_visits``.
     """
-    model = f"{turnout.hashes['mismatch']}/{digest_of_model(turnout, track)}"
-    by_files = {v: {"code": code, "model": model, "files": _digest(unit.files)} for v, unit in units.items()}
+    by_files = {visit: version_by_files(units, turnout, track, code) for visit, units in by_visit.items()}
     unchanged = {s.visit for s in read_visits(folder, turnout.id, by_files)}
     stored = set(map(visit_of_file, stored_files(folder, turnout.id)))
-    changed = {v: version_of(u, turnout, raw_root, track, code) for v, u in units.items() if v in stored - unchanged}
-    return {v: by_files[v] for v in units if v in unchanged} | by_content(changed)
+    changed = {
+        visit: version_of(units, turnout, raw_root, track, code)
+        for visit, units in by_visit.items()
+        if visit in stored - unchanged
+    }
+    return {v: by_files[v] for v in by_visit if v in unchanged} | by_content(changed)
 
 
 def fit_group(

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 import small_turnout as small
 
+from turnout.cli.input_warnings import events_in_doubt
 from turnout.cli.main import main
-from turnout.cli.twin import events_in_doubt, model_text
+from turnout.cli.twin import model_text
 from turnout.config import load_configuration, with_raw
 from turnout.constants import DAYS_PER_YEAR
 from turnout.errors import SimulationError
