@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from turnout.cli.input_warnings import input_warnings
@@ -132,8 +133,12 @@ def _diagnose(args: argparse.Namespace) -> dict[str, list[dict]]:
     """Rows by table of the requested visit."""
     from turnout.config import load_configuration
     from turnout.stages.mismatch_results import diagnose_turnout
+    from turnout.workflow.future_dates import future_files
+    from turnout.workflow.scan import scan
 
-    add_warnings(args, input_warnings(load_configuration(args.configuration), args.turnout, args.raw))
+    configuration = load_configuration(args.configuration)
+    add_warnings(args, input_warnings(configuration, args.turnout, args.raw))
+    add_warnings(args, map(str, future_files(scan(configuration.turnout(args.turnout), Path(args.raw)).units)))
     with DiagnoseBar() as bar:
         return diagnose_turnout(
             args.turnout, args.configuration, args.raw, args.work, args.visit, args.track, tuple(args.sections),

@@ -52,6 +52,7 @@ from turnout.stages.visit_time import day_of
 from turnout.stages.visit_versions import by_content, version_of
 from turnout.stages.visits_unlike_others import notes_on_channels, unlike_visits
 from turnout.stages.work_days import work_days_of
+from turnout.workflow.future_dates import future_files
 from turnout.workflow.scan import scan
 
 if TYPE_CHECKING:
@@ -156,8 +157,9 @@ def calibrate_turnout(
     stored = read_visits(folder, turnout_id, by_content(versions))
     complete = complete_visits(stored)
     missing = [label for label in by_visit if label not in complete]
+    notes = [*copies, *map(str, future_files(units))]
     of_diagnosis = {(s.visit, s.neighbours): s.answer for s in stored if s.answer}
-    fits = VisitFits(turnout, folder, by_visit, versions, of_diagnosis, raw_root, work, track, without, [*copies])
+    fits = VisitFits(turnout, folder, by_visit, versions, of_diagnosis, raw_root, work, track, without, notes)
     fits.fit_all(missing)
     stored = read_visits(folder, turnout_id, by_content(versions))
     if not any(s.groups for s in stored):

@@ -33,6 +33,7 @@ from turnout.stages.recording_choice import (
 from turnout.stages.track_files import digest_of_model
 from turnout.stages.visit_time import MIDDLE_OF_MONTH, years_of
 from turnout.stages.work_days import days_of_work
+from turnout.workflow.future_dates import up_to_now
 from turnout.workflow.plan import PlannedUnit, read_plan
 
 if TYPE_CHECKING:
@@ -191,6 +192,7 @@ def visits(units: Iterable[Unit], work_days: Sequence[date]) -> dict[str, list[U
 
     No recorded work lies between the day of a visit, or the middle of its month, and its passages: these show another
     track before the work than after it. Passages between two works with no such day between these are in no visit.
+    Nor are recordings that are dated in the future: else one of them would be the newest visit until its day.
 
     Parameters
     ----------
@@ -220,7 +222,7 @@ def visits(units: Iterable[Unit], work_days: Sequence[date]) -> dict[str, list[U
     >>> {name: len(members) for name, members in found.items()}
     {'2026-07': 1, '2026-07-25': 1}
     """
-    units = list(units)
+    units = up_to_now(units)
     days = sorted({date.fromisoformat(u.campaign) for u in units if u.campaign})
     by_visit: dict[str, list[Unit]] = {}
     for unit in units:

@@ -1,9 +1,9 @@
-"""Check campaigns.csv and trains.csv against the raw files."""
+"""Check campaigns.csv and trains.csv against the raw files, and the dates of both."""
 
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from datetime import UTC, date, datetime, timedelta
+from datetime import date, datetime, timedelta
 from pathlib import Path
 from statistics import median
 
@@ -13,11 +13,10 @@ from turnout.config.csv_table import TableError, read_csv
 from turnout.config.events import day_problem, parse_utc
 from turnout.errors import ReadError
 from turnout.records import Unit
+from turnout.workflow.future_dates import REMEDY, future_files, is_future
 from turnout.workflow.notes import start_of
 
 CLOCK_SHIFTS = sorted((h for h in range(-14, 15) if h), key=abs)  # h, offsets of local times from UTC
-FUTURE_TOLERANCE = timedelta(days=1)
-FUTURE_REMEDY = "Correct the date, or the clock of this machine"
 MIN_SEASON = 3  # campaigns of the same and the neighbouring months
 MAX_DIFFERENCE_TO_SEASON = 25.0  # °C, of a rail from the median of its season
 MIN_SHIFTED_PASSAGES = 3  # passages that a shift must match to trains: fewer may match by chance
@@ -40,9 +39,10 @@ def note_contradictions(turnout: TurnoutConfig, raw_root: Path, units: Iterable[
     Yields
     ------
     ReadError
-        An error for each row without files, and for files without a row.
+        An error for each row without files, for files without a row, and for each day in the future.
     """
     units = list(units)
+    yield from future_files(units)
     yield from _campaigns(Path(raw_root) / turnout.raw / "campaigns.csv", f"{turnout.raw}/campaigns.csv", units)
     if turnout.passages:
         tolerance = turnout.settings["passage"].train_data_tolerance
@@ -60,7 +60,7 @@ def _campaigns(path: Path, name: str, units: Sequence[Unit]) -> Iterator[ReadErr
         day = _day(cells["campaign"])
         if day is not None and is_future(datetime.fromisoformat(day)):
             where = str(cells.place(name, line, "campaign"))
-            yield ReadError(name, where, f"the campaign {day} is in the future", FUTURE_REMEDY)
+            yield ReadError(name, where, f"the campaign {day} is in the future", REMEDY)
         days_in_notes.add(day)
         if day is not None and day not in n_files:
             remedy = "Correct its day, put its files there, or remove the row"
@@ -103,21 +103,6 @@ def improbable_temperatures(turnout: TurnoutConfig) -> Iterator[str]:
         )
 
 
-def is_future(moment: datetime) -> bool:
-    """Whether a time is more than a day after now, in any time zone.
-
-    Parameters
-    ----------
-    moment : datetime
-        Naive UTC.
-
-    Returns
-    -------
-    bool
-    """
-    return moment > datetime.now(UTC).replace(tzinfo=None) + FUTURE_TOLERANCE
-
-
 def _day(text: str) -> str | None:
     return None if day_problem(text) else date.fromisoformat(text).isoformat()
 
@@ -129,7 +114,7 @@ def _trains(
     for row in rows:
         if is_future(parse_utc(row["passed_at_utc"])):
             problem = f"a train at {row['passed_at_utc']}, in the future"
-            yield ReadError(name, "column passed_at_utc", problem, FUTURE_REMEDY)
+            yield ReadError(name, "column passed_at_utc", problem, REMEDY)
     passages = [start for unit in units if unit.kind == "passage" and (start := start_of(unit.label))]
     trains = sorted(parse_utc(row["passed_at_utc"]) for row in rows)
 

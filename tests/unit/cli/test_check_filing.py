@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from turnout.cli.main import main
-from turnout.workflow.notes_check import is_future
+from turnout.workflow.future_dates import is_future
 from turnout.workflow.project import create_project
 
 DAY = "2026-05-13"
@@ -95,6 +95,20 @@ def test_a_campaign_and_a_train_with_future_dates_are_reported(project, capsys):
     assert code == 1
     assert "campaigns.csv, line 3, column 1: the campaign 2098-05-13 is in the future" in printed
     assert "trains.csv, column passed_at_utc: a train at 2098-05-13T10:00:00, in the future" in printed
+
+
+def test_a_folder_and_a_file_with_a_name_in_the_future_are_reported(project, capsys):
+    """Without a row of campaigns.csv, too. Each day is one line."""
+    ahead = datetime.now(UTC) + timedelta(days=40)
+    raw = project / "raw" / "W1"
+    test = next(path for path in raw.rglob("A7_1.csv"))
+    folder = test.parent.with_name(f"{ahead:%Y-%m-%d}")
+    folder.mkdir()
+    for name in ("A7_1.csv", "A7_2.csv"):
+        (folder / name).write_bytes(test.read_bytes() + b"\n" * len(name))
+    code, printed = check_output(capsys)
+    (line,) = [line for line in printed.splitlines() if f"{ahead:%Y-%m-%d} is in the future" in line]
+    assert code == 1 and "A7_1.csv and 1 more" in line and "no visit" in line
 
 
 def test_a_time_of_tomorrow_in_another_time_zone_is_not_in_the_future():

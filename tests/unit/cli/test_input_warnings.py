@@ -1,6 +1,7 @@
 """Rows beside the recordings that a command cannot use are stated by every command that reads these tables."""
 
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,10 @@ def test_good_tables_give_no_warning(site, capsys, command):
     main([command, *COMMANDS[command]])
     text = capsys.readouterr().err
     assert "trains.csv" not in text and "campaigns.csv" not in text
+
+
+def test_a_diagnosis_states_recordings_that_are_dated_in_the_future(site, capsys):
+    ahead = datetime.now(UTC) + timedelta(days=40)
+    (site / "raw" / "t1" / f"{ahead:%Y%m%d}T090000Z.csv").write_text("web\n0\n")
+    main(["diagnose", "--turnout", "t1"])
+    assert f"{ahead:%Y-%m-%d} is in the future" in capsys.readouterr().err

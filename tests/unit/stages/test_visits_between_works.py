@@ -1,7 +1,7 @@
 """Passages belong to a visit on their side of recorded work: before tamping or a renewal they show another track."""
 
 import json
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 
 import pytest
 
@@ -70,6 +70,27 @@ def by_visit(tests, trains, *work):
 def test_no_work_lies_between_a_visit_and_its_passages(tests, trains, work, expected):
     found = by_visit(tests, trains, *work)
     assert found == expected and list(found) == list(expected)
+
+
+@pytest.mark.parametrize(
+    ("tests", "trains", "expected"),
+    [
+        # a campaign or a train with a wrong year is no visit, in whatever order
+        ([-40, 200], [-41], {-40: [-41]}),
+        ([200, -40], [250, -39], {-40: [-39]}),
+        ([0], [1], {0: [1]}),  # another time zone
+        ([200, 300], [201], {200: [201], 300: []}),  # all of them: the clock of this machine is late
+    ],
+)
+def test_recordings_of_the_future_are_no_visit(tests, trains, expected):
+    """One of them would be the newest visit until its day, and the nightly run would diagnose no other."""
+
+    def day(n):
+        return f"{datetime.now(UTC) + timedelta(days=n):%Y-%m-%d}"
+
+    visits_found = by_visit([day(n) for n in tests], [day(n) for n in trains])
+    assert visits_found == {day(n): [day(t).replace("-", "") for t in of] for n, of in expected.items()}
+    assert list(visits_found)[-1] == day(max(expected))
 
 
 def work_at(kind, *resets, hour=0):
